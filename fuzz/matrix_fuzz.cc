@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/geometry/import_matrix.h"
+#include "helicarm/geometry/itk_transform.h"
 #include "target.h"
 
 namespace helicarm::fuzz {
 
 void run(std::string_view bytes) {
-  const auto matrix = geometry::import_matrix(put_file("input.txt", bytes), 10);
+  const auto file = put_file("input.txt", bytes);
+  if (const auto transform = geometry::read_itk_transform(file); transform && *transform)
+    check((*transform)->matrix().allFinite(), "the transform is finite");
+  geometry::ImportOptions options{.mm_per_unit = 10, .column = 1, .image_size = Eigen::Vector2i(1024, 768)};
+  options.pixel_mm = {0.4, 0.4};
+  const auto matrix = geometry::import_matrix(file, options);
   if (!matrix) return;
   check(matrix->view.camera_from_world.matrix().allFinite(), "the camera's position is finite");
   check(std::isfinite(matrix->view.intrinsics.fx) && std::isfinite(matrix->view.intrinsics.fy),
@@ -20,8 +26,17 @@ std::vector<std::string> seeds() {
       "image size\n1024,768\n\ncamera "
       "matrix\n4000,0,512\n0,4000,384\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\n"
       "translation\n3\n-5\n700\n",
-      "4000 0 512 1\n0 4000 384 2\n0 0 1 700\n", "[[4000,0,512,1],[0,4000,384,2],[0,0,1,700]]",
+      "4000 0 512 1\n0 4000 384 2\n0 0 1 700\n",
+      "[[4000,0,512,1],[0,4000,384,2],[0,0,1,700]]",
       R"({"projection": [[4000,0,512,1],[0,4000,384,2],[0,0,1,700]], "image_size": [1024, 768]})",
+      "#Insight Transform File V1.0\nTransform: Euler3DTransform_double_3_3\nParameters: 0.1 0.2 0.3 4 5 6\n"
+      "FixedParameters: 7 8 9 1\n",
+      "<RTKThreeDCircularGeometry version=\"3\"><SourceToIsocenterDistance>1000</SourceToIsocenterDistance>"
+      "<Projection><SourceToDetectorDistance>1500</SourceToDetectorDistance></Projection>"
+      "</RTKThreeDCircularGeometry>",
+      "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   data: [ 4000., 0., 512., 0.,\n      "
+      "4000., "
+      "384., 0., 0., 1. ]\nrvec: [ 0.1, 0.2, 0.3 ]\ntvec: [ 3., -5., 700. ]\n",
       "NRRD0004\nsizes: 1024 768\nProjection Matrix:=[[4000,0,512,1],[0,4000,384,2],[0,0,1,700]]\n\n"};
 }
 

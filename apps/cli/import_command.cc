@@ -5,6 +5,7 @@
 
 #include "helicarm/core/json.h"
 #include "helicarm/geometry/import_matrix.h"
+#include "helicarm/geometry/itk_transform.h"
 #include "helicarm/geometry/view_json.h"
 
 namespace helicarm::cli {
@@ -33,6 +34,21 @@ void print_table(const geometry::ImportedMatrix& imported, std::ostream& out) {
     out << fmt::format("image size {} x {}\n", size->x(), size->y());
 }
 
+/// `fixed_from_moving` is the world_from_model of a model placed below the transform in 3D Slicer.
+void print_transform(const geometry::RigidTransform& moving_from_fixed, Console& console) {
+  const Eigen::Matrix4d forward = moving_from_fixed.matrix(), back = moving_from_fixed.inverse().matrix();
+  if (console.json) {
+    console.out << to_text(Json{{"fixed_from_moving", geometry::json_rows(back)},
+                                {"moving_from_fixed", geometry::json_rows(forward)}})
+                << '\n';
+    return;
+  }
+  const Eigen::IOFormat rows(8, 0, "  ", "\n", "  ");
+  console.out << "fixed from moving (LPS, mm)\n"
+              << back.format(rows) << "\nmoving from fixed, as in the file\n"
+              << forward.format(rows) << '\n';
+}
+
 }  // namespace
 
 CommandResult import_command(const ImportArguments& arguments, Console& console) {
@@ -42,6 +58,15 @@ CommandResult import_command(const ImportArguments& arguments, Console& console)
                                   .column = arguments.column,
                                   .undistorted = arguments.undistorted};
   if (!arguments.image_size.empty()) options.image_size = {arguments.image_size[0], arguments.image_size[1]};
+  if (!arguments.pixel_mm.empty()) options.pixel_mm = {arguments.pixel_mm[0], arguments.pixel_mm[1]};
+  if (!arguments.origin_mm.empty()) options.origin_mm = {arguments.origin_mm[0], arguments.origin_mm[1]};
+  auto transform = geometry::read_itk_transform(arguments.file);
+  if (!transform) return tl::unexpected<Failure>(transform.error());
+  if (*transform) {
+    (*transform)->translation *= options.mm_per_unit;
+    print_transform(**transform, console);
+    return {};
+  }
   const auto imported = geometry::import_matrix(arguments.file, options);
   if (!imported) return tl::unexpected<Failure>(imported.error());
   const auto& size = imported->image_size;

@@ -12,13 +12,16 @@ namespace helicarm::cli {
 
 struct ImportArguments {
   std::filesystem::path file;
-  std::string unit = "mm";           ///< of lengths in the file: mm or cm
-  std::optional<int> column = {};    ///< of DLT coefficients
-  std::vector<int> image_size = {};  ///< width, height
+  std::string unit = "mm";             ///< of lengths in the file: mm or cm
+  std::optional<int> column = {};      ///< of DLT coefficients, RTK, OpenCV
+  std::vector<int> image_size = {};    ///< width, height
+  std::vector<double> pixel_mm = {};   ///< of RTK's projection images: column, row
+  std::vector<double> origin_mm = {};  ///< of their first pixel
   bool undistorted = false;
 };
 
-/// Converts the projection of another program to mm and this program's conventions.
+/// Converts the projection of another program to mm and this program's conventions; of an ITK transform
+/// prints both directions.
 CommandResult import_command(const ImportArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

@@ -32,5 +32,22 @@ TEST(ImportCommand, CentimetresBecomeMillimetres) {
   EXPECT_EQ(refused.error().reason, Reason::usage);
 }
 
+/// 3D Slicer's parent transform of a model that moves by (10, 0, 0) L: the file holds the inverse.
+TEST(ImportCommand, ItkTransformIsPrintedInBothDirections) {
+  const fs::path path = fs::temp_directory_path() / fmt::format("helicarm_import_command_{}.tfm", ::getpid());
+  ASSERT_TRUE(write_file(path,
+                         "#Insight Transform File V1.0\n#Transform 0\nTransform: AffineTransform_double_3_3\n"
+                         "Parameters: 1 0 0 0 1 0 0 0 1 -10 0 0\nFixedParameters: 0 0 0\n"));
+  std::ostringstream out, progress;
+  Console console{out, progress};
+  console.json = true;
+  const auto imported = import_command({path}, console);
+  fs::remove(path);
+  ASSERT_TRUE(imported) << imported.error().message;
+  const Json json = *parse_json(out.str(), "out");
+  EXPECT_EQ(json["fixed_from_moving"][0], Json({1.0, 0.0, 0.0, 10.0}));
+  EXPECT_EQ(json["moving_from_fixed"][0], Json({1.0, 0.0, 0.0, -10.0}));
+}
+
 }  // namespace
 }  // namespace helicarm::cli

@@ -200,6 +200,8 @@ void add_rectify(CLI::App& app, Action& action) {
                    "Folder for rectified.dcm (of several images NAME_rectified.dcm), inpainted.dcm, "
                    "map.json and residuals.csv")
       ->capture_default_str();
+  command->add_flag("--field", a.field,
+                    "Also displacement.nrrd: the map as displacement field of ITK and 3D Slicer");
   command->add_flag("--keep-patient", a.keep_patient,
                     "Written images keep the patient and the study of theirs, to be stored with it (default: "
                     "neither name nor dates nor UIDs)");
@@ -228,26 +230,43 @@ void add_detect(CLI::App& app, Action& action) {
 }
 
 void add_import(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, "import", "Read a projection of another program: MayaCam 2, DLT, NRRD, a matrix",
-                  "helicarm import camera.txt --unit cm --json\n"
-                  "  helicarm import MergedDlts.csv --column 2 --image-size 1760,1700 --json");
+  auto* command = add_command(
+      app, "import",
+      "Read a projection or transform of another program: MayaCam 2, DLT, NRRD, OpenCV, RTK, ITK",
+      "helicarm import camera.txt --unit cm --json\n"
+      "  helicarm import MergedDlts.csv --column 2 --image-size 1760,1700 --json\n"
+      "  helicarm import geometry.xml --column 1 --pixel-mm 0.388,0.388 --image-size 1024,768 --json\n"
+      "  helicarm import femur.tfm --json");
   auto& a = arguments_of(command, action, import_command);
   command
-      ->add_option("FILE", a.file,
-                   "MayaCam 2, NRRD header, a 3x4 matrix as text or JSON, or XMALab's DLT coefficients")
+      ->add_option(
+          "FILE", a.file,
+          "MayaCam 2, NRRD header, OpenCV (YAML, XML), RTK (XML), a 3x4 matrix as text or JSON, XMALab's DLT "
+          "coefficients, or an ITK transform (.tfm)")
       ->required();
   command->add_option("--unit", a.unit, "Unit of length in the file: mm or cm")
       ->type_name("WORD")
       ->capture_default_str();
-  command->add_option("--column", a.column, "Camera in a table of DLT coefficients, from 1")
+  command
+      ->add_option("--column", a.column,
+                   "Camera of DLT coefficients, projection of RTK, image of OpenCV; from 1")
       ->check(within(1, 100));
   command
       ->add_option("--image-size", a.image_size,
-                   "Width,height in px; DLT coefficients count rows upwards from 1")
+                   "Width,height in px; DLT coefficients count rows upwards from 1, RTK's mm from the centre")
       ->delimiter(',')
       ->expected(2)
       ->check(within(1, 16384));
+  command->add_option("--pixel-mm", a.pixel_mm, "RTK: spacing of the projection images, column,row")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(within(1e-4, 100));
+  command
+      ->add_option("--origin-mm", a.origin_mm,
+                   "RTK: origin of the projection images (default: the image's centre is 0,0)")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(within(-1e5, 1e5));
   command->add_flag("--undistorted", a.undistorted,
                     "The images are undistorted already: a lens distortion in the file is left out");
 }

@@ -7,6 +7,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/image/png.h"
+#include "helicarm/rectification/displacement_field.h"
 #include "helicarm/rectification/inpaint.h"
 #include "helicarm/rectification/paper_dots.h"
 #include "helicarm/rectification/rectified_dicom.h"
@@ -31,6 +32,15 @@ void write(const std::filesystem::path& to, xray::DerivedImage image, const std:
       *uid = xray::uid_of(xray::text_key(*uid + image.patient_study->sop_instance_uid));
   }
   value_or_throw(xray::write_dicom(to, image));
+}
+
+/// In the pixels of the rectified image that is written; 1 mm where their size is not known.
+void write_field(const RectifyArguments& arguments, const rectification::DistortionMap& map,
+                 const xray::DerivedImage& rectified) {
+  if (!arguments.field) return;
+  const Eigen::Vector2d pixel_mm = rectified.acquisition.pixel_mm.value_or(Eigen::Vector2d::Ones());
+  value_or_throw(
+      write_file(arguments.out / "displacement.nrrd", rectification::displacement_field(map, pixel_mm)));
 }
 
 xray::XrayImage read(const std::filesystem::path& image, const RectifyArguments& arguments) {
@@ -75,8 +85,9 @@ void rectify_image(const RectifyArguments& arguments, Console& console) {
     residuals += fmt::format("{},{},{}\n", r.plate_dots[i].centre_px.x(), r.plate_dots[i].centre_px.y(),
                              r.residual_px[i]);
   const std::filesystem::path& source = arguments.images.front();
-  write(arguments.out / "rectified.dcm", rectification::rectified_dicom(xray_image, r.map, "rectified"),
-        source, arguments);
+  const xray::DerivedImage rectified = rectification::rectified_dicom(xray_image, r.map, "rectified");
+  write_field(arguments, r.map, rectified);
+  write(arguments.out / "rectified.dcm", rectified, source, arguments);
   xray::XrayImage without_dots = xray_image;
   without_dots.pixels = rectification::inpainted(xray_image.pixels, r.plate_dots);
   write(arguments.out / "inpainted.dcm",
@@ -114,7 +125,9 @@ void map_images(const RectifyArguments& arguments, Console& console) {
           files[i].filename().string());
     const std::filesystem::path to =
         arguments.out / (files.size() == 1 ? "rectified.dcm" : names[i] + "_rectified.dcm");
-    write(to, rectification::rectified_dicom(xray_image, map, "rectified"), files[i], arguments);
+    const xray::DerivedImage rectified = rectification::rectified_dicom(xray_image, map, "rectified");
+    if (i == 0) write_field(arguments, map, rectified);
+    write(to, rectified, files[i], arguments);
     written.push_back(to.string());
     if (!console.quiet && !console.json)
       console.out << fmt::format("[{}/{}] {}\n", i + 1, files.size(), to.string());
@@ -183,6 +196,8 @@ CommandResult rectify_command(const RectifyArguments& arguments, Console& consol
       throw BadInput(Reason::usage, "rectify: --stages is of IMAGE --plate --method paper");
     if (a.model && (!a.plate || a.method == "paper"))
       throw BadInput(Reason::usage, "rectify: --model is of IMAGE --plate --method best");
+    if (a.field && (a.images.empty() || a.test_grid_mm))
+      throw BadInput(Reason::usage, "rectify: --field is of IMAGE --plate and of IMAGE... --map");
     if (a.points && a.map && a.images.empty()) return map_points(a, console);
     if (a.images.size() == 1 && a.test_grid_mm && a.map) return measure_grid(a, console);
     if (!a.images.empty() && a.map && !a.plate && !a.points && !a.test_grid_mm) return map_images(a, console);

@@ -23,6 +23,7 @@ struct RectifyArguments {
   std::optional<std::string> model;  ///< distortion model; nothing: automatic
   bool inverse = false;              ///< points: rectified -> raw
   bool stages = false;               ///< also the images of the paper's Fig. 2
+  bool field = false;                ///< also displacement.nrrd
   bool keep_patient = false;         ///< written images stay with the patient and the study of theirs
 };
 

@@ -2,8 +2,6 @@
 #include "helicarm/geometry/import_matrix.h"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -13,7 +11,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
-#include "helicarm/geometry/decomposition.h"
+#include "helicarm/geometry/import_formats.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::geometry {
@@ -21,53 +19,6 @@ namespace {
 
 constexpr std::uintmax_t max_bytes = 256u << 20;  // an NRRD file includes its pixels
 constexpr double largest_number = 1e12;
-constexpr int largest_side_px = 16384;
-constexpr std::string_view separators = " \t\r,;[]";
-
-double number_from(std::string_view word, const std::string& where) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error == std::errc::result_out_of_range || (error == std::errc() && !std::isfinite(value)))
-    throw BadInput(Reason::not_finite, fmt::format("{}: \"{}\" is not finite", where, word));
-  if (error != std::errc() || end != word.data() + word.size())
-    throw BadInput(Reason::bad_value, fmt::format("{}: \"{}\" is not a number", where, word.substr(0, 40)));
-  return value;
-}
-
-std::vector<double> numbers_in(std::string_view line, const std::string& where) {
-  std::vector<double> numbers;
-  for (std::size_t at = line.find_first_not_of(separators); at != std::string_view::npos;) {
-    const std::size_t end = std::min(line.find_first_of(separators, at), line.size());
-    numbers.push_back(number_from(line.substr(at, end - at), where));
-    at = line.find_first_not_of(separators, end);
-  }
-  return numbers;
-}
-
-ImportedMatrix imported(const std::vector<double>& numbers, const std::string& where) {
-  if (numbers.size() != 12)
-    throw BadInput(Reason::bad_size,
-                   fmt::format("{}: {} numbers, a 3x4 matrix has 12", where, numbers.size()));
-  const Projection projection =
-      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
-  const auto view = decompose(projection, Eigen::Vector3d::Zero());
-  if (!view) throw BadInput(Reason::bad_value, fmt::format("{}: {}", where, view.error().message));
-  return {*view, std::nullopt};
-}
-
-Eigen::Vector2i image_size_from(const std::vector<double>& numbers, const std::string& where) {
-  for (double side : numbers)
-    if (numbers.size() != 2 || side < 1 || side > largest_side_px || side != std::floor(side))
-      throw BadInput(Reason::bad_value, fmt::format("{}: image size is not two whole numbers in 1 to {}",
-                                                    where, largest_side_px));
-  if (numbers.empty()) throw BadInput(Reason::truncated, fmt::format("{}: image size is missing", where));
-  return {int(numbers[0]), int(numbers[1])};
-}
-
-std::string trimmed(const std::string& line) {
-  const auto first = line.find_first_not_of(" \t\r");
-  return first == std::string::npos ? "" : line.substr(first, line.find_last_not_of(" \t\r") - first + 1);
-}
 
 /// Numbers after a section's title, up to the next title.
 std::vector<double> section(const std::string& text, const std::string& title, std::size_t count,
@@ -94,37 +45,23 @@ std::string without_line_ends(std::string text) {
   return text;
 }
 
-/// XMALab's lens model: OpenCV's k1, k2, p1, p2, k3 to k6 beside K.
+/// XMALab's lens model is OpenCV's, beside K.
 void check_undistorted(const std::string& text, const std::string& origin, const ImportOptions& options) {
-  if (options.undistorted || text.find("undistortion") == std::string::npos) return;
-  const std::string after = text.substr(text.find("undistortion") + std::string("undistortion").size());
-  auto coefficients = numbers_in(without_line_ends(after), origin + ": undistortion");
-  coefficients.resize(std::max<std::size_t>(coefficients.size(), 2));
-  if (std::ranges::all_of(coefficients, [](double c) { return c == 0; })) return;
-  throw BadInput(Reason::unsupported,
-                 fmt::format("{}: undistortion: the camera has a lens distortion (k1 {:g}, k2 {:g}); export "
-                             "undistorted images, and state that they are (--undistorted)",
-                             origin, coefficients[0], coefficients[1]));
+  const auto at = text.find("undistortion");
+  if (at == std::string::npos) return;
+  const std::string where = origin + ": undistortion";
+  refuse_lens_distortion(
+      numbers_in(without_line_ends(text.substr(at + std::string_view("undistortion").size())), where), where,
+      options);
 }
 
 ImportedMatrix parse_maya_cam(const std::string& text, const std::string& origin,
                               const ImportOptions& options) {
   check_undistorted(text, origin, options);
-  using Rows = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
-  const auto k_numbers = section(text, "camera matrix", 9, origin);
-  const auto r_numbers = section(text, "rotation", 9, origin);
-  const auto t_numbers = section(text, "translation", 3, origin);
-  const Eigen::Matrix3d k = Rows(k_numbers.data());
-  if (k(1, 0) != 0 || k(2, 0) != 0 || k(2, 1) != 0 || k(2, 2) != 1 || k(0, 0) == 0 || k(1, 1) == 0)
-    throw BadInput(
-        Reason::bad_value,
-        fmt::format("{}: camera matrix: must be upper triangular with a 1 as its last number", origin));
-  ImportedMatrix result;
-  result.view.intrinsics = {k(0, 0), k(1, 1), k(0, 2), k(1, 2), k(0, 1)};
-  RigidTransform& pose = result.view.camera_from_world;
-  pose.rotation = Rows(r_numbers.data());
-  pose.translation = Eigen::Map<const Eigen::Vector3d>(t_numbers.data());
-  value_or_throw(rigid_transform_from(pose.matrix(), fmt::format("{}: rotation", origin)));
+  ImportedMatrix result{
+      camera_of(section(text, "camera matrix", 9, origin), section(text, "rotation", 9, origin),
+                section(text, "translation", 3, origin), origin),
+      std::nullopt};
   result.image_size = image_size_from(section(text, "image size", 2, origin), origin);
   return result;
 }
@@ -235,27 +172,26 @@ ImportedMatrix parse_text_matrix(const std::string& text, const std::string& ori
 /// Names what is not read, where the beginning of the text tells.
 void refuse_other_formats(const std::string& text, const std::string& origin) {
   constexpr std::pair<std::string_view, std::string_view> formats[] = {
-      {"RTKThreeDCircularGeometry", "an RTK geometry"},
-      {"opencv_storage", "an OpenCV file"},
-      {"%YAML", "a YAML file, such as OpenCV writes"},
-      {"#Insight Transform File", "an ITK transform"},
-      {"\x89HDF", "an HDF5 file"},
-      {"<?xml", "an XML file"}};
+      {"#Insight Transform File", "an ITK transform, which has no projection"},
+      {"\x89HDF", "an HDF5 file; in 3D Slicer save the transform as .tfm"},
+      {"%YAML", "a YAML file that OpenCV did not write"},
+      {"<?xml", "an XML file of neither RTK nor OpenCV"}};
   const std::string_view beginning = std::string_view(text).substr(0, 1000);
   for (const auto& [mark, name] : formats)
     if (beginning.find(mark) != beginning.npos)
-      throw BadInput(Reason::unsupported,
-                     fmt::format("{}: is {}; give its 3x4 matrix from mm to pixels as text", origin, name));
+      throw BadInput(Reason::unsupported, fmt::format("{}: is {}", origin, name));
 }
 
 ImportedMatrix parse(const std::string& text, const std::string& origin, const ImportOptions& options) {
   const auto first = text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) throw BadInput(Reason::truncated, fmt::format("{}: is empty", origin));
   if (text.starts_with("NRRD")) return parse_nrrd(text, origin);
+  if (is_rtk_geometry(text)) return parse_rtk_geometry(text, origin, options);
+  if (is_opencv_file(text)) return parse_opencv_camera(text, origin, options);
   refuse_other_formats(text, origin);
   if (text.find('\0') != std::string::npos)
     throw BadInput(Reason::unsupported,
-                   fmt::format("{}: neither MayaCam 2, NRRD, JSON nor a text matrix", origin));
+                   fmt::format("{}: neither MayaCam 2, NRRD, RTK, OpenCV, JSON nor a text matrix", origin));
   if (text.find("camera matrix") != std::string::npos) return parse_maya_cam(text, origin, options);
   if (text[first] == '{' || text.substr(first).starts_with("[[")) return parse_json_matrix(text, origin);
   return parse_text_matrix(text, origin, options);

@@ -19,18 +19,22 @@ struct ImportedMatrix {
 };
 
 struct ImportOptions {
-  double mm_per_unit = 1;                          ///< the file's unit of length: 10 for cm
-  std::optional<int> column = {};                  ///< of a table of DLT coefficients, from 1
-  std::optional<Eigen::Vector2i> image_size = {};  ///< width, height; needed for DLT coefficients
+  double mm_per_unit = 1;          ///< the file's unit of length: 10 for cm
+  std::optional<int> column = {};  ///< of a table of DLT coefficients; projection of an RTK geometry; from 1
+  std::optional<Eigen::Vector2i> image_size = {};  ///< width, height; for DLT coefficients and RTK
+  std::optional<Eigen::Vector2d> pixel_mm = {};    ///< spacing of RTK's projection images: column, row
+  /// Of the first pixel's centre on RTK's detector; nothing: the image's centre is at 0, 0.
+  std::optional<Eigen::Vector2d> origin_mm = {};
   /// The images are free of distortion: a lens distortion that the file states is not refused.
   bool undistorted = false;
 };
 
 /// Reads a MayaCam 2 camera (text), an NRRD header with a "Projection Matrix", a 3x4 matrix as text or JSON
-/// (rows, or an object's "projection"), or 11 rows of DLT coefficients, a column for each camera, in XMALab's
-/// pixels (u + 1, height - v). Fails with `missing_file`, `truncated`, `bad_json`, `bad_value`, `not_finite`,
-/// `bad_size`, `unsupported` (another format, or a lens distortion) or `usage` (DLT coefficients without
-/// column or size).
+/// (rows, or an object's "projection"), 11 rows of DLT coefficients, a column for each camera, in XMALab's
+/// pixels (u + 1, height - v), a projection of an RTK geometry (XML), or OpenCV's camera with its pose (YAML
+/// or XML). Fails with `missing_file`, `truncated`, `bad_json`, `bad_value`, `not_finite`, `bad_size`,
+/// `unsupported` (another format, or a lens distortion) or `usage` (DLT coefficients without column or size,
+/// RTK without column, spacing or size).
 Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, const ImportOptions& options = {});
 
 /// From this program's pixels to XMALab's, (u + 1, height - v): the first pixel is 1, v counts upwards.

@@ -2,24 +2,12 @@
 #include "helicarm/geometry/import_matrix.h"
 
 #include <fmt/format.h>
-#include <gtest/gtest.h>
-#include <unistd.h>
 
-#include "helicarm/core/files.h"
 #include "helicarm/geometry/decomposition.h"
+#include "helicarm/geometry/import_text_test.h"
 
 namespace helicarm::geometry {
 namespace {
-namespace fs = std::filesystem;
-
-Expected<ImportedMatrix> import_text(const std::string& text, const ImportOptions& options = {}) {
-  const fs::path path =
-      fs::temp_directory_path() / ("helicarm_import_" + std::to_string(::getpid()) + ".txt");
-  EXPECT_TRUE(write_file(path, text));
-  auto result = import_matrix(path, options);
-  fs::remove(path);
-  return result;
-}
 
 Reason reason_of(const std::string& text) {
   const auto result = import_text(text);
@@ -53,12 +41,9 @@ TEST(ImportMatrix, LensDistortionIsRefusedUnlessTheImagesAreUndistorted) {
 }
 
 TEST(ImportMatrix, OtherProgramsFormatsAreNamed) {
-  for (const auto& [text, name] :
-       {std::pair{
-            "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">",
-            "RTK"},
-        {"%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n", "YAML"},
-        {"#Insight Transform File V1.0\n#Transform 0\n", "ITK"}}) {
+  for (const auto& [text, name] : {std::pair{std::string("<?xml version=\"1.0\"?>\n<html></html>"), "XML"},
+                                   {std::string("\x89HDF\r\n\x1a\n"), "HDF5"},
+                                   {std::string("#Insight Transform File V1.0\n#Transform 0\n"), "ITK"}}) {
     const auto refused = import_text(text);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().reason, Reason::unsupported);
@@ -95,16 +80,12 @@ TEST(ImportMatrix, DltCoefficientsOfXmalabAreTurnedIntoPixels) {
 TEST(ImportMatrix, BrokenMayaCamIsNamed) {
   EXPECT_EQ(reason_of(maya_cam.substr(0, maya_cam.size() - 8)), Reason::truncated);
   EXPECT_EQ(reason_of(maya_cam.substr(0, maya_cam.find("rotation"))), Reason::truncated);
-  const auto replaced = [](const std::string& what, const std::string& by) {
-    std::string text = maya_cam;
-    return text.replace(text.find(what), what.size(), by);
-  };
-  EXPECT_EQ(reason_of(replaced("-0.6,-0.8,0", "0.6,0.8,0")), Reason::bad_value);  // a reflection
-  EXPECT_EQ(reason_of(replaced("-0.6,-0.8", "-0.6,-0.7")), Reason::bad_value);
-  EXPECT_EQ(reason_of(replaced("0,0,1\n\n", "0,1,1\n\n")), Reason::bad_value);
-  EXPECT_EQ(reason_of(replaced("125.25", "nan")), Reason::not_finite);
-  EXPECT_EQ(reason_of(replaced("125.25", "12x")), Reason::bad_value);
-  EXPECT_EQ(reason_of(replaced("1760,1700", "1760,-1")), Reason::bad_value);
+  EXPECT_EQ(reason_of(replaced(maya_cam, "-0.6,-0.8,0", "0.6,0.8,0")), Reason::bad_value);  // a reflection
+  EXPECT_EQ(reason_of(replaced(maya_cam, "-0.6,-0.8", "-0.6,-0.7")), Reason::bad_value);
+  EXPECT_EQ(reason_of(replaced(maya_cam, "0,0,1\n\n", "0,1,1\n\n")), Reason::bad_value);
+  EXPECT_EQ(reason_of(replaced(maya_cam, "125.25", "nan")), Reason::not_finite);
+  EXPECT_EQ(reason_of(replaced(maya_cam, "125.25", "12x")), Reason::bad_value);
+  EXPECT_EQ(reason_of(replaced(maya_cam, "1760,1700", "1760,-1")), Reason::bad_value);
 }
 
 const std::string rows = "-506.148 -0 -3532.97 376726\n-384 -3532.97 -0 285811\n-1 -0 -0 744.3\n";

@@ -10,8 +10,8 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
-#include "helicarm/geometry/import_matrix.h"
 #include "helicarm/rectification/rectified_dicom.h"
+#include "helicarm/report/camera_exports.h"
 #include "helicarm/report/overlay.h"
 
 namespace helicarm::report {
@@ -87,46 +87,13 @@ std::string slicer_markups(const pipeline::Result& result) {
          "\n";
 }
 
-std::string rows_of(const Eigen::MatrixXd& matrix, std::string_view between) {
-  std::string rows;
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i)
-    for (Eigen::Index j = 0; j < matrix.cols(); ++j)
-      rows += fmt::format("{}{}", matrix(i, j), j + 1 < matrix.cols() ? between : "\n");
-  return rows;
-}
-
-std::string maya_cam(const pipeline::ViewResult& view) {
-  const geometry::View& of = view.calibrated->view;
-  return fmt::format("image size\n{},{}\n\ncamera matrix\n{}\nrotation\n{}\ntranslation\n{}",
-                     view.xray_image->pixels.width(), view.xray_image->pixels.height(),
-                     rows_of(of.intrinsics.matrix(), ","), rows_of(of.camera_from_world.rotation, ","),
-                     rows_of(of.camera_from_world.translation, ","));
-}
-
-std::string matrix_text(const pipeline::ViewResult& view) {
-  return "# 3x4: calibrator (mm) to rectified pixels, (0, 0) is the centre of the top-left one\n" +
-         rows_of(view.calibrated->view.projection(), " ");
-}
-
-/// L1 to L11, one column per view, in XMALab's pixels: u + 1 = (L1 x + L2 y + L3 z + L4) / (L9 x + L10 y +
-/// L11 z + 1), height - v with L5 to L8.
-std::string dlt_csv(const std::vector<const pipeline::ViewResult*>& views) {
-  Eigen::MatrixXd columns(11, Eigen::Index(views.size()));
-  for (Eigen::Index i = 0; i < columns.cols(); ++i) {
-    const pipeline::ViewResult& view = *views[std::size_t(i)];
-    const geometry::Projection p =
-        geometry::xmalab_from_pixels(view.xray_image->pixels.height()) * view.calibrated->view.projection();
-    if (!geometry::factors_from_projection(p))
-      throw BadInput(
-          {Reason::point_at_infinity,
-           "has no DLT coefficients: the calibrator's origin lies in the plane of the X-ray source",
-           view.name,
-           {}});
-    const geometry::Projection scaled = p / p(2, 3);
-    columns.col(i) << scaled.row(0).transpose(), scaled.row(1).transpose(),
-        scaled.row(2).head<3>().transpose();
-  }
-  return rows_of(columns, ",");
+/// Among all formats an RTK geometry is left out where RTK cannot represent the camera.
+std::string rtk_if_possible(const pipeline::ViewResult& view, bool among_all) {
+  const auto text = guarded([&] { return rtk_geometry(view); });
+  if (text || among_all) return text.value_or("");
+  Failure failure = text.error();
+  failure.view = view.name;
+  throw BadInput(std::move(failure));
 }
 
 Files files_of(const pipeline::Result& result, std::span<const Export> kinds) {
@@ -146,6 +113,10 @@ Files files_of(const pipeline::Result& result, std::span<const Export> kinds) {
     const std::string stem = file_stem(view.name, i);
     if (wanted(Export::mayacam)) add(stem + "_mayacam.txt", maya_cam(view));
     if (wanted(Export::matrix)) add(stem + "_matrix.txt", matrix_text(view));
+    if (wanted(Export::opencv)) add(stem + "_opencv.yml", opencv_yaml(view));
+    if (wanted(Export::itk)) add(stem + "_pose.tfm", itk_pose(view));
+    if (wanted(Export::rtk))
+      add(stem + "_rtk.xml", rtk_if_possible(view, kinds.size() == every_export.size()));
   }
   if (wanted(Export::dlt) && !calibrated.empty()) add("dlt.csv", dlt_csv(calibrated));
   return files;

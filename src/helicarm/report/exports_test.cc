@@ -65,8 +65,19 @@ TEST_F(Exports, AllAreWritten) {
   ASSERT_TRUE(written) << written.error().message;
   std::vector<std::string> names;
   for (const fs::path& path : *written) names.push_back(path.filename().string());
-  EXPECT_THAT(names, testing::ElementsAre("AP_matrix.txt", "AP_mayacam.txt", "LAT_matrix.txt",
-                                          "LAT_mayacam.txt", "dlt.csv", "points.csv", "points.mrk.json"));
+  EXPECT_THAT(names, testing::ElementsAre("AP_matrix.txt", "AP_mayacam.txt", "AP_opencv.yml", "AP_pose.tfm",
+                                          "LAT_matrix.txt", "LAT_mayacam.txt", "LAT_opencv.yml",
+                                          "LAT_pose.tfm", "dlt.csv", "points.csv", "points.mrk.json"));
+}
+
+TEST_F(Exports, RtkRefusesASkewOnlyWhereItIsChosen) {
+  const std::array only{Export::rtk};
+  const auto refused = write_exports(result_, folder_, only);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::unsupported);
+  EXPECT_EQ(refused.error().view, "AP");
+  for (pipeline::ViewResult& view : result_.views) view.calibrated->view.intrinsics.skew = 0;
+  EXPECT_EQ(write_exports(result_, folder_, only).value().size(), 2u);
 }
 
 TEST_F(Exports, RectifiedImagesAreOfTheViews) {
@@ -150,7 +161,7 @@ TEST_F(Exports, OnlyRequestedAndAvailablePartsAreWritten) {
   result_.points.clear();
   result_.tunnel_ends.clear();
   result_.views[1].calibrated.reset();
-  EXPECT_EQ(write_exports(result_, folder_).value().size(), 3u);
+  EXPECT_EQ(write_exports(result_, folder_).value().size(), 5u);
   const std::array kinds{Export::csv, Export::matrix};
   EXPECT_EQ(write_exports(result_, folder_, kinds).value().size(), 1u);
 }
