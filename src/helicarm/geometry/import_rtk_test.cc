@@ -96,7 +96,7 @@ class RtkViews : public testing::TestWithParam<double> {};
 /// A point's pixel by RTK's matrix is the view's, whichever way the rows run.
 TEST_P(RtkViews, AreTheCamera) {
   const Eigen::Vector2i size(640, 480);
-  const View view{{GetParam(), 3100, 331.5, 228.25, 0},
+  const View view{{GetParam(), 3100, 331.5, 228.25, 1e-18},
                   {rotation_from_vector({0.4, -1.9, 0.7}), {14, -9, 610}}};
   const auto rtk = rtk_view(view, size, 0.3);
   ASSERT_TRUE(rtk) << rtk.error().message;

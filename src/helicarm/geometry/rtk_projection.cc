@@ -12,6 +12,7 @@ namespace helicarm::geometry {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
+constexpr double rounding_px = 1e-6;  // skew of an estimate without skew
 
 /// The opposite angles x (out of plane), y (gantry), z (in plane) of Rz Rx Ry, in degrees.
 Eigen::Vector3d rtk_angles(const Eigen::Matrix3d& rotation) {
@@ -56,7 +57,7 @@ Eigen::Matrix3d RtkPixels::pixels_from_mm() const {
 
 Expected<RtkView> rtk_view(const View& view, const Eigen::Vector2i& image_size, double pixel_mm) {
   const Intrinsics& k = view.intrinsics;
-  if (k.skew != 0)
+  if (std::abs(k.skew) > rounding_px)
     return fail(Reason::unsupported,
                 fmt::format("RTK's geometry has no skew; the camera's is {:g} px", k.skew));
   const Eigen::Vector3d& t = view.camera_from_world.translation;
