@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "helicarm/rectification/basis.h"
+#include "helicarm/rectification/models/polynomial.h"
 
 namespace helicarm::rectification {
 namespace {
@@ -16,18 +16,18 @@ using Eigen::Vector2d;
 
 /// About 15 px of pincushion at the corner.
 DistortionMap pincushion(int width, int height) {
+  const Vector2d centre(width / 2.0, height / 2.0);
+  const double scale = width / 2.0;
+  Eigen::MatrixX2d coefficients = Eigen::MatrixX2d::Zero(10, 2);
+  coefficients.row(0) << centre.x() + 1, centre.y() - 2;
+  coefficients.row(1) << scale, 1;
+  coefficients.row(2) << -1, scale;
+  coefficients.row(6) << 7, 0;
+  coefficients.row(7) << 0, 7;
+  coefficients.row(8) << 7, 0;
+  coefficients.row(9) << 0, 7;
   DistortionMap map;
-  map.order = 3;
-  map.centre = {width / 2.0, height / 2.0};
-  map.scale = width / 2.0;
-  map.coefficients = Eigen::MatrixX2d::Zero(term_count(3), 2);
-  map.coefficients.row(0) << map.centre.x() + 1, map.centre.y() - 2;
-  map.coefficients.row(1) << map.scale, 1;
-  map.coefficients.row(2) << -1, map.scale;
-  map.coefficients.row(6) << 7, 0;
-  map.coefficients.row(7) << 0, 7;
-  map.coefficients.row(8) << 7, 0;
-  map.coefficients.row(9) << 0, 7;
+  map.model = polynomial_model(3, {centre, scale}, coefficients);
   map.width = width;
   map.height = height;
   return map;
