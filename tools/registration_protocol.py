@@ -216,9 +216,9 @@ def tables(rows):
             kept = [row for row in own if row["decision"] != "refuse"]
             errors = [row["mtre_mm"] for row in kept]
             share = lambda limit: f"{sum(e < limit for e in errors)} of {len(own)}"  # noqa: E731
-            inside = np.mean([row["inside"] for row in kept if "inside" in row]) if kept else math.nan
+            inside = [row["inside"] for row in kept if "inside" in row]
             lines.append(f"| {low} to {high} mm | {len(own)} | {' | '.join(figures(errors))} | {share(1)} | {share(2)} | "
-                         f"{len(own) - len(kept)} | {100 * inside:.0f} % |")
+                         f"{len(own) - len(kept)} | {f'{100 * np.mean(inside):.0f} %' if inside else '-'} |")
         kept = [row["start_mm"] for row in right if row["decision"] != "refuse" and row["mtre_mm"] > 2]
         lines += ["", f"Median {np.median([row['seconds'] for row in right]):.1f} s. Not refused and beyond 2 mm: {len(kept)}.", ""]
     wrong = [kind for kind in KINDS[1:] if any(row["kind"] == kind for row in rows)]

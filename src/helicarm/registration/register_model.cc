@@ -176,6 +176,15 @@ void describe(const Scene& scene, const Estimate& best, Registration& result) {
 
 }  // namespace
 
+Warning cameras_without_covariance(const std::string& name) {
+  return {Reason::covariance_missing,
+          name +
+              ": the cameras come without covariance and are taken as exact: their errors are not in the "
+              "covariance; views that helicarm calibrates have one",
+          {},
+          {}};
+}
+
 std::string_view word(Decision decision) {
   return decision == Decision::accept ? "accept" : decision == Decision::warn ? "warn" : "refuse";
 }
@@ -222,8 +231,11 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
       deformation_of(best.observation, errors.correlation_px, errors.edge_mm / model.radius_mm);
   compare_views(errors, stages.back().level, best, result);
   if (result.disagreement) result.covariance *= result.disagreement->ratio();
-  step("mirror image");
-  result.mirrored_ratio = mirrored_cost_ratio(scene, best.pose, best.score, stages, options.search);
+  if (options.search.candidates > 0) {
+    step("mirror image");
+    result.mirrored_ratio = mirrored_cost_ratio(scene, best.pose, best.score, stages, options.search);
+  }
+  if (errors.cameras.isZero(0)) result.warnings.push_back(cameras_without_covariance(model.name));
   decide(model, starts, options, result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return result;

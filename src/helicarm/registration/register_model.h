@@ -71,12 +71,16 @@ struct Registration {
   double spacing_mm = 0;  ///< of the finest comparison
   int starts = 0, agree = 0;
   std::optional<RunnerUp> runner_up;
-  std::optional<double> mirrored_ratio;  ///< cost ratio of the mirrored model
+  std::optional<double>
+      mirrored_ratio;  ///< cost ratio of the mirrored model; a search without candidates: none
   Deformation deformation;
   std::optional<Disagreement> disagreement;  ///< of two or more views
   std::vector<RegisteredView> views;
   double seconds = 0;
 };
+
+/// covariance_missing, of a registration to cameras of other programs.
+Warning cameras_without_covariance(const std::string& name);
 
 /// Registers a model to the views from one or more starting poses (world_from_model). Refusals are in the
 /// result: out_of_capture, wrong_model, registration_ambiguous, registration_disagrees, uncertain.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 
 #include "helicarm/core/parallel.h"
 
@@ -11,6 +12,8 @@ namespace helicarm::registration {
 namespace {
 
 using geometry::RigidTransform;
+
+constexpr std::size_t most_given = 3;  // starts that are tried whatever their score
 
 /// The additive recurrence with the generalised golden ratio of six dimensions (Roberts 2018), in -1 .. 1.
 RigidStep sequence(int number) {
@@ -55,61 +58,79 @@ std::vector<std::size_t> best_of(const Model& model, const std::vector<RigidTran
   return kept;
 }
 
+/// A pose on its way through the stages, and the numbers of the starts that led to it.
+struct Descent {
+  RigidTransform pose;
+  std::set<std::size_t> starts;
+};
+
+/// The given starts, then the best poses about them.
+std::vector<Descent> first_poses(const Scene& scene, const SearchStage& stage,
+                                 const std::vector<RigidTransform>& starts, const SearchOptions& options) {
+  std::vector<Descent> first;
+  const auto add = [&](const RigidTransform& pose) { first.push_back({pose, {first.size()}}); };
+  if (starts.size() <= most_given || options.candidates == 0) std::ranges::for_each(starts, add);
+  if (options.candidates == 0) return first;
+  const auto candidates = candidates_about(scene.model(), starts, options);
+  std::vector<double> scores(candidates.size());
+  parallel_for(candidates.size(), scene.threads(), [&](std::size_t i) {
+    scores[i] = scene.observe(stage.level, candidates[i], false, 1).score();
+  });
+  for (const std::size_t i : best_of(scene.model(), candidates, scores, stage.keep, stage.level.spacing_mm))
+    add(candidates[i]);
+  return first;
+}
+
+std::vector<Estimate> refined(const Scene& scene, const Level& level, const std::vector<Descent>& from,
+                              double converged) {
+  std::vector<Estimate> estimates(from.size());
+  const bool few = from.size() < 2 * std::size_t{std::max(1U, scene.threads())};
+  parallel_for(from.size(), few ? 1 : scene.threads(), [&](std::size_t i) {
+    estimates[i] = refine(scene, level, from[i].pose,
+                          {.iterations = 15, .converged = converged, .threads = few ? scene.threads() : 1});
+  });
+  return estimates;
+}
+
 }  // namespace
 
 SearchResult search(Scene& scene, const std::vector<SearchStage>& stages,
                     const std::vector<RigidTransform>& starts, const SearchOptions& options, double same_mm) {
   const Model& model = scene.model();
   for (const SearchStage& stage : stages) scene.prepare(stage.level, starts.front() * model.centre);
-  const auto candidates = candidates_about(model, starts, options);
-  std::vector<double> scores(candidates.size());
-  parallel_for(candidates.size(), scene.threads(), [&](std::size_t i) {
-    scores[i] = scene.observe(stages.front().level, candidates[i], false, 1).score();
-  });
-  std::vector<RigidTransform> poses;
-  if (starts.size() <= 3) poses = starts;  // a given pose is tried whatever its score
-  for (const std::size_t i :
-       best_of(model, candidates, scores, stages.front().keep, stages.front().level.spacing_mm))
-    poses.push_back(candidates[i]);
+  std::vector<Descent> descents = first_poses(scene, stages.front(), starts, options);
   SearchResult result;
-  result.starts = int(poses.size());
-  std::vector<RigidTransform> ends;
+  result.starts = int(descents.size());
   for (const SearchStage& stage : stages) {
-    // Coarse levels can lead away from a good start.
-    if (&stage != &stages.front() && starts.size() <= 3)
-      poses.insert(poses.end(), starts.begin(), starts.end());
-    std::vector<Estimate> estimates(poses.size());
-    const bool few = poses.size() < 2 * std::size_t{std::max(1U, scene.threads())};
-    parallel_for(poses.size(), few ? 1 : scene.threads(), [&](std::size_t i) {
-      estimates[i] = refine(scene, stage.level, poses[i],
-                            {.iterations = 15,
-                             .converged = &stage == &stages.back() ? 0.002 : 0.02,
-                             .threads = few ? scene.threads() : 1});
-    });
-    if (poses.size() + 3 >= std::size_t(result.starts)) {
-      ends.clear();
-      for (const Estimate& estimate : estimates) ends.push_back(estimate.pose);
-    }
-    std::vector<RigidTransform> reached;
-    std::vector<double> finals;
-    for (const Estimate& estimate : estimates)
-      reached.push_back(estimate.pose), finals.push_back(estimate.score);
     const bool last = &stage == &stages.back();
-    const int keep = last ? int(poses.size()) : (&stage)[1].keep;
-    poses.clear();
-    const auto order = best_of(model, reached, finals, std::max(2, keep), same_mm);
-    if (order.size() > 1) {
-      result.runner_up = estimates[order[1]];
-      result.runner_up_best = finals[order[0]];
+    // Coarse levels can lead away from a good start.
+    if (&stage != &stages.front() && starts.size() <= most_given && options.candidates > 0)
+      for (std::size_t i = 0; i < starts.size(); ++i) descents.push_back({starts[i], {i}});
+    auto estimates = refined(scene, stage.level, descents, last ? 0.002 : 0.02);
+    std::vector<RigidTransform> reached;
+    std::vector<double> scores;
+    for (const Estimate& estimate : estimates)
+      reached.push_back(estimate.pose), scores.push_back(estimate.score);
+    const std::size_t keep = last ? estimates.size() : std::size_t((&stage)[1].keep);
+    auto kept = best_of(model, reached, scores, int(std::max<std::size_t>(2, keep)), same_mm);
+    if (kept.size() > 1) {
+      result.runner_up = estimates[kept[1]];
+      result.runner_up_best = scores[kept[0]];
     }
-    for (std::size_t k = 0; k < order.size() && int(k) < keep; ++k) {
-      poses.push_back(reached[order[k]]);
-      if (last) result.solutions.push_back(std::move(estimates[order[k]]));
+    kept.resize(std::min(kept.size(), keep));
+    std::vector<Descent> next;
+    for (const std::size_t k : kept) next.push_back({reached[k], {}});
+    for (std::size_t i = 0; i < descents.size(); ++i) {
+      const auto same = std::ranges::find_if(next, [&](const Descent& descent) {
+        return separation(model, descent.pose, reached[i]) < same_mm;
+      });
+      if (same != next.end()) same->starts.insert(descents[i].starts.begin(), descents[i].starts.end());
     }
+    if (last)
+      for (const std::size_t k : kept) result.solutions.push_back(std::move(estimates[k]));
+    descents = std::move(next);
   }
-  // The last stages move the best a little: what ended near its coarse place agrees.
-  for (const RigidTransform& end : ends)
-    if (separation(model, end, result.solutions.front().pose) < 2 * same_mm) ++result.agree;
+  result.agree = int(descents.front().starts.size());
   return result;
 }
 

@@ -17,7 +17,7 @@ struct SearchStage {
 struct SearchOptions {
   double shift_mm = 15;  ///< per axis, about each start
   double turn_deg = 15;
-  int candidates = 600;  ///< scored at the first level
+  int candidates = 600;  ///< scored at the first level; 0: the starts alone are refined
 };
 
 struct SearchResult {
@@ -26,7 +26,7 @@ struct SearchResult {
   std::optional<Estimate> runner_up;
   double runner_up_best = 0;
   int starts = 0;  ///< refined
-  int agree = 0;   ///< of them, that ended within `same_mm` of the best before only the best went on
+  int agree = 0;   ///< of them, that led to the best: at each level what ends within `same_mm` goes on as one
 };
 
 /// Poses about the starts in a low-discrepancy sequence (each start first), the best of which are refined
