@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/registration/vtp.h"
 
 namespace helicarm::registration {
 namespace {
@@ -39,6 +40,14 @@ class Welder {
 
 void add_triangle(TriangleMesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c) {
   if (a != b && b != c && c != a) mesh.triangles.push_back({a, b, c});
+}
+
+TriangleMesh welded(const TriangleMesh& soup) {
+  TriangleMesh mesh;
+  Welder weld(mesh);
+  for (const auto& [a, b, c] : soup.triangles)
+    add_triangle(mesh, weld(soup.corners[a]), weld(soup.corners[b]), weld(soup.corners[c]));
+  return mesh;
 }
 
 template <class T>
@@ -259,10 +268,13 @@ TriangleMesh mesh_from(std::string_view bytes, const std::string& origin) {
   const bool sized = bytes.size() >= stl_header &&
                      bytes.size() == stl_header + stl_facet * std::size_t{value_at<std::uint32_t>(bytes, 80)};
   if (!sized && bytes.starts_with("solid")) return from_text_stl(bytes, origin);
-  if (bytes.starts_with("<?xml") || bytes.starts_with("# vtk") || bytes.starts_with("<VTKFile"))
-    throw BadInput(Reason::unsupported, fmt::format("{}: a VTK file; save the model as STL or PLY", origin));
+  if (is_vtk_xml(bytes)) return welded(mesh_from_vtp(bytes, origin));
+  if (bytes.starts_with("<?xml") || bytes.starts_with("# vtk"))
+    throw BadInput(Reason::unsupported,
+                   fmt::format("{}: neither STL, PLY nor VTK's XML; save the model as one of these", origin));
   if (bytes.size() < stl_header)
-    throw BadInput(Reason::truncated, fmt::format("{}: {} bytes, neither STL nor PLY", origin, bytes.size()));
+    throw BadInput(Reason::truncated,
+                   fmt::format("{}: {} bytes, neither STL, PLY nor VTP", origin, bytes.size()));
   return from_binary_stl(bytes, origin);
 }
 

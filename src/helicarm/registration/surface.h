@@ -15,8 +15,9 @@ namespace helicarm::registration {
 /// Largest number of triangles of a surface file.
 inline constexpr std::size_t max_triangles = 5'000'000;
 
-/// Reads STL (binary or text) or PLY (text or binary), detected by content. Corners at one place are joined.
-/// Fails with missing_file, truncated, bad_size, bad_value, not_finite, unsupported.
+/// Reads STL (binary or text), PLY (text or binary) or VTK XML PolyData (`mesh_from_vtp`), detected by
+/// content. Corners at one place are joined. Fails with missing_file, truncated, bad_size, bad_value,
+/// not_finite, unsupported.
 Expected<phantom::TriangleMesh> read_surface(const std::filesystem::path& path);
 Expected<phantom::TriangleMesh> surface_from(std::string_view bytes, const std::string& origin);
 
