@@ -50,7 +50,7 @@ void add_register(CLI::App& app, Action& action) {
                               "helicarm register my-case --out my-registration\n\n"
                               "case.json holds \"models\": a CT (\"volume\", with \"mask\" or \"window_hu\") "
                               "or a closed surface (\"surface\",\n"
-                              "STL or PLY), a \"start\" (a pose, landmarks, or none) and a \"plan\" (3D "
+                              "STL, PLY or VTP), a \"start\" (a pose, landmarks, or none) and a \"plan\" (3D "
                               "Slicer's markups). The views are\n"
                               "calibrated by the program, or bring cameras: \"camera\": \"camera.json\" as "
                               "helicarm import --json prints it.\n"
@@ -70,6 +70,10 @@ void add_register(CLI::App& app, Action& action) {
   command->add_option("--search-deg", a.options.turn_deg, "Search about the start, degrees per axis")
       ->check(within(0, 180))
       ->capture_default_str();
+  command->add_option("--frames", a.frames,
+                      "Follow the models through the frames A-B[:STEP] of files with several frames, or of "
+                      "numbered files (\"image\": \"ap_{frame:03d}.tif\"); writes registration.csv and "
+                      "relative.csv");
 }
 
 void add_export(CLI::App& app, Action& action) {

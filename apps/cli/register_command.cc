@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/case_registration/follow_case.h"
 #include "helicarm/core/json.h"
 #include "helicarm/pipeline/registration_case.h"
+#include "progress_line.h"
 
 namespace helicarm::cli {
 namespace {
@@ -37,7 +39,31 @@ void print(const RegisteredModel& model, std::ostream& out) {
 /// Files of an earlier run could be taken for an answer.
 void forget(const std::filesystem::path& out) {
   std::error_code ignored;
-  for (const char* file : {"registration.json", "report.html"}) std::filesystem::remove(out / file, ignored);
+  for (const char* file : {"registration.json", "report.html", "registration.csv", "relative.csv"})
+    std::filesystem::remove(out / file, ignored);
+}
+
+/// Every model through a sequence of images.
+void follow(const RegisterArguments& arguments, const case_registration::RegisterOptions& options,
+            Console& console) {
+  const auto range = value_or_throw(case_registration::frame_range_from(arguments.frames));
+  const auto given = value_or_throw(pipeline::read_registration_case(arguments.folder));
+  ProgressLine progress(console);
+  const auto sequence = value_or_throw(
+      case_registration::follow_case(given, range, options, [&](double share) { progress.notify(share); }));
+  if (sequence.failure) throw BadInput(*sequence.failure);
+  value_or_throw(case_registration::write_sequence(sequence, arguments.out));
+  if (!console.quiet) {
+    for (std::size_t i = 0; i < given.models.size(); ++i) {
+      int counts[3] = {};
+      for (const auto& frame : sequence.frames) ++counts[int(frame.models[i].decision)];
+      console.out << fmt::format("  {}: {} accepted, {} warned, {} refused\n", given.models[i].name,
+                                 counts[0], counts[1], counts[2]);
+    }
+    console.out << fmt::format("  {} frames in {:.1f} s\n\n  written to {}\n", sequence.frames.size(),
+                               sequence.seconds, arguments.out.string());
+  }
+  if (const auto refusal = sequence.refusal()) throw BadInput(*refusal);
 }
 
 }  // namespace
@@ -51,6 +77,7 @@ CommandResult register_command(const RegisterArguments& arguments, Console& cons
       options.on_step = [&](const std::string& model, std::string_view step) {
         console.progress << fmt::format("helicarm: {}{}{}\n", model, model.empty() ? "" : ": ", step);
       };
+    if (!arguments.frames.empty()) return follow(arguments, options, console);
     const auto given = value_or_throw(pipeline::read_registration_case(arguments.folder));
     const auto result = value_or_throw(case_registration::register_case(given, options));
     value_or_throw(case_registration::write_registration(result, arguments.out));

@@ -101,31 +101,31 @@ volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& given,
   return stack ? tiff_stack(path, *given.voxel_mm, offset_hu) : value_or_throw(volume::read_volume(path));
 }
 
-}  // namespace
-
-Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given) {
-  return guarded([&] {
-    LoadedViews loaded;
-    for (std::size_t i = 0; i < given.base.views.size(); ++i) {
-      const pipeline::CaseView& view = given.base.views[i];
-      const xray::XrayImage image = value_or_throw(xray::read_xray_image(view.image, view.name, view.frame));
-      const geometry::ImportedMatrix camera = value_or_throw(geometry::import_matrix(given.cameras[i]));
-      const Eigen::Vector2i size(image.pixels.width(), image.pixels.height());
-      if (camera.image_size && *camera.image_size != size)
-        throw BadInput(Reason::bad_size,
-                       fmt::format("{}: the camera is for {} x {} pixels, the image has {} x {}", view.name,
-                                   camera.image_size->x(), camera.image_size->y(), size.x(), size.y()));
-      loaded.views.push_back(view_of(image, view.name, camera.view));
-      loaded.views.back().grey = image.pixels;
-      loaded.maps.emplace_back();
-      loaded.warnings.insert(loaded.warnings.end(), image.warnings.begin(), image.warnings.end());
-    }
-    return loaded;
-  });
+void check_size(const std::string& view, const char* expected_by, const Eigen::Vector2i& expected,
+                const image::Image<float>& image) {
+  if (expected != Eigen::Vector2i(image.width(), image.height()))
+    throw BadInput(Reason::bad_size,
+                   fmt::format("{}: {} {} x {} pixels, the image has {} x {}", view, expected_by,
+                               expected.x(), expected.y(), image.width(), image.height()));
 }
 
-LoadedViews load_views(const pipeline::RegistrationCase& given,
-                       const pipeline::CaseCalibration& calibration) {
+LoadedViews views_of_cameras(const pipeline::RegistrationCase& given) {
+  LoadedViews loaded;
+  for (std::size_t i = 0; i < given.base.views.size(); ++i) {
+    const pipeline::CaseView& view = given.base.views[i];
+    const xray::XrayImage image = value_or_throw(xray::read_xray_image(view.image, view.name, view.frame));
+    const geometry::ImportedMatrix camera = value_or_throw(geometry::import_matrix(given.cameras[i]));
+    if (camera.image_size) check_size(view.name, "the camera is for", *camera.image_size, image.pixels);
+    loaded.views.push_back(view_of(image, view.name, camera.view));
+    loaded.views.back().grey = image.pixels;
+    loaded.maps.emplace_back();
+    loaded.warnings.insert(loaded.warnings.end(), image.warnings.begin(), image.warnings.end());
+  }
+  return loaded;
+}
+
+LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
+                                 const pipeline::CaseCalibration& calibration) {
   LoadedViews loaded;
   for (std::size_t i = 0; i < calibration.views.size(); ++i) {
     const pipeline::LabelledView& image = calibration.images[i];
@@ -138,6 +138,42 @@ LoadedViews load_views(const pipeline::RegistrationCase& given,
   loaded.camera_covariance = calibration.joint_covariance;
   loaded.warnings = calibration.warnings;
   return loaded;
+}
+
+}  // namespace
+
+Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, unsigned threads,
+                                 const std::function<void(std::string_view stage)>& on_stage) {
+  return guarded([&] {
+    if (!given.cameras.empty()) {
+      if (on_stage) on_stage("read");
+      return views_of_cameras(given);
+    }
+    pipeline::RunOptions run;
+    run.threads = threads;
+    run.on_stage = on_stage;
+    const auto calibration = pipeline::calibrate_case(given.base, run);
+    if (!calibration) throw BadInput(calibration.error().failure);
+    return views_of_calibration(given, *calibration);
+  });
+}
+
+Expected<std::vector<RegistrationView>> with_images(const LoadedViews& loaded,
+                                                    const pipeline::RegistrationCase& given) {
+  return guarded([&] {
+    std::vector<RegistrationView> views = loaded.views;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const pipeline::CaseView& asked = given.base.views[i];
+      const auto image = value_or_throw(xray::read_xray_image(asked.image, asked.name, asked.frame));
+      check_size(asked.name, "the sequence's first image has",
+                 {views[i].grey.width(), views[i].grey.height()}, image.pixels);
+      RegistrationView now = view_of(image, asked.name, views[i].view);
+      now.grey = loaded.maps[i] ? rectification::resample(image, *loaded.maps[i]) : image.pixels;
+      now.usable = std::move(views[i].usable);
+      views[i] = std::move(now);
+    }
+    return views;
+  });
 }
 
 Expected<std::optional<registration::Model>> load_model(const pipeline::CaseModel& given) {

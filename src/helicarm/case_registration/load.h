@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "helicarm/pipeline/calibrate_case.h"
@@ -19,12 +21,17 @@ struct LoadedViews {
   std::vector<Warning> warnings;
 };
 
-/// Views with cameras of other programs; the images are taken as free of distortion. Refuses (bad_size) a
-/// camera of another image size.
-Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given);
+/// The views of a case: calibrated by the program, then fiducials, plate dots and check targets are masked,
+/// or with cameras of other programs, then the images are taken as free of distortion. Fails as
+/// `read_xray_image`, `import_matrix` and `calibrate_case`, and with bad_size for a camera of another image
+/// size.
+Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, unsigned threads,
+                                 const std::function<void(std::string_view stage)>& on_stage);
 
-/// Calibrated views; fiducials, plate dots and check targets are masked.
-LoadedViews load_views(const pipeline::RegistrationCase& given, const pipeline::CaseCalibration& calibration);
+/// The views with the images of another moment: their geometry, distortion and masks stay. Fails as
+/// `read_xray_image`, and with bad_size for another image size.
+Expected<std::vector<registration::RegistrationView>> with_images(const LoadedViews& loaded,
+                                                                  const pipeline::RegistrationCase& given);
 
 /// The model's files; nothing for a model of landmarks alone.
 Expected<std::optional<registration::Model>> load_model(const pipeline::CaseModel& given);

@@ -4,12 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
-#include "helicarm/core/csv.h"
-#include "helicarm/geometry/ray.h"
-#include "helicarm/geometry/triangulation.h"
+#include "helicarm/case_registration/start_poses.h"
 #include "helicarm/registration/outline.h"
 
 namespace helicarm::case_registration {
@@ -37,75 +34,6 @@ std::vector<RegistrationView> following(std::vector<RegistrationView> views, con
                                       *guidance::calibrator_from(bone, given.views[i].poses) *
                                       first.inverse();
   return views;
-}
-
-/// The point nearest to the rays through the images' centres.
-Vector3d middle_of(const std::vector<RegistrationView>& views) {
-  Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
-  Vector3d sum = Vector3d::Zero();
-  for (const RegistrationView& view : views) {
-    const Eigen::Vector2d centre(0.5 * (view.grey.width() - 1), 0.5 * (view.grey.height() - 1));
-    const geometry::Ray ray = geometry::ray_through(view.view, centre);
-    const Eigen::Matrix3d off = Eigen::Matrix3d::Identity() - ray.direction * ray.direction.transpose();
-    across += off;
-    sum += off * ray.origin;
-  }
-  return across.ldlt().solve(sum);
-}
-
-/// The model's axes along the world's in all 24 ways.
-std::vector<RigidTransform> axis_starts(const registration::Model& model, const Vector3d& at) {
-  std::vector<RigidTransform> starts;
-  for (int x = 0; x < 3; ++x)
-    for (int y = 0; y < 3; ++y)
-      for (int signs = 0; x != y && signs < 4; ++signs) {
-        Eigen::Matrix3d rotation;
-        rotation.col(0) = (signs & 1 ? -1.0 : 1.0) * Vector3d::Unit(x);
-        rotation.col(1) = (signs & 2 ? -1.0 : 1.0) * Vector3d::Unit(y);
-        rotation.col(2) = rotation.col(0).cross(rotation.col(1));
-        starts.push_back({rotation, at - rotation * model.centre});
-      }
-  return starts;
-}
-
-/// Landmarks of the file that are picked in two or more views.
-std::vector<registration::Landmark> landmarks_of(const pipeline::RegistrationCase& given,
-                                                 const LoadedViews& loaded,
-                                                 const std::vector<RegistrationView>& views,
-                                                 const std::filesystem::path& path) {
-  const CsvTable table = value_or_throw(read_csv(path, {"name", "x_mm", "y_mm", "z_mm"}, {}));
-  std::vector<registration::Landmark> landmarks;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    registration::Landmark landmark{
-        table.text(row, "name"),
-        Vector3d(table.number(row, "x_mm"), table.number(row, "y_mm"), table.number(row, "z_mm")),
-        Vector3d::Zero()};
-    std::vector<geometry::RayObservation> rays;
-    std::vector<double> sigmas;
-    for (const pipeline::Pick& pick : given.base.picks) {
-      if (pick.name != landmark.name) continue;
-      for (std::size_t i = 0; i < views.size(); ++i) {
-        if (views[i].name != pick.view) continue;
-        const auto at = loaded.maps[i] ? rectification::rectified_in_image(*loaded.maps[i], pick.uv_raw)
-                                       : std::optional(pick.uv_raw);
-        if (!at)
-          throw BadInput(Reason::bad_value,
-                         fmt::format("picks: \"{}\" lies outside {}", pick.name, pick.view));
-        rays.push_back({views[i].view, *at});
-        sigmas.push_back(pick.sigma_px.value_or(0.5));
-      }
-    }
-    if (rays.size() < 2) continue;
-    Eigen::MatrixXd covariance =
-        Eigen::MatrixXd::Zero(2 * Eigen::Index(rays.size()), 2 * Eigen::Index(rays.size()));
-    for (std::size_t i = 0; i < rays.size(); ++i)
-      covariance.diagonal().segment<2>(2 * Eigen::Index(i)).setConstant(sigmas[i] * sigmas[i]);
-    const auto crossing = value_or_throw(geometry::intersect(rays, covariance));
-    landmark.in_world = crossing.point;
-    landmark.covariance_in_world = crossing.covariance;
-    landmarks.push_back(std::move(landmark));
-  }
-  return landmarks;
 }
 
 /// The tunnels and points of a plan at the registered pose.
@@ -158,13 +86,12 @@ class Registrar {
     const auto views = follows ? following(loaded_.views, given_.base, *asked.moves_with) : loaded_.views;
     for (const RegistrationView& view : views) made.views.push_back(view.view);
     const auto model = value_or_throw(load_model(asked));
-    const auto starts = starts_of(asked, model, views, made);
+    StartPoses start = start_poses(given_, loaded_, asked, model, views);
+    made.landmarks = std::move(start.landmarks);
+    made.landmark_names = std::move(start.landmark_names);
+    const std::vector<RigidTransform>& starts = start.poses;
     if (model) {
-      registration::RegistrationOptions how;
-      how.max_error_mm = options_.max_error_mm;
-      how.threads = options_.threads;
-      how.camera_covariance = loaded_.camera_covariance;
-      how.search = {options_.shift_mm, options_.turn_deg, starts.size() > 1 ? 150 * int(starts.size()) : 600};
+      registration::RegistrationOptions how = search_options(options_, loaded_, starts.size());
       if (options_.on_step) how.on_step = [&](std::string_view step) { options_.on_step(asked.name, step); };
       made.registration = registration::register_model(*model, views, starts, how);
       for (const RegistrationView& view : views)
@@ -173,14 +100,11 @@ class Registrar {
     } else {
       made.by_landmarks_only = true;
       made.registration = by_landmarks(asked.name, *made.landmarks);
+      if (loaded_.camera_covariance.size() == 0) {
+        made.registration.warnings.push_back(registration::cameras_without_covariance(asked.name));
+        made.registration.decision = registration::Decision::warn;
+      }
     }
-    if (loaded_.camera_covariance.size() == 0)
-      made.registration.notes.push_back(
-          {Reason::uncertain,
-           "the cameras come from another program and are taken as exact: their errors "
-           "are not in the covariance",
-           {},
-           {}});
     if (asked.moves_with && !follows && views.size() > 1)
       made.registration.notes.push_back(
           {Reason::bone_taken_as_fixed,
@@ -194,25 +118,6 @@ class Registrar {
   }
 
  private:
-  std::vector<RigidTransform> starts_of(const pipeline::CaseModel& asked,
-                                        const std::optional<registration::Model>& model,
-                                        const std::vector<RegistrationView>& views,
-                                        RegisteredModel& made) const {
-    if (asked.world_from_model) return {*asked.world_from_model};
-    if (asked.landmarks) {
-      const auto landmarks = landmarks_of(given_, loaded_, views, *asked.landmarks);
-      made.landmarks = value_or_throw(registration::register_landmarks(landmarks));
-      for (const registration::Landmark& landmark : landmarks) made.landmark_names.push_back(landmark.name);
-      return {made.landmarks->world_from_model};
-    }
-    if (views.size() < 2)
-      throw BadInput(
-          Reason::bad_value,
-          fmt::format("models: \"{}\": \"start\" is missing: with one view a pose or landmarks are needed",
-                      asked.name));
-    return axis_starts(*model, middle_of(views));
-  }
-
   const pipeline::RegistrationCase& given_;
   const RegisterOptions& options_;
   const LoadedViews& loaded_;
@@ -234,21 +139,16 @@ Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given
     const auto step = [&](std::string_view name) {
       if (options.on_step) options.on_step("", name);
     };
-    if (!given.cameras.empty()) {
-      step("read");
-      result.loaded = value_or_throw(load_views(given));
-    } else {
-      pipeline::RunOptions run;
-      run.threads = options.threads;
-      run.on_stage = step;
-      const auto calibration = pipeline::calibrate_case(given.base, run);
-      if (!calibration) {
-        if (exit_code(calibration.error().failure.reason) == 2) throw BadInput(calibration.error().failure);
-        result.failure = calibration.error().failure;
-        return result;
-      }
-      result.loaded = load_views(given, *calibration);
+    if (pipeline::is_sequence(given))
+      throw BadInput(Reason::bad_value,
+                     "views: \"image\" holds {frame}: name the frames with --frames, such as --frames 1-100");
+    auto loaded = load_views(given, options.threads, step);
+    if (!loaded) {
+      if (exit_code(loaded.error().reason) == 2) throw BadInput(loaded.error());
+      result.failure = loaded.error();
+      return result;
     }
+    result.loaded = std::move(*loaded);
     result.warnings.insert(result.warnings.end(), result.loaded.warnings.begin(),
                            result.loaded.warnings.end());
     const Registrar registrar(given, options, result.loaded);

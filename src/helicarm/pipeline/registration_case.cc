@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/pipeline/registration_case.h"
 
+#include <algorithm>
+#include <regex>
 #include <set>
 
 #include <fmt/format.h>
@@ -88,6 +90,22 @@ std::vector<fs::path> take_cameras(Json& json, const fs::path& file) {
   return cameras;
 }
 
+constexpr std::string_view placeholder = "{frame";
+
+/// `name` with the frame's number, or nothing without a placeholder.
+std::optional<std::string> numbered(const std::string& name, int frame) {
+  static const std::regex forms(R"(\{frame(?::0([1-9])d)?\})");
+  if (name.find(placeholder) == std::string::npos) return std::nullopt;
+  std::string made, rest = name;
+  for (std::smatch match; std::regex_search(rest, match, forms); rest = match.suffix())
+    made += match.prefix().str() + fmt::format("{:0{}}", frame, match[1].matched ? std::stoi(match[1]) : 1);
+  if (made.empty() || rest.find(placeholder) != std::string::npos)
+    throw BadInput(Reason::bad_value, fmt::format("views: \"image\": \"{}\": write {{frame}} or, for leading "
+                                                  "zeros, {{frame:03d}}",
+                                                  name));
+  return made + rest;
+}
+
 }  // namespace
 
 Expected<RegistrationCase> read_registration_case(const fs::path& path) {
@@ -112,6 +130,23 @@ Expected<RegistrationCase> read_registration_case(const fs::path& path) {
     if (read.models.empty())
       reader.refuse(Reason::bad_value, "models", "is empty: name a volume or a surface");
     return read;
+  });
+}
+
+bool is_sequence(const RegistrationCase& given) {
+  return std::ranges::any_of(given.base.views, [](const CaseView& view) {
+    return view.image.filename().string().find(placeholder) != std::string::npos;
+  });
+}
+
+Expected<RegistrationCase> at_frame(RegistrationCase given, int frame) {
+  return guarded([&] {
+    for (CaseView& view : given.base.views)
+      if (const auto name = numbered(view.image.filename().string(), frame))
+        view.image.replace_filename(*name);
+      else
+        view.frame = frame;
+    return std::move(given);
   });
 }
 

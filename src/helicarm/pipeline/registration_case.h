@@ -15,12 +15,12 @@ namespace helicarm::pipeline {
 struct CaseModel {
   std::string name;
   std::optional<std::filesystem::path> volume;   ///< CT; this or `surface`, or landmarks alone
-  std::optional<std::filesystem::path> surface;  ///< closed, STL or PLY
+  std::optional<std::filesystem::path> surface;  ///< closed: STL, PLY or VTP
   std::optional<std::filesystem::path> mask;     ///< of the volume
   std::optional<Eigen::Vector2d> window_hu;
   std::optional<Eigen::Vector3d> voxel_mm;  ///< of a TIFF stack
   double tiff_offset_hu = 0;                ///< added to a TIFF stack's values
-  std::optional<std::string> side;          ///< left or right
+  std::optional<std::string> side;          ///< left or right; not used
   std::optional<guidance::Bone> moves_with;
   std::optional<geometry::RigidTransform> world_from_model;  ///< start
   std::optional<std::filesystem::path> landmarks;            ///< start: CSV of points that are also picked
@@ -37,5 +37,13 @@ struct RegistrationCase {
 
 /// Reads a case with "models". Fails as `read_case`.
 Expected<RegistrationCase> read_registration_case(const std::filesystem::path& path);
+
+/// Whether an image's name holds {frame}.
+bool is_sequence(const RegistrationCase& given);
+
+/// The case with the images of one frame: in an image's name {frame} or, with leading zeros, {frame:03d} is
+/// replaced by the number; an image without it is a file with several frames, the first of which is 1. Fails
+/// with bad_value for another form of {frame}.
+Expected<RegistrationCase> at_frame(RegistrationCase given, int frame);
 
 }  // namespace helicarm::pipeline

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/follow_case.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <regex>
+
+#include <fmt/format.h>
+
+#include "helicarm/case_registration/start_poses.h"
+#include "helicarm/core/csv.h"
+#include "helicarm/core/files.h"
+#include "helicarm/registration/follow.h"
+
+namespace helicarm::case_registration {
+namespace {
+
+using registration::Follower;
+using registration::Registration;
+
+/// A model and who follows it; the follower refers to the model.
+struct Followed {
+  registration::Model model;
+  std::optional<Follower> follower;
+};
+
+std::vector<std::unique_ptr<Followed>> followed_models(const pipeline::RegistrationCase& given,
+                                                       const RegisterOptions& options,
+                                                       const LoadedViews& loaded) {
+  std::vector<std::unique_ptr<Followed>> bodies;
+  for (const pipeline::CaseModel& asked : given.models) {
+    auto model = value_or_throw(load_model(asked));
+    if (!model)
+      throw BadInput(Reason::bad_value,
+                     fmt::format("models: \"{}\": a sequence needs a volume or a surface", asked.name));
+    const StartPoses start = start_poses(given, loaded, asked, model, loaded.views);
+    auto body = std::make_unique<Followed>(Followed{std::move(*model), {}});
+    body->follower.emplace(body->model, start.poses, search_options(options, loaded, start.poses.size()));
+    bodies.push_back(std::move(body));
+  }
+  return bodies;
+}
+
+constexpr double degrees = 180 / EIGEN_PI;
+
+/// 16 numbers of the pose by rows, then sigmas: three in degrees, three in mm.
+std::string pose_fields(const geometry::RigidTransform& pose,
+                        const registration::RigidCovariance& covariance) {
+  std::string fields;
+  const Eigen::Matrix4d matrix = pose.matrix();
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column) fields += fmt::format(",{:.9g}", matrix(row, column));
+  for (int i = 0; i < 6; ++i)
+    fields += fmt::format(",{:.6g}", (i < 3 ? degrees : 1) * std::sqrt(std::max(0.0, covariance(i, i))));
+  return fields;
+}
+
+std::string header(const char* first) {
+  std::string line = first;
+  for (int i = 0; i < 16; ++i) line += fmt::format(",m{}{}", i / 4 + 1, i % 4 + 1);
+  return line + ",sigma_rx_deg,sigma_ry_deg,sigma_rz_deg,sigma_x_mm,sigma_y_mm,sigma_z_mm,code\n";
+}
+
+/// Of the failure, or else of the warnings.
+std::string code_field(const Registration& result) {
+  if (result.failure) return std::string(code(result.failure->reason));
+  std::string codes;
+  for (const Warning& warning : result.warnings)
+    codes += fmt::format("{}{}", codes.empty() ? "" : " ", code(warning.reason));
+  return codes;
+}
+
+}  // namespace
+
+Expected<FrameRange> frame_range_from(const std::string& text) {
+  static const std::regex form(R"((\d{1,6})-(\d{1,6})(?::(\d{1,6}))?)");
+  std::smatch match;
+  if (!std::regex_match(text, match, form))
+    return fail(Reason::bad_value,
+                fmt::format("frames: \"{}\" is neither A-B nor A-B:STEP, such as 1-100 or 1-100:2", text));
+  const FrameRange range{std::stoi(match[1]), std::stoi(match[2]),
+                         match[3].matched ? std::stoi(match[3]) : 1};
+  if (range.first > range.last || range.step < 1)
+    return fail(Reason::bad_value,
+                fmt::format("frames: \"{}\": the first frame must not be after the last, and the step at "
+                            "least 1",
+                            text));
+  return range;
+}
+
+std::optional<Failure> CaseSequence::refusal() const {
+  std::optional<Failure> first;
+  int refused = 0, number = 0;
+  for (const RegisteredFrame& frame : frames)
+    for (const Registration& model : frame.models)
+      if (model.failure && refused++ == 0) first = model.failure, number = frame.frame;
+  if (first)
+    first->message = fmt::format("{} of {} registrations are refused, the first in frame {}: {}", refused,
+                                 frames.size() * frames.front().models.size(), number, first->message);
+  return first;
+}
+
+Expected<CaseSequence> follow_case(const pipeline::RegistrationCase& given, const FrameRange& range,
+                                   const RegisterOptions& options,
+                                   const std::function<void(double share)>& on_frame) {
+  return guarded([&] {
+    CaseSequence sequence;
+    sequence.warnings = given.base.warnings;
+    const auto first = value_or_throw(pipeline::at_frame(given, range.first));
+    const auto loaded = load_views(first, options.threads, [&](std::string_view stage) {
+      if (options.on_step) options.on_step("", stage);
+    });
+    if (!loaded) {
+      if (exit_code(loaded.error().reason) == 2) throw BadInput(loaded.error());
+      sequence.failure = loaded.error();
+      return sequence;
+    }
+    sequence.warnings.insert(sequence.warnings.end(), loaded->warnings.begin(), loaded->warnings.end());
+    const auto bodies = followed_models(first, options, *loaded);
+    const auto begun = std::chrono::steady_clock::now();
+    for (int i = 0; i < range.count(); ++i) {
+      const int frame = range.first + i * range.step;
+      const auto views =
+          value_or_throw(with_images(*loaded, value_or_throw(pipeline::at_frame(given, frame))));
+      RegisteredFrame made{frame, {}};
+      for (const auto& body : bodies) made.models.push_back(body->follower->next(views, frame));
+      sequence.frames.push_back(std::move(made));
+      if (on_frame) on_frame(double(i + 1) / range.count());
+    }
+    sequence.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    return sequence;
+  });
+}
+
+std::string poses_csv(const CaseSequence& sequence) {
+  std::string csv = header("frame,model,decision");
+  for (const RegisteredFrame& frame : sequence.frames)
+    for (const Registration& model : frame.models)
+      csv += fmt::format("{},{},{}{},{}\n", frame.frame, csv_field(model.name),
+                         registration::word(model.decision),
+                         pose_fields(model.world_from_model, model.covariance), code_field(model));
+  return csv;
+}
+
+std::string relative_csv(const CaseSequence& sequence) {
+  std::string csv = header("frame,model,reference,decision");
+  for (const RegisteredFrame& frame : sequence.frames)
+    for (std::size_t i = 1; i < frame.models.size(); ++i) {
+      const Registration &reference = frame.models[0], &model = frame.models[i];
+      const auto relative = registration::relative_pose(reference, model);
+      const bool by_reference = reference.decision > model.decision;
+      csv += fmt::format("{},{},{},{}{},{}\n", frame.frame, csv_field(model.name), csv_field(reference.name),
+                         registration::word(std::max(reference.decision, model.decision)),
+                         pose_fields(relative.reference_from_model, relative.covariance),
+                         code_field(by_reference ? reference : model));
+    }
+  return csv;
+}
+
+Expected<void> write_sequence(const CaseSequence& sequence, const std::filesystem::path& folder) {
+  return write_file(folder / "registration.csv", poses_csv(sequence)).and_then([&]() -> Expected<void> {
+    if (sequence.frames.empty() || sequence.frames.front().models.size() < 2) return {};
+    return write_file(folder / "relative.csv", relative_csv(sequence));
+  });
+}
+
+}  // namespace helicarm::case_registration

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/start_poses.h"
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include "helicarm/core/csv.h"
+#include "helicarm/geometry/ray.h"
+#include "helicarm/geometry/triangulation.h"
+
+namespace helicarm::case_registration {
+namespace {
+
+using Eigen::Vector3d;
+using geometry::RigidTransform;
+using registration::RegistrationView;
+
+/// The point nearest to the rays through the images' centres.
+Vector3d middle_of(const std::vector<RegistrationView>& views) {
+  Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
+  Vector3d sum = Vector3d::Zero();
+  for (const RegistrationView& view : views) {
+    const Eigen::Vector2d centre(0.5 * (view.grey.width() - 1), 0.5 * (view.grey.height() - 1));
+    const geometry::Ray ray = geometry::ray_through(view.view, centre);
+    const Eigen::Matrix3d off = Eigen::Matrix3d::Identity() - ray.direction * ray.direction.transpose();
+    across += off;
+    sum += off * ray.origin;
+  }
+  return across.ldlt().solve(sum);
+}
+
+/// The model's axes along the world's in all 24 ways.
+std::vector<RigidTransform> axis_starts(const registration::Model& model, const Vector3d& at) {
+  std::vector<RigidTransform> starts;
+  for (int x = 0; x < 3; ++x)
+    for (int y = 0; y < 3; ++y)
+      for (int signs = 0; x != y && signs < 4; ++signs) {
+        Eigen::Matrix3d rotation;
+        rotation.col(0) = (signs & 1 ? -1.0 : 1.0) * Vector3d::Unit(x);
+        rotation.col(1) = (signs & 2 ? -1.0 : 1.0) * Vector3d::Unit(y);
+        rotation.col(2) = rotation.col(0).cross(rotation.col(1));
+        starts.push_back({rotation, at - rotation * model.centre});
+      }
+  return starts;
+}
+
+/// Landmarks of the file that are picked in two or more views.
+std::vector<registration::Landmark> landmarks_of(const pipeline::RegistrationCase& given,
+                                                 const LoadedViews& loaded,
+                                                 const std::vector<RegistrationView>& views,
+                                                 const std::filesystem::path& path) {
+  const CsvTable table = value_or_throw(read_csv(path, {"name", "x_mm", "y_mm", "z_mm"}, {}));
+  std::vector<registration::Landmark> landmarks;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    registration::Landmark landmark{
+        table.text(row, "name"),
+        Vector3d(table.number(row, "x_mm"), table.number(row, "y_mm"), table.number(row, "z_mm")),
+        Vector3d::Zero()};
+    std::vector<geometry::RayObservation> rays;
+    std::vector<double> sigmas;
+    for (const pipeline::Pick& pick : given.base.picks) {
+      if (pick.name != landmark.name) continue;
+      for (std::size_t i = 0; i < views.size(); ++i) {
+        if (views[i].name != pick.view) continue;
+        const auto at = loaded.maps[i] ? rectification::rectified_in_image(*loaded.maps[i], pick.uv_raw)
+                                       : std::optional(pick.uv_raw);
+        if (!at)
+          throw BadInput(Reason::bad_value,
+                         fmt::format("picks: \"{}\" lies outside {}", pick.name, pick.view));
+        rays.push_back({views[i].view, *at});
+        sigmas.push_back(pick.sigma_px.value_or(0.5));
+      }
+    }
+    if (rays.size() < 2) continue;
+    Eigen::MatrixXd covariance =
+        Eigen::MatrixXd::Zero(2 * Eigen::Index(rays.size()), 2 * Eigen::Index(rays.size()));
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      covariance.diagonal().segment<2>(2 * Eigen::Index(i)).setConstant(sigmas[i] * sigmas[i]);
+    const auto crossing = value_or_throw(geometry::intersect(rays, covariance));
+    landmark.in_world = crossing.point;
+    landmark.covariance_in_world = crossing.covariance;
+    landmarks.push_back(std::move(landmark));
+  }
+  return landmarks;
+}
+
+}  // namespace
+
+StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedViews& loaded,
+                       const pipeline::CaseModel& asked, const std::optional<registration::Model>& model,
+                       const std::vector<RegistrationView>& views) {
+  if (asked.world_from_model) return {{*asked.world_from_model}, {}, {}};
+  if (asked.landmarks) {
+    const auto landmarks = landmarks_of(given, loaded, views, *asked.landmarks);
+    StartPoses start;
+    start.landmarks = value_or_throw(registration::register_landmarks(landmarks));
+    for (const registration::Landmark& landmark : landmarks) start.landmark_names.push_back(landmark.name);
+    start.poses = {start.landmarks->world_from_model};
+    return start;
+  }
+  if (views.size() < 2)
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("models: \"{}\": \"start\" is missing: with one view a pose or landmarks are needed",
+                    asked.name));
+  return {axis_starts(*model, middle_of(views)), {}, {}};
+}
+
+registration::RegistrationOptions search_options(const RegisterOptions& options, const LoadedViews& loaded,
+                                                 std::size_t starts) {
+  registration::RegistrationOptions how;
+  how.max_error_mm = options.max_error_mm;
+  how.threads = options.threads;
+  how.camera_covariance = loaded.camera_covariance;
+  how.search = {options.shift_mm, options.turn_deg, starts > 1 ? 150 * int(starts) : 600};
+  return how;
+}
+
+}  // namespace helicarm::case_registration

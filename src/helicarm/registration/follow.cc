@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/follow.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm::registration {
+
+using geometry::RigidTransform;
+
+namespace {
+
+constexpr double longest_extrapolation = 2;  // of the last interval, after refused images
+
+}  // namespace
+
+Follower::Follower(const Model& model, std::vector<RigidTransform> starts, RegistrationOptions options)
+    : model_(&model), starts_(std::move(starts)), options_(std::move(options)) {}
+
+std::optional<RigidTransform> Follower::predicted(double time) const {
+  if (!last_) return std::nullopt;
+  if (!before_) return last_->pose;
+  const double intervals = (time - last_->time) / (last_->time - before_->time);
+  const RigidStep step = step_about(before_->pose, last_->pose, before_->pose * model_->centre);
+  return moved_about(last_->pose, last_->pose * model_->centre,
+                     std::min(intervals, longest_extrapolation) * step);
+}
+
+Registration Follower::next(const std::vector<RegistrationView>& views, double time) {
+  Registration result;
+  if (const auto expected = predicted(time)) {
+    RegistrationOptions narrow = options_;
+    narrow.search.candidates = 0;
+    if (before_) result = register_model(*model_, views, {*expected, last_->pose}, narrow);
+    if (!before_ || result.failure || result.agree < 2) {
+      RegistrationOptions wide = options_;
+      wide.search.candidates = SearchOptions{}.candidates;
+      const double spent_s = result.seconds;
+      result = register_model(*model_, views, {*expected}, wide);
+      result.seconds += spent_s;
+    }
+  } else {
+    result = register_model(*model_, views, starts_, options_);
+  }
+  if (!result.failure) {
+    before_ = std::exchange(last_, Timed{time, result.world_from_model});
+  }
+  return result;
+}
+
+RelativePose relative_pose(const Registration& reference, const Registration& model) {
+  Eigen::Matrix<double, 6, 6> at_centre = Eigen::Matrix<double, 6, 6>::Identity();
+  at_centre.bottomLeftCorner<3, 3>() = -geometry::cross_matrix(model.centre - reference.centre);
+  const Eigen::Matrix3d axes = reference.world_from_model.rotation.transpose();
+  Eigen::Matrix<double, 6, 6> turn = Eigen::Matrix<double, 6, 6>::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = axes;
+  const RigidCovariance sum = model.covariance + at_centre * reference.covariance * at_centre.transpose();
+  return {reference.world_from_model.inverse() * model.world_from_model, turn * sum * turn.transpose()};
+}
+
+}  // namespace helicarm::registration
