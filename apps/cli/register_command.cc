@@ -53,16 +53,25 @@ void follow(const RegisterArguments& arguments, const case_registration::Registe
       case_registration::follow_case(given, range, options, [&](double share) { progress.notify(share); }));
   if (sequence.failure) throw BadInput(*sequence.failure);
   value_or_throw(case_registration::write_sequence(sequence, arguments.out));
-  if (!console.quiet) {
-    for (std::size_t i = 0; i < given.models.size(); ++i) {
-      int counts[3] = {};
-      for (const auto& frame : sequence.frames) ++counts[int(frame.models[i].decision)];
-      console.out << fmt::format("  {}: {} accepted, {} warned, {} refused\n", given.models[i].name,
-                                 counts[0], counts[1], counts[2]);
-    }
-    console.out << fmt::format("  {} frames in {:.1f} s\n\n  written to {}\n", sequence.frames.size(),
-                               sequence.seconds, arguments.out.string());
+  Json summary = {
+      {"frames", sequence.frames.size()}, {"seconds", sequence.seconds}, {"models", Json::array()}};
+  std::string text;
+  for (std::size_t i = 0; i < given.models.size(); ++i) {
+    int counts[3] = {};
+    for (const auto& frame : sequence.frames) ++counts[int(frame.models[i].decision)];
+    text += fmt::format("  {}: {} accepted, {} warned, {} refused\n", given.models[i].name, counts[0],
+                        counts[1], counts[2]);
+    summary["models"].push_back({{"name", given.models[i].name},
+                                 {"accepted", counts[0]},
+                                 {"warned", counts[1]},
+                                 {"refused", counts[2]}});
   }
+  if (console.json)
+    console.out << to_text(summary) << '\n';
+  else if (!console.quiet)
+    console.out << text
+                << fmt::format("  {} frames in {:.1f} s\n\n  written to {}\n", sequence.frames.size(),
+                               sequence.seconds, arguments.out.string());
   if (const auto refusal = sequence.refusal()) throw BadInput(*refusal);
 }
 
