@@ -13,6 +13,7 @@ PYBIND11_MODULE(_helicarm, module) {
   add_calibration(module);
   add_measures(module);
   add_cases(module);
+  add_registration(module);
   add_phantom_calibration(module);
 }
 
