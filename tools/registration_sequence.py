@@ -1,0 +1,175 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Follows the femur and the tibia of a modelled knee through a simulated biplane sequence.
+
+  tools/registration_sequence.py --frames 100
+
+The knee is that of tools/bone_ct.py. The images are made here, by sums along rays, with soft tissue of varying thickness
+and noise; both bones move, about 1 mm and 1 degree from frame to frame. Prints the errors of the poses (mean over 14 points of
+each bone) and of the tibia's pose relative to the femur, the decisions, and the pairs of images per second that `helicarm register
+--frames` states (both bones, reading included). Needs NumPy."""
+import argparse
+import csv
+import json
+import pathlib
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import zlib
+
+import numpy as np
+
+import bone_ct
+from registration_protocol import TARGETS, moved, placed
+
+SIZE, PIXEL_MM, DETECTOR_MM, SOURCE_MM = 320, 0.7, 1100.0, 700.0
+STEP_MM = 0.8
+CENTRES = {"femur": np.array([0, 5, 25.0]), "tibia": np.array([0, 5, -35.0])}
+
+
+def camera(degrees):
+    """K and camera_from_world of a view that turns about the world's z."""
+    angle = np.radians(degrees)
+    ray = np.array([np.sin(angle), np.cos(angle), 0])
+    right = np.cross(ray, [0, 0, 1])
+    focus = DETECTOR_MM / PIXEL_MM
+    pose = np.eye(4)
+    pose[:3, :3] = [right, np.cross(ray, right), ray]
+    pose[2, 3] = SOURCE_MM
+    middle = (SIZE - 1) / 2
+    return np.array([[focus, 0, middle], [0, focus, middle], [0, 0, 1]]), pose
+
+
+def sampled(values, places):
+    """Values between the voxels (S, P, L) at places (mm, L P S), 0 outside."""
+    at = (places - bone_ct.LOW) / bone_ct.VOXEL_MM
+    whole = np.floor(at).astype(np.int32)
+    inside = np.all((whole >= 0) & (whole < np.array(bone_ct.SIZE) - 1), axis=-1)
+    whole, part = whole[inside], (at[inside] - whole[inside]).astype(np.float32)
+    flat, (nx, ny, _) = values.ravel(), bone_ct.SIZE
+    index = (whole[:, 2] * ny + whole[:, 1]) * nx + whole[:, 0]
+    total = np.zeros(len(index), np.float32)
+    for corner in range(8):
+        bits = [corner >> axis & 1 for axis in range(3)]
+        weight = np.prod([part[:, axis] if bit else 1 - part[:, axis] for axis, bit in enumerate(bits)], axis=0)
+        total += weight * flat[index + bits[0] + nx * (bits[1] + ny * bits[2])]
+    result = np.zeros(inside.shape, np.float32)
+    result[inside] = total
+    return result
+
+
+def integrals(bones, poses, k, camera_from_world):
+    """Line integrals of the bones at their poses, one image."""
+    u, v = np.meshgrid(np.arange(SIZE), np.arange(SIZE))
+    rays = np.stack([u, v, np.ones_like(u)], axis=-1).reshape(-1, 3) @ np.linalg.inv(k).T
+    rays = rays / np.linalg.norm(rays, axis=1, keepdims=True) @ camera_from_world[:3, :3]
+    source = -camera_from_world[:3, :3].T @ camera_from_world[:3, 3]
+    image = np.zeros(len(rays))
+    for name, values in bones.items():
+        back = np.linalg.inv(poses[name])
+        start, along = back[:3, :3] @ source + back[:3, 3], rays @ back[:3, :3].T
+        near = (CENTRES[name] - start) @ along.T  # along each ray to the plane nearest to the bone
+        for step in np.arange(-75, 75, STEP_MM):
+            image += sampled(values, start + along * (near + step)[:, None]) * STEP_MM
+    return image.reshape(SIZE, SIZE)
+
+
+def write_png(path, pixels):
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in pixels)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", SIZE, SIZE, 16, 0, 0, 0, 0))
+                     + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b""))
+
+
+def poses_at(frame):
+    """World_from_patient of both bones: translations of about 1 mm, rotations of about 1 degree a frame."""
+    phase = 2 * np.pi * frame / 50
+    femur = moved(np.eye(4), CENTRES["femur"], np.array([6 * np.sin(phase), 4 * np.sin(2 * phase), 5 * np.sin(phase)]),
+                  np.radians([4 * np.sin(phase), 3 * np.sin(2 * phase), 5 * np.sin(phase)]))
+    tibia = moved(femur, placed(femur, np.array([[0, 5, 0.0]]))[0], np.array([0, np.sin(phase), 0]),
+                  np.radians([8 * np.sin(phase), 0, 3 * np.sin(2 * phase)]))
+    return {"femur": femur, "tibia": tibia}
+
+
+def make_case(folder, frames, seed):
+    knee = bone_ct.Knee(seed)
+    scan = bone_ct.rounded(knee.scanned())
+    bone_ct.write_nrrd(folder / "scan.nrrd", scan)
+    bones, models, views = {}, [], []
+    for name, mask in (("femur", knee.femur), ("tibia", knee.tibia)):
+        bone_ct.write_nrrd(folder / f"{name}.nrrd", mask.astype(np.uint8))
+        bones[name] = np.where(mask, np.maximum(knee.hu, 0) * 3.2e-5, 0).astype(np.float32)
+        start = moved(poses_at(0)[name], CENTRES[name], np.array([2, -2, 2.0]), np.radians([2, -2, 2]))
+        models.append({"name": name, "volume": "scan.nrrd", "mask": f"{name}.nrrd",
+                       "start": {"world_from_model": start.tolist()}})
+    rng = np.random.default_rng(seed)
+    v, u = np.mgrid[:SIZE, :SIZE]
+    for view, degrees in (("A", 0), ("B", 75)):
+        k, pose = camera(degrees)
+        (folder / f"{view}.json").write_text(json.dumps({"K": k.tolist(), "R": pose[:3, :3].tolist(), "t": pose[:3, 3].tolist()}))
+        views.append({"name": view, "image": f"{view}_{{frame:03d}}.png", "camera": f"{view}.json"})
+        for frame in range(frames):
+            tissue = 1.2 + 0.3 * np.cos(0.012 * u + 0.02 * frame) + 0.0008 * v
+            dose = np.exp(-tissue - integrals(bones, poses_at(frame), k, pose))
+            dose += 0.003 * rng.standard_normal(dose.shape) * np.sqrt(dose)
+            write_png(folder / f"{view}_{frame:03d}.png", np.clip(65535 * dose, 1, 65535).astype(np.uint16))
+    (folder / "case.json").write_text(json.dumps({"format": "helicarm-case/1", "views": views, "models": models}))
+
+
+def rows_of(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def pose_of(row):
+    return np.array([[float(row[f"m{i}{j}"]) for j in range(1, 5)] for i in range(1, 5)])
+
+
+def summary(errors):
+    return f"median {np.median(errors):.3f} mm, 95 % {np.percentile(errors, 95):.3f} mm, largest {max(errors):.3f} mm"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--program", default="build/bin/helicarm")
+    parser.add_argument("--frames", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("--keep", type=pathlib.Path, help="folder for case and result; a case that it holds is used again")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = arguments.keep or pathlib.Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        if not (folder / "case.json").exists():
+            make_case(folder, arguments.frames, arguments.seed)
+        done = subprocess.run([arguments.program, "register", folder, "--out", folder / "out", "--frames",
+                               f"0-{arguments.frames - 1}", "--threads", str(arguments.threads)],
+                              capture_output=True, text=True, check=False)
+        if done.returncode not in (0, 3):
+            sys.exit(done.stderr)
+        rows = rows_of(folder / "out/registration.csv")
+        for name, centre in CENTRES.items():
+            own = [row for row in rows if row["model"] == name]
+            points = centre + 0.75 * TARGETS
+            errors = [np.linalg.norm(placed(pose_of(row), points) - placed(poses_at(int(row["frame"]))[name], points), axis=1).mean()
+                      for row in own if row["decision"] != "refuse"]
+            decisions = {word: sum(row["decision"] == word for row in own) for word in ("accept", "warn", "refuse")}
+            codes = sorted({row["code"] for row in own if row["code"]})
+            print(f"{name}: {summary(errors) if errors else '-'}; {decisions}; codes: {', '.join(codes) or '-'}")
+        errors = []
+        for row in rows_of(folder / "out/relative.csv"):
+            if row["decision"] == "refuse":
+                continue
+            poses, points = poses_at(int(row["frame"])), CENTRES["tibia"] + 0.75 * TARGETS
+            true = np.linalg.inv(poses["femur"]) @ poses["tibia"]
+            errors.append(np.linalg.norm(placed(pose_of(row), points) - placed(true, points), axis=1).mean())
+        print(f"tibia in femur: {summary(errors) if errors else '-'}")
+        frames, seconds = re.search(r"(\d+) frames in ([\d.]+) s", done.stdout).groups()
+        print(f"{frames} pairs in {seconds} s: {int(frames) / float(seconds):.2f} pairs/s, two bones")
+
+
+if __name__ == "__main__":
+    main()
