@@ -279,15 +279,21 @@ class CommandLine(unittest.TestCase):
         out = self.root / "exported"
         done = run("export", self.root / "case", "--out", out, "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
-        names = ["AP_matrix.txt", "AP_mayacam.txt", "AP_rectified.dcm", "LAT_matrix.txt", "LAT_mayacam.txt",
-                 "LAT_rectified.dcm", "dlt.csv", "points.csv", "points.mrk.json"]
+        of_view = ["matrix.txt", "mayacam.txt", "opencv.yml", "pose.tfm", "rectified.dcm", "rtk.xml"]
+        names = [f"{view}_{name}" for view in ("AP", "LAT") for name in of_view]
+        names += ["dlt.csv", "points.csv", "points.mrk.json"]
         self.assertEqual(sorted(path.name for path in out.iterdir()), names)
         self.assertEqual(json.loads(done.stdout)["written"], [str(out / name) for name in names])
-        back = [json.loads(run("import", out / f"AP_{kind}.txt", "--json").stdout) for kind in ("mayacam", "matrix")]
+        back = [json.loads(run("import", out / f"AP_{name}", "--json").stdout)
+                for name in ("mayacam.txt", "matrix.txt", "opencv.yml")]
         self.assertEqual(back[0]["image_size"], [512, 512])
-        for row, other in zip(back[0]["projection"], back[1]["projection"]):
-            for a, b in zip(row, other):
-                self.assertAlmostEqual(a, b, delta=1e-6 * max(1, abs(a)))
+        for camera in back[1:]:
+            for row, other in zip(back[0]["projection"], camera["projection"]):
+                for a, b in zip(row, other):
+                    self.assertAlmostEqual(a, b, delta=1e-6 * max(1, abs(a)))
+        pose = json.loads(run("import", out / "AP_pose.tfm", "--json").stdout)["moving_from_fixed"]
+        for row, other, t in zip(pose, back[0]["R"], back[0]["t"]):
+            self.assertEqual([round(a, 9) for a in row], [round(a, 9) for a in other + [t]])
         self.assertEqual({len(line.split(",")) for line in (out / "dlt.csv").read_text().splitlines()}, {2})
         some = self.root / "some"
         self.assertEqual(run("export", self.root / "case", "--out", some, "--as", "csv,dlt").returncode, 0)
