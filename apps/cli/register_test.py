@@ -113,7 +113,8 @@ class Frames(unittest.TestCase):
         for row in rows:
             for key, expected in zip(("m14", "m24", "m34"), shift_at(int(row["frame"]))):
                 self.assertAlmostEqual(float(row[key]), expected, delta=0.3)
-            self.assertEqual((row["decision"], row["code"]), ("warn", "covariance_missing"))
+            self.assertEqual(row["decision"], "warn")
+            self.assertIn("covariance_missing", row["code"])
             self.assertGreater(float(row["sigma_x_mm"]), 0)
         relative = self.table("relative.csv")
         self.assertEqual([(row["model"], row["reference"]) for row in relative], 3 * [("second", "first")])
