@@ -6,18 +6,11 @@ import json
 import os
 import pathlib
 import shutil
-import subprocess
-import sys
 import tarfile
 import tempfile
 import unittest
 
-PROGRAM = sys.argv.pop(1)
-
-
-def run(*arguments, program=PROGRAM, **options):
-    return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, errors="replace",
-                          stdin=subprocess.DEVNULL, **options)
+from program import PROGRAM, run
 
 
 class OwnFiles(unittest.TestCase):

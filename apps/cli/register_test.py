@@ -1,142 +1,64 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of `register --frames` with images of a body of four balls, made here. Usage: register_test.py PROGRAM"""
+"""Tests of `register`. Usage: register_test.py PROGRAM"""
 
-import csv
 import json
-import math
-import pathlib
-import struct
-import subprocess
-import sys
-import tempfile
+import shutil
 import unittest
-import zlib
 
-PROGRAM = sys.argv.pop(1)
-BALLS = (((-8, 0, 4), 7), ((9, 3, -6), 9), ((2, -9, 12), 5), ((-3, 10, -12), 4))  # centre, radius; mm
-SIZE, FOCUS, DISTANCE = 96, 1000, 600
-# Rows: camera axes in the world.
-CAMERAS = {"A": ((1, 0, 0), (0, 0, -1), (0, 1, 0)), "B": ((0, -1, 0), (0, 0, -1), (1, 0, 0))}
+from program import SimulatedCase, run
 
 
-def run(*arguments):
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, stdin=subprocess.DEVNULL,
-                          check=False)
-
-
-def shift_at(frame):
-    return 1.5 * frame, -1 * frame, 0.5 * frame * frame
-
-
-def matter(origin, ray, shift):
-    """Length of a ray (unit vector) within the balls."""
-    total = 0
-    for centre, radius in BALLS:
-        arm = [c + s - o for c, s, o in zip(centre, shift, origin)]
-        along = sum(a * r for a, r in zip(arm, ray))
-        across = sum(a * a for a in arm) - along * along
-        total += 2 * math.sqrt(max(0, radius * radius - across))
-    return total
-
-
-def image(axes, shift):
-    middle = (SIZE - 1) / 2
-    origin = [-DISTANCE * axis for axis in axes[2]]
-    rows = []
-    for v in range(SIZE):
-        row = []
-        for u in range(SIZE):
-            ray = [axes[0][i] * (u - middle) / FOCUS + axes[1][i] * (v - middle) / FOCUS + axes[2][i] for i in range(3)]
-            length = math.sqrt(sum(r * r for r in ray))
-            noise = ((u * 7919 + v * 104729) % 1009 - 504) // 8
-            row.append(int(40000 * math.exp(-0.03 * matter(origin, [r / length for r in ray], shift))) + noise)
-        rows.append(struct.pack(f">{SIZE}H", *row))
-    return b"".join(b"\0" + row for row in rows)
-
-
-def png(rows):
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", SIZE, SIZE, 16, 0, 0, 0, 0))
-            + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
-
-
-def volume():
-    """Voxels of 1 mm; the world's origin is in the middle."""
-    side = 48
-    low = -(side - 1) / 2
-    voxels = [1000 if any(math.dist((x + low, y + low, z + low), centre) < radius for centre, radius in BALLS) else -1000
-              for z in range(side) for y in range(side) for x in range(side)]
-    header = (f"NRRD0004\ntype: int16\ndimension: 3\nspace: left-posterior-superior\nsizes: {side} {side} {side}\n"
-              f"space directions: (1,0,0) (0,1,0) (0,0,1)\nendian: little\nencoding: raw\nspace origin: ({low},{low},{low})\n\n")
-    return header.encode() + struct.pack(f"<{side ** 3}h", *voxels)
-
-
-class Frames(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.root = pathlib.Path(cls.folder.name)
-        (cls.root / "balls.nrrd").write_bytes(volume())
-        views = []
-        for name, axes in CAMERAS.items():
-            k = [[FOCUS, 0, (SIZE - 1) / 2], [0, FOCUS, (SIZE - 1) / 2], [0, 0, 1]]
-            (cls.root / f"{name}.json").write_text(json.dumps({"K": k, "R": axes, "t": [0, 0, DISTANCE]}))
-            views.append({"name": name, "image": f"{name}_{{frame:02d}}.png", "camera": f"{name}.json"})
-            for frame in range(3):
-                (cls.root / f"{name}_{frame:02d}.png").write_bytes(png(image(axes, shift_at(frame))))
-        start = [[1, 0, 0, 1], [0, 1, 0, -1], [0, 0, 1, 1], [0, 0, 0, 1]]
-        model = {"volume": "balls.nrrd", "window_hu": [100, 3000], "start": {"world_from_model": start}}
-        cls.case = {"format": "helicarm-case/1", "views": views,
-                    "models": [{"name": "first", **model}, {"name": "second", **model}]}
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.folder.cleanup()
-
-    def register(self, case, *more):
-        (self.root / "case.json").write_text(json.dumps(case))
-        return run("register", self.root, "--out", self.root / "out", *more)
-
-    def table(self, name):
-        with (self.root / "out" / name).open() as file:
-            return list(csv.DictReader(file))
-
-    def test_two_models_are_followed(self):
-        done = self.register(self.case, "--frames", "0-2", "--search-mm", 4, "--search-deg", 4)
+class Register(SimulatedCase):
+    def test_landmarks_alone_register_a_model(self):
+        folder = self.root / "landmarks"
+        shutil.copytree(self.root / "case", folder)
+        truth = json.loads((folder / "truth.json").read_text())
+        case = json.loads((folder / "case.json").read_text())
+        rows = ["name,x_mm,y_mm,z_mm"]
+        case["picks"] = []
+        for name, (x, y, z) in truth["targets_in_calibrator"].items():
+            rows.append(f"p{name},{x - 100},{y},{z}")
+            for view in truth["views"]:
+                raw = next(target["raw"] for target in view["targets"] if target["name"] == name)
+                case["picks"].append({"name": f"p{name}", "view": view["name"], "uv": raw})
+        (folder / "points.csv").write_text("\n".join(rows) + "\n")
+        case["models"] = [{"name": "body", "start": {"landmarks": "points.csv"}}]
+        (folder / "case.json").write_text(json.dumps(case))
+        done = run("register", folder, "--out", self.root / "registered", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("3 frames", done.stdout)
-        rows = self.table("registration.csv")
-        self.assertEqual([(row["frame"], row["model"]) for row in rows],
-                         [(str(frame), model) for frame in range(3) for model in ("first", "second")])
-        for row in rows:
-            for key, expected in zip(("m14", "m24", "m34"), shift_at(int(row["frame"]))):
-                self.assertAlmostEqual(float(row[key]), expected, delta=0.3)
-            self.assertEqual(row["decision"], "warn")
-            self.assertIn("covariance_missing", row["code"])
-            self.assertGreater(float(row["sigma_x_mm"]), 0)
-        relative = self.table("relative.csv")
-        self.assertEqual([(row["model"], row["reference"]) for row in relative], 3 * [("second", "first")])
-        self.assertAlmostEqual(float(relative[2]["m11"]), 1, delta=1e-3)
+        model = json.loads(done.stdout)["models"][0]
+        self.assertEqual(model["decision"], "accept")
+        for row, expected in zip(model["world_from_model"], ((1, 0, 0, 100), (0, 1, 0, 0), (0, 0, 1, 0))):
+            for value, wanted in zip(row, expected):
+                self.assertAlmostEqual(value, wanted, delta=0.7 if abs(wanted) > 1 or wanted == 0 else 0.02)
+        self.assertLess(model["landmarks"]["fre_mm"], 1)
+        self.assertTrue((self.root / "registered/report.html").exists())
 
-    def test_a_missing_frame_is_named(self):
-        done = self.register(self.case, "--frames", "2-3")
-        self.assertEqual(done.returncode, 2)
-        self.assertIn("A_03.png", done.stderr)
+        points = [{"label": name, "position": place} for name, place in (("s", [-100, 0, 40]), ("e", [-100, 20, 60]))]
+        (folder / "plan.mrk.json").write_text(json.dumps({"markups": [
+            {"type": "Line", "name": "planned", "coordinateSystem": "LPS", "coordinateUnits": "mm", "controlPoints": points}]}))
+        case["models"][0]["plan"] = "plan.mrk.json"
+        (folder / "case.json").write_text(json.dumps(case))
+        done = run("run", folder, "--out", self.root / "run-models", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        result = json.loads(done.stdout)
+        self.assertEqual([tunnel["name"] for tunnel in result["tunnels"]], ["planned"])
+        self.assertEqual(json.loads((self.root / "run-models/result.json").read_text()), result)
+        self.assertEqual(json.loads((self.root / "run-models/registration.json").read_text())["status"], "ok")
 
-    def test_what_is_no_sequence_is_refused(self):
-        for frames in ("3-1", "0-2:0", "x"):
-            done = self.register(self.case, "--frames", frames)
-            self.assertEqual(done.returncode, 2)
-            self.assertIn(frames, done.stderr)
-        landmarks = dict(self.case, models=[{"name": "points", "start": {"landmarks": "points.csv"}}])
-        self.assertIn("needs a volume or a surface", self.register(landmarks, "--frames", "0-2").stderr)
-
-    def test_a_sequence_needs_its_frames(self):
-        done = self.register(self.case)
-        self.assertEqual(done.returncode, 2)
-        self.assertIn("--frames", done.stderr)
+    def test_register_names_what_is_wrong_with_a_model(self):
+        folder = self.root / "no-model"
+        shutil.copytree(self.root / "case", folder)
+        case = json.loads((folder / "case.json").read_text())
+        for models, code in (([], "bad_value"), ([{"name": "femur"}], "bad_value"),
+                             ([{"name": "femur", "surface": "none.stl"}], "bad_value"),
+                             ([{"name": "femur", "surface": "../femur.stl"}], "path_outside"),
+                             ([{"name": "femur", "surfaces": "x.stl"}], "bad_value")):
+            (folder / "case.json").write_text(json.dumps(dict(case, models=models)))
+            done = run("register", folder, "--out", self.root / "none")
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertFalse((self.root / "none/registration.json").exists())
 
 
 if __name__ == "__main__":

@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the commands for tracker, robot and operation. Usage: device_test.py PROGRAM"""
+
+import json
+import pathlib
+import signal
+import subprocess
+import tempfile
+import unittest
+
+from program import PROGRAM, run
+
+
+class Tracker(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.file = pathlib.Path(cls.folder.name) / "poses.mha"
+        lines = [f"Seq_Frame{i:04}_ToolToTrackerTransform = 1 0 0 {i % 7 / 100} 0 1 0 0 0 0 1 800 0 0 0 1\n"
+                 f"Seq_Frame{i:04}_Timestamp = {i / 100}\n" for i in range(100)]
+        cls.file.write_text("".join(lines) + "ElementDataFile = LOCAL\n")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def replay(self):
+        server = subprocess.Popen([PROGRAM, "tracker", "replay", self.file, "--json"], text=True,
+                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.addCleanup(server.communicate)
+        self.addCleanup(server.kill)
+        return server, server.stderr.readline().split()[-1]
+
+    def test_replay_is_watched_and_recorded_and_ends_at_once(self):
+        server, port = self.replay()
+        done = run("tracker", "watch", f"127.0.0.1:{port}", "--seconds", 1, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        seen = json.loads(done.stdout)
+        self.assertEqual(seen["state"], "connected")
+        self.assertEqual([tool["name"] for tool in seen["tools"]], ["ToolToTracker"])
+        self.assertGreater(seen["tools"][0]["accepted"], 10)
+        copy = self.file.with_name("copy.mha")
+        done = run("tracker", "record", f"127.0.0.1:{port}", copy, "--seconds", 0.5, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("ToolToTrackerTransform", copy.read_text())
+        server.terminate()
+        self.assertEqual(server.wait(timeout=5), 0)
+
+    def test_recording_is_watched_without_a_server(self):
+        done = run("tracker", "watch", f"file:{self.file}", "--seconds", 0.5, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        seen = json.loads(done.stdout)
+        self.assertEqual(seen["state"], "connected")
+        self.assertGreater(seen["tools"][0]["accepted"], 5)
+        done = run("tracker", "watch", "file:/nowhere.mha", "--seconds", 0.5)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("missing_file", done.stderr)
+
+    def test_port_in_use_and_pivot_without_rotation_are_refused(self):
+        _, port = self.replay()
+        done = run("tracker", "replay", self.file, "--port", port)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("port_taken", done.stderr)
+        done = run("tracker", "pivot", self.file, "--tool", "ToolToTracker")
+        self.assertEqual(done.returncode, 3)
+        self.assertIn("poses_too_alike", done.stderr)
+
+    def recorded_touch(self, name, point_in_tracker):
+        """A pointer at rest whose tip, 100 mm below its marker, touches a point of a calibrator at rest."""
+        x, y, z = point_in_tracker
+        lines = [f"Seq_Frame{i:04}_FacetTransform = 1 0 0 0 0 1 0 0 0 0 1 900 0 0 0 1\n"
+                 f"Seq_Frame{i:04}_PointerTransform = 1 0 0 {x} 0 1 0 {y + 100} 0 0 1 {z} 0 0 0 1\n"
+                 f"Seq_Frame{i:04}_Timestamp = {i / 50}\n" for i in range(12)]
+        file = self.file.with_name(f"{name}.mha")
+        file.write_text("".join(lines) + "ElementDataFile = LOCAL\n")
+        return f"{name}={file}"
+
+    def test_mount_is_found_from_recorded_touches(self):
+        mount, divots = (10, 20, 30), {"D1": (60, 0, 0), "D2": (0, 45, 0), "D3": (-40, -20, 50), "D4": (0, 5, 80)}
+        in_tracker = {name: [c - m + o for c, m, o in zip(at, mount, (0, 0, 900))] for name, at in divots.items()}
+        tip, out = self.file.with_name("tip.json"), self.file.with_name("mount.json")
+        tip.write_text(json.dumps({"tip_in_tool": [0, -100, 0]}))
+        common = ["tracker", "calibrate-mount", "--facet", "Facet", "--pointer", "Pointer", "--tip", tip, "--out", out]
+        for name, at in divots.items():
+            common += ["--divot", f"{name}={','.join(map(str, at))}"]
+        touches = [word for name, at in in_tracker.items() for word in ("--recorded", self.recorded_touch(name, at))]
+        done = run(*common, *touches, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        found = json.loads(out.read_text())
+        self.assertEqual(found, json.loads(done.stdout))
+        for axis in range(3):
+            self.assertAlmostEqual(found["facet"]["calibrator_from_facet"][axis][3], mount[axis], delta=0.01)
+        self.assertLess(found["fre_mm"], 0.01)
+        self.assertLess(found["tre_mm"]["D1"], 1)
+        exchanged = run(*common, *touches[:-4], "--recorded", self.recorded_touch("D4", in_tracker["D3"]),
+                        "--recorded", self.recorded_touch("D3", in_tracker["D4"]))
+        self.assertEqual(exchanged.returncode, 3)
+        self.assertIn("residual_too_large", exchanged.stderr)
+        self.assertIn("exchanged", exchanged.stderr)
+        few = run(*common, *touches[:4])
+        self.assertEqual(few.returncode, 3)
+        self.assertIn("poses_too_alike", few.stderr)
+
+    def test_missing_or_invalid_arguments_are_named(self):
+        for words, said in ((("tracker", "pivot", self.file, "--tool", "Pointer"), "which holds ToolToTracker"),
+                            (("tracker", "calibrate-mount", "--facet", "F", "--recorded", "P1=x"), "need --tip"),
+                            (("tracker", "calibrate-mount", "--facet", "F", "--divot", "D=1,2"), "xyz_mm"),
+                            (("tracker", "calibrate-mount", "--facet", "F", "--touch", "P1"), "belong together"),
+                            (("tracker", "watch", "127.0.0.1:70000"), "1 to 65535"),
+                            (("tracker", "replay", self.file, "--port", "70000"), "0 to 65535"),
+                            (("receive", "--watch", self.file.parent, "--port", "11112"), "excludes")):
+            done = run(*words)
+            self.assertEqual(done.returncode, 2, words)
+            self.assertIn(said, done.stderr)
+
+
+class Robot(unittest.TestCase):
+    def test_robot_that_does_not_answer_is_refused(self):
+        done = run("robot", "watch", "127.0.0.1", "--port", 9, "--seconds", 0.5)
+        self.assertEqual(done.returncode, 3)
+        self.assertIn("not_connected", done.stderr)
+
+
+class Operate(unittest.TestCase):
+    def test_stop_signal_is_reported(self):
+        with tempfile.TemporaryDirectory() as folder:
+            operate = subprocess.Popen([PROGRAM, "operate", "--cases", "1", "--size", "512", "--out", folder], text=True,
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            self.addCleanup(operate.kill)
+            operate.stderr.readline()  # starting the virtual devices
+            operate.send_signal(signal.SIGINT)
+            _, said = operate.communicate(timeout=60)
+            self.assertEqual(operate.returncode, 3)
+            self.assertIn("interrupted", said)
+
+
+if __name__ == "__main__":
+    unittest.main()
