@@ -18,10 +18,10 @@ def landmarks(tmp_path):
     views, picks = [], []
     for name, rotation in (("A", [[1, 0, 0], [0, 0, -1], [0, 1, 0]]), ("B", [[0, -1, 0], [0, 0, -1], [1, 0, 0]])):
         rotation, shift = np.array(rotation, float), np.array([0, 0, 800.0])
-        (tmp_path / f"{name}.json").write_text(json.dumps({"K": k.tolist(), "R": rotation.tolist(), "t": shift.tolist()}))
+        (tmp_path / f"camera{name}.json").write_text(json.dumps({"K": k.tolist(), "R": rotation.tolist(), "t": shift.tolist()}))
         grey = np.random.default_rng(1).integers(900, 1100, (80, 96)).astype(np.uint16)
         cv2.imwrite(str(tmp_path / f"{name}.png"), grey)
-        views.append({"name": name, "image": f"{name}.png", "camera": f"{name}.json"})
+        views.append({"name": name, "image": f"{name}.png", "camera": f"camera{name}.json"})
         for point, place in POINTS.items():
             at = k @ (rotation @ (np.array(place) + SHIFT) + shift)
             picks.append({"name": point, "view": name, "uv": (at[:2] / at[2]).tolist()})
