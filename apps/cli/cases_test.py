@@ -7,26 +7,18 @@ import os
 import pathlib
 import shutil
 import tarfile
-import tempfile
 import unittest
 
-from program import PROGRAM, run
+from program import PROGRAM, SimulatedCase, run
 
 
-class OwnFiles(unittest.TestCase):
+class OwnFiles(SimulatedCase):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.root = pathlib.Path(cls.folder.name)
-        done = run("simulate", cls.root / "case", "--size", 512, "--seed", 5, "--quiet")
-        assert done.returncode == 0, done.stderr
+        super().setUpClass()
         cls.images = [cls.root / "IM0001", cls.root / "IM0002"]
         for name, image in zip(("LAT", "AP"), cls.images):
             shutil.copy(cls.root / "case" / f"{name}.dcm", image)
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.folder.cleanup()
 
     def made(self, name):
         out = self.root / name
