@@ -152,7 +152,8 @@ Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, unsign
     pipeline::RunOptions run;
     run.threads = threads;
     run.on_stage = on_stage;
-    const auto calibration = pipeline::calibrate_case(given.base, run);
+    const double least_angle_deg = given.base.views.size() > 1 ? calibration::least_view_angle_deg : 0;
+    const auto calibration = pipeline::calibrate_case(given.base, run, least_angle_deg);
     if (!calibration) throw BadInput(calibration.error().failure);
     return views_of_calibration(given, *calibration);
   });

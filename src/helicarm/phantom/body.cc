@@ -9,9 +9,12 @@
 #include <fmt/format.h>
 
 #include "helicarm/phantom/open_body.h"
+#include "helicarm/phantom/simplify.h"
 
 namespace helicarm::phantom {
 namespace {
+
+constexpr double simplified_within_mm = 0.02;  // a tenth of a printed layer and less
 
 using Polygon = std::vector<Eigen::Vector2d>;
 
@@ -193,14 +196,16 @@ Expected<TriangleMesh> printable_body(const Calibrator& calibrator, const BodyOp
           });
   if (!checked) return tl::unexpected<Failure>(checked.error());
   if (options.shape != BodyShape::cone)
-    return surface_of(body_distance(calibrator, options), open_body_box(calibrator, options),
-                      options.step_mm);
+    return simplified(
+        surface_of(body_distance(calibrator, options), open_body_box(calibrator, options), options.step_mm),
+        simplified_within_mm);
   const Cone cone(options);
   const double reach = cone.radius(-options.flange_depth_mm) + options.flange_width_mm + 2 * options.step_mm;
   const Eigen::AlignedBox3d box(
       Eigen::Vector3d(-reach, -reach, -options.flange_depth_mm - 2 * options.step_mm),
       Eigen::Vector3d(reach, reach, options.height_mm + 2 * options.step_mm));
-  return surface_of(body_distance(calibrator, options), box, options.step_mm);
+  return simplified(surface_of(body_distance(calibrator, options), box, options.step_mm),
+                    simplified_within_mm);
 }
 
 }  // namespace helicarm::phantom

@@ -33,9 +33,10 @@ struct BodyOptions {
 /// Signed distance (mm, negative in the plastic): exact near the shell, a bound elsewhere.
 SignedDistance body_distance(const Calibrator& calibrator, const BodyOptions& options = {});
 
-/// The printable surface. Each ball has a blind pocket of its own diameter and the clearance, open to the
-/// outside (plate: upwards); grooves of the cone connect balls named as in 2.3.4. Refuses (bad_value) a ball
-/// outside the cone's wall, a ball in another one's post, and a step or clearance out of range.
+/// The printable surface, that of the grid simplified within 0.02 mm. Each ball has a blind pocket of its own
+/// diameter and the clearance, open to the outside (plate: upwards); grooves of the cone connect balls named
+/// as in 2.3.4. Refuses (bad_value) a ball outside the cone's wall, a ball in another one's post, and a step
+/// or clearance out of range.
 Expected<TriangleMesh> printable_body(const Calibrator& calibrator, const BodyOptions& options = {});
 
 /// Cone if every ball lies on the wall, else rings.

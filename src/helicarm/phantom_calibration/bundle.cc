@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
+#include <utility>
 
 #include <Eigen/SparseCore>
 #include <ceres/ceres.h>
@@ -63,7 +65,7 @@ struct Blocks {
   ceres::Problem problem;
 };
 
-Eigen::MatrixXd whitening_of(const BundleView& view, bool robust) {
+std::optional<Eigen::MatrixXd> whitening_of(const BundleView& view, bool robust) {
   const auto n = Eigen::Index(view.images.size());
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   if (view.map_covariance_px2.rows() == n) covariance = view.map_covariance_px2;
@@ -71,7 +73,7 @@ Eigen::MatrixXd whitening_of(const BundleView& view, bool robust) {
     covariance(i, i) +=
         std::max(std::pow(view.images[std::size_t(i)].sigma_px, 2), least_own_share * covariance(i, i));
   if (robust) covariance = Eigen::MatrixXd(covariance.diagonal().asDiagonal());
-  return geometry::whitening(covariance).value();
+  return geometry::whitening(covariance);
 }
 
 void add_images(Blocks& blocks, const BundleProblem& given, std::size_t v, const BundleOptions& options) {
@@ -136,7 +138,7 @@ void add_c_arm(Blocks& blocks, const BundleProblem& given) {
   shared[0] = mean;
 }
 
-void fill(Blocks& blocks, const BundleProblem& given, const BundleOptions& options) {
+Expected<void> fill(Blocks& blocks, const BundleProblem& given, const BundleOptions& options) {
   for (const Eigen::Vector3d& centre : given.centres)
     blocks.centres.push_back({centre.x(), centre.y(), centre.z()});
   blocks.views.resize(given.views.size());
@@ -146,7 +148,11 @@ void fill(Blocks& blocks, const BundleProblem& given, const BundleOptions& optio
     write_pose(from.start.camera_from_world, view.pose.data());
     write_intrinsics(from.start.intrinsics, view.intrinsics.data());
     view.mirrored = from.start.intrinsics.fx < 0;
-    view.whitening = whitening_of(from, options.robust);
+    auto whitening = whitening_of(from, options.robust);
+    if (!whitening)
+      return fail(Reason::uncertain,
+                  fmt::format("the covariance of the images in view {} is not positive definite", from.name));
+    view.whitening = *std::move(whitening);
     add_images(blocks, given, v, options);
     blocks.problem.SetParameterLowerBound(view.intrinsics.data(), 0, 1);
     blocks.problem.SetParameterLowerBound(view.intrinsics.data(), 1, 0.5);
@@ -157,6 +163,7 @@ void fill(Blocks& blocks, const BundleProblem& given, const BundleOptions& optio
     for (std::size_t i = 0; i < blocks.centres.size(); ++i)
       if (options.free_centre != i && blocks.problem.HasParameterBlock(blocks.centres[i].data()))
         blocks.problem.SetParameterBlockConstant(blocks.centres[i].data());
+  return {};
 }
 
 /// Whitened residuals and their dense Jacobian by the tangent spaces: centres, then all else.
@@ -279,7 +286,8 @@ Expected<BundleFit> adjust(const BundleProblem& given, const BundleOptions& opti
     if (view.images.empty())
       return fail(Reason::uncertain, fmt::format("no ball is seen in view {}", view.name));
   Blocks blocks;
-  fill(blocks, given, options);
+  if (const auto filled = fill(blocks, given, options); !filled)
+    return tl::unexpected<Failure>(filled.error());
   ceres::Solver::Options how;
   how.linear_solver_type = ceres::DENSE_QR;
   how.max_num_iterations = options.most_iterations;

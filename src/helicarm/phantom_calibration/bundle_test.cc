@@ -79,6 +79,16 @@ TEST(Bundle, TwoViewsWithKnownIntrinsicsAreEnough) {
   EXPECT_TRUE(adjust(synthetic_problem(helix_centres(), 2, sigma_px, 9)));
 }
 
+TEST(Bundle, CovarianceThatIsNotPositiveIsUncertain) {
+  BundleProblem problem = synthetic_problem(helix_centres(), 3, sigma_px, 9);
+  const auto n = Eigen::Index(problem.views[1].images.size());
+  problem.views[1].map_covariance_px2 = -Eigen::MatrixXd::Identity(n, n);
+  const auto fit = adjust(problem);
+  ASSERT_FALSE(fit);
+  EXPECT_EQ(fit.error().reason, Reason::uncertain);
+  EXPECT_THAT(fit.error().message, testing::HasSubstr(problem.views[1].name));
+}
+
 TEST(Bundle, ViewWithoutImagesIsUncertain) {
   BundleProblem problem = synthetic_problem(helix_centres(), 4, 0.05, 3);
   problem.views[2].images.clear();

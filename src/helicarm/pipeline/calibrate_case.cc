@@ -64,9 +64,10 @@ Eigen::Vector3d centre_of(const calibration::CalibrationResult& calibration) {
 
 /// As `check_views_apart`, in the calibrator's frame or in the tracker's: a calibrator on the receiver turns
 /// with the C-arm and looks alike in all views.
-Expected<void> check_apart(const calibration::CalibrationResult& calibration, const Case& given) {
+Expected<void> check_apart(const calibration::CalibrationResult& calibration, const Case& given,
+                           double least_deg) {
   const Eigen::Vector3d centre = centre_of(calibration);
-  auto apart = calibration::check_views_apart(calibration.views, centre);
+  auto apart = calibration::check_views_apart(calibration.views, centre, least_deg);
   const auto pose = [](const CaseView& view) { return view.poses.tracker_from_calibrator; };
   if (apart ||
       !std::ranges::all_of(given.views, [&](const CaseView& view) { return pose(view).has_value(); }))
@@ -76,11 +77,11 @@ Expected<void> check_apart(const calibration::CalibrationResult& calibration, co
     geometry::RigidTransform& camera_from_world = views[i].view.camera_from_world;
     camera_from_world = camera_from_world * pose(given.views[i])->inverse();
   }
-  return calibration::check_views_apart(views, *pose(given.views.front()) * centre);
+  return calibration::check_views_apart(views, *pose(given.views.front()) * centre, least_deg);
 }
 
-Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& given,
-                                     const RunOptions& options) {
+Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& given, const RunOptions& options,
+                                     double least_angle_deg) {
   std::optional<calibration::LearnedIntrinsics> history;
   if (options.history) {
     const auto prior = prior_from_history(views, *options.history);
@@ -100,7 +101,7 @@ Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& giv
   return (options.method == rectification::Method::paper ? calibration::calibrate_paper(fiducials, how)
                                                          : calibration::calibrate(fiducials, how))
       .and_then([&](calibration::CalibrationResult result) {
-        return check_apart(result, given).map([&] {
+        return check_apart(result, given, least_angle_deg).map([&] {
           return CaseCalibration{std::move(result), {}, history, {}, {}};
         });
       });
@@ -122,10 +123,10 @@ Expected<CaseCalibration> with_explanations(CaseCalibration calibration, const L
 }
 
 /// 2.2, Eq. 4-7: all views jointly, or each alone by the paper's method.
-OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& given,
-                                           const RunOptions& options) {
+OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& given, const RunOptions& options,
+                                           double least_angle_deg) {
   auto calibration =
-      calibrated(views, given, options)
+      calibrated(views, given, options, least_angle_deg)
           .and_then([&](CaseCalibration done) { return check_calibrator(std::move(done), views, given); })
           .and_then([&](CaseCalibration done) {
             return with_explanations(std::move(done), views, given, options);
@@ -152,7 +153,8 @@ void add_guesses(Refusal& refusal, const Case& given, const RunOptions& options)
 
 }  // namespace
 
-OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options) {
+OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options,
+                                          double least_angle_deg) {
   Timing time;
   const auto announce = [&](std::string_view name) {
     if (options.on_stage) options.on_stage(name);
@@ -164,12 +166,15 @@ OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& o
       return work(std::move(views), given, options);
     };
   };
+  const auto calibrate_apart = [least_angle_deg](LabelledViews views, const Case& of, const RunOptions& how) {
+    return calibrate_views(std::move(views), of, how, least_angle_deg);
+  };
   announce("read");
   return timed(time.read, [&] { return read_views(given, options); })
       .and_then(stage("rectify", time.rectify, rectify_views))        // 2.1, Eq. 1-3
       .and_then(stage("detect", time.detect, detect_in_views))        // 2.1
       .and_then(stage("label", time.label, label_views))              // 2.3.4
-      .and_then(stage("calibrate", time.calibrate, calibrate_views))  // 2.2, Eq. 4-7
+      .and_then(stage("calibrate", time.calibrate, calibrate_apart))  // 2.2, Eq. 4-7
       .map([&](CaseCalibration calibration) {
         calibration.timing_ms = time;
         return calibration;
