@@ -124,6 +124,8 @@ LoadedViews views_of_cameras(const pipeline::RegistrationCase& given) {
   return loaded;
 }
 
+}  // namespace
+
 LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
                                  const pipeline::CaseCalibration& calibration) {
   LoadedViews loaded;
@@ -139,8 +141,6 @@ LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
   loaded.warnings = calibration.warnings;
   return loaded;
 }
-
-}  // namespace
 
 Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, unsigned threads,
                                  const std::function<void(std::string_view stage)>& on_stage) {

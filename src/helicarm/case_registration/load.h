@@ -28,6 +28,10 @@ struct LoadedViews {
 Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, unsigned threads,
                                  const std::function<void(std::string_view stage)>& on_stage);
 
+/// The views of a case that is calibrated already.
+LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
+                                 const pipeline::CaseCalibration& calibration);
+
 /// The views with the images of another moment: their geometry, distortion and masks stay. Fails as
 /// `read_xray_image`, and with bad_size for another image size.
 Expected<std::vector<registration::RegistrationView>> with_images(const LoadedViews& loaded,

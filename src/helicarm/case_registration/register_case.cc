@@ -94,9 +94,7 @@ class Registrar {
       registration::RegistrationOptions how = search_options(options_, loaded_, starts.size());
       if (options_.on_step) how.on_step = [&](std::string_view step) { options_.on_step(asked.name, step); };
       made.registration = registration::register_model(*model, views, starts, how);
-      for (const RegistrationView& view : views)
-        made.outlines.push_back(
-            registration::outline(*model, view.view, made.registration.world_from_model, outline_step_px));
+      made.outlines = outlines(*model, made.views, made.registration.world_from_model);
     } else {
       made.by_landmarks_only = true;
       made.registration = by_landmarks(asked.name, *made.landmarks);
@@ -125,6 +123,15 @@ class Registrar {
 
 }  // namespace
 
+std::vector<std::vector<Eigen::Vector2d>> outlines(const registration::Model& model,
+                                                   const std::vector<geometry::View>& views,
+                                                   const RigidTransform& world_from_model) {
+  std::vector<std::vector<Eigen::Vector2d>> made;
+  for (const geometry::View& view : views)
+    made.push_back(registration::outline(model, view, world_from_model, outline_step_px));
+  return made;
+}
+
 bool CaseRegistration::refused() const {
   return failure || std::ranges::any_of(models, [](const RegisteredModel& model) {
            return model.registration.failure.has_value();
@@ -148,7 +155,16 @@ Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given
       result.failure = loaded.error();
       return result;
     }
-    result.loaded = std::move(*loaded);
+    return value_or_throw(register_loaded(given, *std::move(loaded), options));
+  });
+}
+
+Expected<CaseRegistration> register_loaded(const pipeline::RegistrationCase& given, LoadedViews loaded,
+                                           const RegisterOptions& options) {
+  return guarded([&] {
+    CaseRegistration result;
+    result.warnings = given.base.warnings;
+    result.loaded = std::move(loaded);
     result.warnings.insert(result.warnings.end(), result.loaded.warnings.begin(),
                            result.loaded.warnings.end());
     const Registrar registrar(given, options, result.loaded);

@@ -53,9 +53,18 @@ struct CaseRegistration {
   bool refused() const;
 };
 
+/// Outlines of a model over each view at a pose, rectified px.
+std::vector<std::vector<Eigen::Vector2d>> outlines(const registration::Model& model,
+                                                   const std::vector<geometry::View>& views,
+                                                   const geometry::RigidTransform& world_from_model);
+
 /// Registers every model of a case. Unreadable input is a failure; refusals are in the result.
 Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given,
                                          const RegisterOptions& options);
+
+/// Registers every model to views that are loaded already. Fails as `register_case`.
+Expected<CaseRegistration> register_loaded(const pipeline::RegistrationCase& given, LoadedViews loaded,
+                                           const RegisterOptions& options);
 
 /// registration.json (docs/formats.md).
 Json to_json(const CaseRegistration& result);
