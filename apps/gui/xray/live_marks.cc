@@ -37,6 +37,11 @@ void LiveMarks::set_picks(std::vector<FreshPick> raw) {
   for (FreshPick& pick : raw) picks_.push_back({std::move(pick), {}});
 }
 
+void LiveMarks::set_outlines(std::vector<ModelOutline> rectified) {
+  outlines_.clear();
+  for (ModelOutline& outline : rectified) outlines_.push_back({std::move(outline)});
+}
+
 void LiveMarks::set_moved(std::optional<FreshPick> raw) {
   moved_.reset();
   if (raw) moved_ = CarriedPick{*std::move(raw), {}};
@@ -45,6 +50,7 @@ void LiveMarks::set_moved(std::optional<FreshPick> raw) {
 void LiveMarks::forget_layer() {
   for (Carried& line : epipolar_) line.is_carried = false;
   for (Carried* one : {&path_, &tool_}) one->is_carried = false;
+  for (CarriedOutline& outline : outlines_) outline.is_carried = false;
   for (CarriedPick& pick : picks_) pick.in_layer.reset();
 }
 
@@ -56,10 +62,34 @@ void LiveMarks::carry(const pipeline::ViewResult& view, Layer layer) {
   };
   for (Carried& line : epipolar_) carry_one(line);
   for (Carried* one : {&path_, &tool_}) carry_one(*one);
+  for (CarriedOutline& outline : outlines_) {
+    if (std::exchange(outline.is_carried, true)) continue;
+    outline.in_layer = {};
+    for (const Eigen::Vector2d& dot : outline.given.dots)
+      if (const auto place = in_layer(view, layer, dot)) outline.in_layer.dots.push_back(*place);
+    for (const auto& [name, at] : outline.given.points)
+      if (const auto place = in_layer(view, layer, at)) outline.in_layer.points.emplace_back(name, *place);
+  }
   for (CarriedPick& pick : picks_)
     if (!pick.in_layer) pick.in_layer = layer_from_raw(view, layer, pick.given.raw);
   if (moved_) moved_->in_layer = layer_from_raw(view, layer, moved_->given.raw);
 }
+
+namespace {
+
+void paint_outline(QPainter& painter, const ModelOutline& outline, const ImageFrame& frame,
+                   const QColor& colour) {
+  QList<QPointF> dots;
+  for (const Eigen::Vector2d& dot : outline.dots) dots.append(frame.to_widget(dot));
+  painter.setPen(QPen(colour, 2));
+  painter.drawPoints(dots.data(), int(dots.size()));
+  for (const auto& [name, at] : outline.points) {
+    paint_open_cross(painter, frame.to_widget(at), colour);
+    outlined_text(painter, frame.to_widget(at) + QPointF(12, -8), name, colour);
+  }
+}
+
+}  // namespace
 
 void LiveMarks::paint(QPainter& painter, const ImageFrame& frame) const {
   for (const Carried& line : epipolar_)
@@ -67,6 +97,8 @@ void LiveMarks::paint(QPainter& painter, const ImageFrame& frame) const {
       paint_path(painter, piece, frame, QPen(ink::epipolar, 1.6, Qt::DashLine));
   for (const rectification::PixelPath& piece : path_.in_layer)
     paint_path(painter, piece, frame, QPen(ink::residual, 2.2));
+  for (std::size_t i = 0; i < outlines_.size(); ++i)
+    paint_outline(painter, outlines_[i].in_layer, frame, ink::models[i % std::size(ink::models)]);
   painter.setBrush(ink::residual);
   painter.setPen(Qt::NoPen);
   if (path_.end) painter.drawEllipse(frame.to_widget(*path_.end), 4, 4);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <QPainter>
+#include <utility>
 
 #include "gui/xray/image_frame.h"
 #include "gui/xray/marks.h"
@@ -15,6 +16,12 @@ struct FreshPick {
   Eigen::Vector2d raw;
 };
 
+/// A registered model: dots along its outline and the points of its plan, rectified px.
+struct ModelOutline {
+  std::vector<Eigen::Vector2d> dots;
+  std::vector<std::pair<QString, Eigen::Vector2d>> points;
+};
+
 /// Changing marks over the image: as given (picks raw, the rest rectified) and in the layer's pixels.
 class LiveMarks {
  public:
@@ -24,6 +31,7 @@ class LiveMarks {
   bool has_tool() const { return !tool_.given.empty(); }
   void set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
+  void set_outlines(std::vector<ModelOutline> rectified);
   /// The pick that is being dragged, in place of the one of its name.
   void set_moved(std::optional<FreshPick> raw);
 
@@ -44,9 +52,14 @@ class LiveMarks {
     FreshPick given;
     std::optional<Eigen::Vector2d> in_layer;
   };
+  struct CarriedOutline {
+    ModelOutline given, in_layer = {};
+    bool is_carried = false;
+  };
   std::vector<Carried> epipolar_;
   Carried path_, tool_;
   QString note_;
+  std::vector<CarriedOutline> outlines_;
   std::vector<CarriedPick> picks_;
   std::optional<CarriedPick> moved_;
 };

@@ -160,6 +160,11 @@ void XrayView::set_path(std::vector<Eigen::Vector2d> rectified) {
   carry_live();
 }
 
+void XrayView::set_outlines(std::vector<ModelOutline> rectified) {
+  live_.set_outlines(std::move(rectified));
+  carry_live();
+}
+
 void XrayView::set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note) {
   if (!rectified && !live_.has_tool()) return;
   live_.set_tool(rectified, note);
