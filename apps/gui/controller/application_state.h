@@ -13,6 +13,10 @@
 #include "helicarm/pipeline/case.h"
 #include "helicarm/simulation/bone_meshes.h"
 
+namespace helicarm::case_registration {
+struct CaseRegistration;
+}
+
 namespace helicarm::gui {
 
 /// Where images come from: `files` is a case, `images` are image files without one, for looking.
@@ -25,10 +29,17 @@ struct ViewFile {
   int frame = 1;  ///< 1-based, of the view
 };
 
-/// The steps in their order.
-enum class Phase { acquire, rectify, calibrate, plan, navigate, verify };
-inline constexpr std::array phases{Phase::acquire, Phase::rectify,  Phase::calibrate,
-                                   Phase::plan,    Phase::navigate, Phase::verify};
+/// The steps in their order; the registration, of a case with models, is shown before the plan.
+enum class Phase { acquire, rectify, calibrate, plan, navigate, verify, registration };
+inline constexpr std::array phases{Phase::acquire,  Phase::rectify, Phase::calibrate,   Phase::plan,
+                                   Phase::navigate, Phase::verify,  Phase::registration};
+
+/// A registered model at a pose tried by hand.
+struct NudgedModel {
+  std::size_t model = 0;  ///< among those of the registration
+  geometry::RigidTransform world_from_model;
+  std::vector<std::vector<Eigen::Vector2d>> outlines;  ///< per view, rectified px
+};
 
 /// The state shown by the window, except live data. A value: the window receives complete states only.
 struct ApplicationState {
@@ -56,6 +67,10 @@ struct ApplicationState {
   bool has_unsaved_picks = false;                         ///< not in the case.json of `case_folder`
   std::optional<Failure> picks_not_kept = {};             ///< why changed picks are not kept or saved
   std::vector<pipeline::Pick> offered_picks;              ///< picks of the plan
+
+  bool has_models = false;  ///< the case names models to be registered
+  std::shared_ptr<const case_registration::CaseRegistration> registration = {};
+  std::optional<NudgedModel> nudged = {};
 
   QString tour;  ///< description of the registration moves
   std::optional<double> hand_eye_rms_mm;

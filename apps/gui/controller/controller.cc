@@ -123,12 +123,17 @@ Controller::Change Controller::came(Images images) {
 }
 
 Controller::Change Controller::measured(Equipment& equipment, const std::vector<pipeline::Pick>& picks) {
+  const bool calibrates = !equipment.calibration || equipment.calibrated_by != equipment.options.method;
   auto result = std::make_shared<const pipeline::Result>(value_or_throw(gui::measure(equipment, picks)));
   std::optional<operation::LiveTool> live;
   if (equipment.operation && !result->failure)
     if (auto follows = equipment.operation->live_tool()) live = *std::move(follows);
-  return [this, result, live](ApplicationState& state) {
+  return [this, result, live, calibrates](ApplicationState& state) {
     forget_measurement(state);
+    if (calibrates) {
+      state.registration.reset();
+      state.nudged.reset();
+    }
     state.result = result;
     ++state.measurements;
     // A refused tunnel leaves the calibration: its ends can be picked again.

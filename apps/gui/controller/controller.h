@@ -10,6 +10,7 @@
 #include "gui/controller/live.h"
 #include "gui/controller/worker.h"
 #include "helicarm/operation/connections.h"
+#include "helicarm/registration/motion.h"
 #include "helicarm/virtual_devices/virtual_devices.h"
 
 namespace helicarm::gui {
@@ -80,6 +81,12 @@ class Controller : public QObject {
   void redo_picks() { step_picks(later_picks_, earlier_picks_); }
   void measure();
 
+  /// Registers the models of a measured case, the nudged one from its present pose.
+  void register_models();
+  /// Moves a registered model from its registered pose, about its centre; its outlines follow as soon as they
+  /// are computed.
+  void nudge(std::size_t model, const registration::RigidStep& step);
+
   void unlock(const std::string& who);
   void register_robot();
   void plan_tunnel(const std::string& tunnel);
@@ -129,6 +136,7 @@ class Controller : public QObject {
   static Change with_plan(const operation::OperationPlan& plan, const Json& offered);
   Change with_case(pipeline::Case given, Equipment& equipment, std::optional<Picks> unsaved = {});
   void keep_unsaved_picks();
+  void outline_nudged();
   Change came(std::vector<pipeline::ViewResult> images);
 
   ApplicationState state_;
@@ -137,6 +145,7 @@ class Controller : public QObject {
   std::optional<operation::PlanWatch> plan_watch_;  ///< of the displayed path
   std::string followed_;
   std::vector<Picks> earlier_picks_, later_picks_;  ///< for undo and redo, the last is the next
+  bool outlining_ = false;                          ///< of the nudged model
   bool picks_came_ = false;                         ///< during the measurement
   std::function<void()> next_source_;               ///< opened as soon as the work in progress has ended
   pipeline::RunOptions options_;

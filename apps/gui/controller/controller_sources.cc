@@ -131,6 +131,8 @@ void Controller::open_case(const fs::path& folder, bool keeps_picks) {
   open(Source::files, folder, "reading " + folder.filename().string(),
        [=, this](Equipment& equipment) -> Change {
          pipeline::Case given = value_or_throw(pipeline::read_case(folder));
+         if (const auto json = read_json(pipeline::case_file(folder)); json && json->contains("models"))
+           equipment.with_models = pipeline::read_registration_case(folder);
          if (!keeps_picks) return with_case(std::move(given), equipment);
          const auto unsaved = unsaved_picks(folder, given.views);
          return [change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)), folder,
@@ -172,18 +174,23 @@ Controller::Change Controller::with_case(pipeline::Case given, Equipment& equipm
   equipment.given = given;
   const std::vector<ViewFile> files = files_of(given);
   const Change found = measured(equipment, unsaved.value_or(given.picks));
-  return
-      [this, given = std::move(given), unsaved = std::move(unsaved), files, found](ApplicationState& state) {
-        for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
-        state.files = files;
-        state.calibrator = given.calibrator;
-        state.tunnels = tunnels_of(given);
-        state.picks = unsaved.value_or(given.picks);
-        state.has_unsaved_picks = unsaved.has_value();
-        if (unsaved) earlier_picks_.push_back(given.picks);
-        complete_landmarks(state);
-        found(state);
-      };
+  const std::optional<Failure> unreadable = equipment.with_models && !*equipment.with_models
+                                                ? std::optional(equipment.with_models->error())
+                                                : std::nullopt;
+  return [this, given = std::move(given), unsaved = std::move(unsaved), files, found, unreadable,
+          has_models = equipment.with_models.has_value()](ApplicationState& state) {
+    for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
+    state.files = files;
+    state.calibrator = given.calibrator;
+    state.tunnels = tunnels_of(given);
+    state.picks = unsaved.value_or(given.picks);
+    state.has_unsaved_picks = unsaved.has_value();
+    if (unsaved) earlier_picks_.push_back(given.picks);
+    complete_landmarks(state);
+    found(state);
+    state.has_models = has_models;
+    if (unreadable) state.refusals.insert_or_assign(Phase::registration, *unreadable);
+  };
 }
 
 }  // namespace helicarm::gui

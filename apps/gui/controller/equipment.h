@@ -2,8 +2,10 @@
 #pragma once
 
 #include <atomic>
+#include <map>
 
 #include "gui/controller/application_state.h"
+#include "helicarm/case_registration/register_case.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/pipeline/locate_case.h"
 #include "helicarm/virtual_devices/virtual_devices.h"
@@ -18,7 +20,9 @@ struct Equipment {
   std::unique_ptr<operation::Operation> operation;
   operation::TrackerPlan tracker;  ///< of the operation; any thread may read it
   std::optional<pipeline::Case> given;
-  std::optional<pipeline::CaseCalibration> calibration;  ///< of `given`
+  std::optional<pipeline::CaseCalibration> calibration;             ///< of `given`
+  std::optional<Expected<pipeline::RegistrationCase>> with_models;  ///< `given`, if it names models
+  std::map<std::string, registration::Model> models;                ///< those that were read
   rectification::Method calibrated_by = rectification::Method::best;
   pipeline::RunOptions options;
   std::optional<robot::RobotOrder> last_order;
@@ -43,6 +47,12 @@ Expected<Images> take(Equipment& equipment, const std::string& view,
 Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipeline::Pick>& picks);
 
 inline constexpr std::size_t most_loose_images = 20;
+
+/// Registers the case's models to its calibrated views. `from`: a model's start in place of the case's.
+/// `on_step` as `RegisterOptions`. Refuses interrupted once `equipment.stopped`.
+Expected<case_registration::CaseRegistration> register_models(
+    Equipment& equipment, const std::vector<pipeline::Pick>& picks, const std::optional<NudgedModel>& from,
+    const std::function<void(const std::string& step)>& on_step);
 
 /// Images of files, for looking; each with its file.
 struct LooseImages {

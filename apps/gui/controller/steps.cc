@@ -4,6 +4,7 @@
 #include <QCoreApplication>
 #include <algorithm>
 
+#include "helicarm/case_registration/register_case.h"
 #include "helicarm/localization/error_bound.h"
 
 namespace helicarm::gui {
@@ -174,6 +175,30 @@ void verify(StepCard& card, const ApplicationState& state) {
   if (state.outcomes.size() == state.tunnels.size()) settle(card, {});
 }
 
+void registered(StepCard& card, const ApplicationState& state) {
+  if (!state.registration) {
+    card.why = tr("register the models");
+    return;
+  }
+  double worst = 0;
+  std::vector<Warning> warnings;
+  for (const case_registration::RegisteredModel& model : state.registration->models) {
+    const registration::Registration& found = model.registration;
+    if (found.failure) {
+      card.status = StepStatus::refused;
+      card.why = sentence_of(*found.failure);
+      return;
+    }
+    if (model.points.empty())
+      worst = std::max(worst, localization::length_at_95(found.covariance.bottomRightCorner<3, 3>()));
+    for (const case_registration::RegisteredPoint& point : model.points)
+      worst = std::max(worst, localization::length_at_95(point.place.covariance_in_calibrator));
+    warnings.insert(warnings.end(), found.warnings.begin(), found.warnings.end());
+  }
+  card.figure = tr("within %1 mm (95 %)").arg(worst, 0, 'f', 2);
+  settle(card, doubts(warnings));
+}
+
 }  // namespace
 
 Phase phase_of(const Failure& failure) {
@@ -207,14 +232,16 @@ QString sentence_of(const Failure& failure) {
 
 std::array<StepCard, phases.size()> steps_of(const ApplicationState& state) {
   std::array<StepCard, phases.size()> cards;
-  const std::array names{tr("Acquire"), tr("Rectify"),  tr("Calibrate"),
-                         tr("Plan"),    tr("Navigate"), tr("Verify")};
+  const std::array names{tr("Acquire"),  tr("Rectify"), tr("Calibrate"), tr("Plan"),
+                         tr("Navigate"), tr("Verify"),  tr("Register")};
   using Judge = void (*)(StepCard&, const ApplicationState&);
-  constexpr std::array<Judge, phases.size()> judges{acquire, rectify, calibrate, plan, navigate, verify};
+  constexpr std::array<Judge, phases.size()> judges{acquire,  rectify, calibrate, plan,
+                                                    navigate, verify,  registered};
   for (std::size_t i = 0; i < cards.size(); ++i) {
     StepCard& card = cards[i];
     card.phase = phases[i];
     card.name = names[i];
+    card.is_offered = card.phase != Phase::registration || state.has_models;
     const bool possible = i < 3 || state.measured;
     if (state.result && possible) judges[i](card, state);
     if (state.source == Source::images && i > 0) card.why = tr("needs a case");

@@ -16,6 +16,7 @@ struct StepCard {
   StepStatus status = StepStatus::waiting;
   QString figure;
   QString why;
+  bool is_offered = true;  ///< the source has this step
 };
 
 std::array<StepCard, phases.size()> steps_of(const ApplicationState& state);

@@ -15,6 +15,7 @@
 #include <algorithm>
 
 #include "gui/controller/steps.h"
+#include "gui/window/register_page.h"
 #include "gui/window/style.h"
 #include "helicarm/geometry/epipolar.h"
 
@@ -34,6 +35,7 @@ Phase open_phase(const std::array<StepCard, phases.size()>& cards, const Applica
   if (state.source == Source::images) return Phase::acquire;
   const bool registered = state.hand_eye_rms_mm.has_value();
   for (const StepCard& card : cards) {
+    if (card.phase == Phase::registration) continue;  // a step that may be left out
     if (card.phase == Phase::navigate && state.source == Source::files && !registered) return Phase::plan;
     if (card.status == StepStatus::good || (card.status == StepStatus::warning && card.phase != Phase::plan))
       continue;
@@ -88,6 +90,7 @@ void MainWindow::build() {
   connect(panels_, &XrayPanels::displayed, this, [this] {
     show_picks();
     show_measures();
+    show_outlines();
   });
   sides->addWidget(build_right());
   sides->setStretchFactor(1, 3);
@@ -139,8 +142,9 @@ void MainWindow::build_pages() {
   plan_ = new PlanPage(controller_, this);
   navigate_ = new NavigatePage(controller_, this);
   auto* verify = new VerifyPage(controller_, this);
-  for (Page* page : std::initializer_list<Page*>{acquire, rectify, new CalibratePage(controller_, this),
-                                                 plan_, navigate_, verify}) {
+  for (Page* page :
+       std::initializer_list<Page*>{acquire, rectify, new CalibratePage(controller_, this), plan_, navigate_,
+                                    verify, new RegisterPage(controller_, this)}) {
     auto* scrolled = new QScrollArea;
     scrolled->setWidgetResizable(true);
     scrolled->setFrameShape(QFrame::NoFrame);
@@ -207,7 +211,7 @@ void MainWindow::show_state() {
   const auto cards = steps_of(state);
   strip_->show_steps(cards);
   if (!state.busy && !moved_on_) show_phase(open_phase(cards, state));
-  if (state.busy) moved_on_ = false;
+  if (state.busy) moved_on_ = state.busy == Phase::registration;  // its page stays
   for (Page* page : all_pages_) page->show_state(state);
   setWindowTitle(state.folder.empty() ? tr("helicarm") : tr("helicarm: %1").arg(text(state.folder.string())));
   rehearsal_menu_->setEnabled(state.source == Source::virtual_or);
@@ -225,6 +229,7 @@ void MainWindow::show_state() {
   redo_->setEnabled(controller_.can_redo_picks() && controller_.takes_picks());
   show_images();
   show_picks();
+  show_outlines();
   focus_->restore(pages_->currentWidget());
 }
 
@@ -250,6 +255,15 @@ void MainWindow::show_picks() {
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
     const auto view = panels_->view_in(i);
     if (view && shown_ && *view < shown_->views.size()) show_picks_in(i, *view, wanted);
+  }
+}
+
+void MainWindow::show_outlines() {
+  const ApplicationState& state = controller_.state();
+  for (std::size_t i = 0; i < xrays_.size(); ++i) {
+    const auto view = panels_->view_in(i);
+    xrays_[i]->set_outlines(view && panels_->panel(i).shows_own_frame() ? outlines_of(state, *view)
+                                                                        : std::vector<ModelOutline>{});
   }
 }
 

@@ -92,6 +92,8 @@ class MainWindow : public QMainWindow {
   void show_images();
   void show_picks();
   void show_measures();
+  /// Of the registered models, over each X-ray image.
+  void show_outlines();
   void display_wanted(const std::optional<WantedPick>& wanted);
   void show_picks_in(std::size_t panel, std::size_t view, const std::optional<WantedPick>& wanted);
   using EpipolarLine = std::vector<Eigen::Vector2d>;  ///< rectified px

@@ -87,7 +87,7 @@ void MainWindow::build_menus() {
   help->addAction(tr("&Keys"), QKeySequence::HelpContents, this, [notify] {
     notify(
         tr("Keys"),
-        tr("Space: stop the robot\nAlt+1 to Alt+6: steps\nTab: next control\n"
+        tr("Space: stop the robot\nAlt+1 to Alt+7: steps\nTab: next control\n"
            "Enter: press; hold it on a yellow button\n"
            "Ctrl+N rehearsal, Ctrl+Shift+N case of X-ray images, Ctrl+O open, Ctrl+5 two or four images, "
            "Ctrl+E export, Ctrl+C copy, Ctrl+P screenshot, Ctrl+, settings\n"

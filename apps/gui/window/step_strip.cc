@@ -47,6 +47,11 @@ QString definition_of(Phase phase) {
       return StepStrip::tr(
           "FRE: mean distance of the fiducials, located by their images, from their places in the "
           "calibrator's file, mm; and fiducials used in all views, of all.");
+    case Phase::registration:
+      return StepStrip::tr(
+          "Length that 95 % of the errors of the worst point of the models' plans do not exceed, without "
+          "plans of "
+          "the worst model's centre, mm.");
     case Phase::plan:
       return StepStrip::tr("Length that 95 % of the errors of the worst point do not exceed, mm.");
     case Phase::navigate:
@@ -130,14 +135,17 @@ StepStrip::StepStrip(QWidget* parent) : QWidget(parent) {
     button->setObjectName(QString("step%1").arg(int(phase)));
     buttons_[std::size_t(phase)] = button;
     group->addButton(button);
-    row->addWidget(button);
+    row->insertWidget(phase == Phase::registration ? int(Phase::plan) : -1, button);
     connect(button, &QToolButton::clicked, this, [this, phase] { emit chosen(phase); });
   }
   choose(Phase::acquire);
 }
 
 void StepStrip::show_steps(const std::array<StepCard, phases.size()>& cards) {
-  for (const StepCard& card : cards) button(card.phase)->show_card(card);
+  for (const StepCard& card : cards) {
+    button(card.phase)->show_card(card);
+    button(card.phase)->setVisible(card.is_offered);
+  }
 }
 
 void StepStrip::choose(Phase phase) { button(phase)->setChecked(true); }

@@ -29,7 +29,7 @@ class StepButton : public QToolButton {
   StepCard card_;
 };
 
-/// The six steps; a click, or Alt+1 to 6, opens one.
+/// The steps; a click, or Alt+1 to 7, opens one.
 class StepStrip : public QWidget {
   Q_OBJECT
 

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// Registration of a case's models, and moving one by hand.
+#include "gui/controller/controller.h"
+#include "gui/controller/equipment.h"
+
+namespace helicarm::gui {
+
+using case_registration::CaseRegistration;
+
+Expected<CaseRegistration> register_models(Equipment& equipment, const std::vector<pipeline::Pick>& picks,
+                                           const std::optional<NudgedModel>& from,
+                                           const std::function<void(const std::string& step)>& on_step) {
+  return guarded([&] {
+    pipeline::RegistrationCase given = value_or_throw(*equipment.with_models);
+    given.base.picks = picks;
+    if (from) given.models.at(from->model).world_from_model = from->world_from_model;
+    case_registration::RegisterOptions options;
+    options.threads = equipment.options.threads;
+    options.on_step = [&](const std::string& model, std::string_view step) {
+      if (equipment.stopped) throw BadInput(Reason::interrupted, "cancelled");
+      on_step(model + ": " + std::string(step));
+    };
+    return value_or_throw(case_registration::register_loaded(
+        given, case_registration::views_of_calibration(given, *equipment.calibration), options));
+  });
+}
+
+namespace {
+
+using Outlines = std::vector<std::vector<Eigen::Vector2d>>;
+
+Expected<Outlines> outlines_of(Equipment& equipment, const CaseRegistration& registration,
+                               const NudgedModel& nudged) {
+  return guarded([&] {
+    const case_registration::RegisteredModel& registered = registration.models.at(nudged.model);
+    const std::string& name = registered.registration.name;
+    if (!equipment.models.contains(name))
+      equipment.models.emplace(
+          name, value_or_throw(
+                    case_registration::load_model(equipment.with_models->value().models.at(nudged.model)))
+                    .value());
+    return case_registration::outlines(equipment.models.at(name), registered.views, nudged.world_from_model);
+  });
+}
+
+bool same_place(const NudgedModel& a, const NudgedModel& b) {
+  return a.model == b.model && a.world_from_model.rotation == b.world_from_model.rotation &&
+         a.world_from_model.translation == b.world_from_model.translation;
+}
+
+}  // namespace
+
+void Controller::register_models() {
+  if (!equipment_ || !state_.has_models || !state_.measured) return;
+  begin(Phase::registration, "reading the models",
+        [this, equipment = equipment_, picks = state_.picks, from = state_.nudged]() -> Change {
+          const auto tell = [this](const std::string& step) {
+            meanwhile([step](ApplicationState& state) { state.doing = step; });
+          };
+          const auto done = std::make_shared<const CaseRegistration>(
+              value_or_throw(gui::register_models(*equipment, picks, from, tell)));
+          return [done](ApplicationState& state) {
+            state.registration = done;
+            state.nudged.reset();
+          };
+        });
+}
+
+void Controller::nudge(std::size_t model, const registration::RigidStep& step) {
+  if (state_.busy || !state_.registration || model >= state_.registration->models.size()) return;
+  const case_registration::RegisteredModel& registered = state_.registration->models[model];
+  const registration::Registration& from = registered.registration;
+  Outlines until_then = state_.nudged && state_.nudged->model == model ? std::move(state_.nudged->outlines)
+                                                                       : registered.outlines;
+  state_.nudged.reset();
+  if (!step.isZero(0) && !registered.by_landmarks_only)
+    state_.nudged = {model, registration::moved_about(from.world_from_model, from.centre, step),
+                     std::move(until_then)};
+  emit changed();
+  if (!outlining_) outline_nudged();
+}
+
+void Controller::outline_nudged() {
+  outlining_ = state_.nudged && !state_.busy;
+  if (!outlining_) return;
+  worker_.post([this, equipment = equipment_, registration = state_.registration, of = *state_.nudged] {
+    const auto outlines = outlines_of(*equipment, *registration, of);
+    QMetaObject::invokeMethod(
+        this,
+        [this, of, outlines] {
+          const bool is_newest = state_.nudged && same_place(*state_.nudged, of);
+          if (outlines && state_.nudged && state_.nudged->model == of.model)
+            state_.nudged->outlines = *outlines;
+          outlining_ = false;
+          if (!is_newest) outline_nudged();
+          emit changed();
+        },
+        Qt::QueuedConnection);
+  });
+}
+
+}  // namespace helicarm::gui

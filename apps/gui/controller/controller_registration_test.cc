@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <QCoreApplication>
+#include <QElapsedTimer>
+#include <QThread>
+
+#include <gtest/gtest.h>
+
+#include "gui/controller/case_with_model_test.h"
+#include "gui/controller/controller.h"
+#include "gui/controller/steps.h"
+#include "helicarm/case_registration/register_case.h"
+#include "helicarm/core/temporary_folder.h"
+
+namespace helicarm::gui {
+namespace {
+
+constexpr int patience_ms = 600000;
+
+class ControllerRegistration : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    truth_ = write_case_with_model(folder_->path());
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  ControllerRegistration() : app_(argc_, argv_), controller_(std::make_unique<Controller>()) {
+    controller_->open_case(folder_->path(), false);
+    wait([&] { return !state().busy; });
+  }
+
+  const ApplicationState& state() { return controller_->state(); }
+  StepCard card() { return steps_of(state())[std::size_t(Phase::registration)]; }
+  template <class Done>
+  void wait(const Done& done) {
+    QElapsedTimer since;
+    since.start();
+    while (!done() && since.elapsed() < patience_ms) {
+      QCoreApplication::processEvents();
+      QThread::msleep(5);
+    }
+    ASSERT_TRUE(done()) << state().doing;
+  }
+  void register_models() {
+    controller_->register_models();
+    wait([&] { return !state().busy; });
+  }
+  const registration::Registration& found() { return state().registration->models.at(0).registration; }
+
+  static inline std::unique_ptr<TemporaryFolder> folder_;
+  static inline geometry::RigidTransform truth_;
+  int argc_ = 1;
+  char name_[5] = "ctrl";
+  char* argv_[2] = {name_, nullptr};
+  QCoreApplication app_;
+  std::unique_ptr<Controller> controller_;
+};
+
+TEST_F(ControllerRegistration, RegistersTheModelsAndStartsFromANudgedPose) {
+  ASSERT_TRUE(state().measured);
+  EXPECT_TRUE(card().is_offered);
+  register_models();
+  ASSERT_TRUE(state().registration) << card().why.toStdString();
+  EXPECT_LT((found().world_from_model.translation - truth_.translation).norm(), 1);
+  EXPECT_EQ(state().registration->models[0].points.size(), 2u);
+  const auto first = state().registration;
+
+  registration::RigidStep step = registration::RigidStep::Zero();
+  step.tail<3>() << 3, 0, 0;
+  controller_->nudge(0, step);
+  ASSERT_TRUE(state().nudged);
+  EXPECT_NEAR((state().nudged->world_from_model.translation - found().world_from_model.translation).norm(), 3,
+              1e-9);
+  wait([&] { return state().nudged->outlines != first->models[0].outlines; });
+  EXPECT_EQ(state().nudged->outlines.size(), 2u);
+  register_models();
+  EXPECT_FALSE(state().nudged);
+  ASSERT_NE(state().registration, first);
+  EXPECT_LT((found().world_from_model.translation - truth_.translation).norm(), 1);
+}
+
+TEST_F(ControllerRegistration, CancelEndsIt) {
+  controller_->register_models();
+  controller_->cancel();
+  wait([&] { return !state().busy; });
+  EXPECT_FALSE(state().registration);
+  EXPECT_EQ(state().refusals.at(Phase::registration).reason, Reason::interrupted);
+}
+
+TEST(Steps, RegistrationIsOfCasesWithModels) {
+  EXPECT_FALSE(steps_of({})[std::size_t(Phase::registration)].is_offered);
+}
+
+StepCard card_of(const case_registration::RegisteredModel& model) {
+  ApplicationState state;
+  state.has_models = state.measured = true;
+  state.result = std::make_shared<const pipeline::Result>();
+  state.registration = std::make_shared<const case_registration::CaseRegistration>(
+      case_registration::CaseRegistration{.failure = {}, .warnings = {}, .models = {model}, .loaded = {}});
+  return steps_of(state)[std::size_t(Phase::registration)];
+}
+
+TEST(Steps, RegistrationShowsTheErrorOfItsWorstModel) {
+  case_registration::RegisteredModel model;
+  model.registration.covariance.diagonal().setConstant(0.04);
+  EXPECT_EQ(card_of(model).figure, "within 0.56 mm (95 %)");  // 0.2 sqrt(7.815)
+  EXPECT_EQ(card_of(model).status, StepStatus::good);
+}
+
+TEST(Steps, RegistrationShowsWhyAModelIsRefused) {
+  case_registration::RegisteredModel model;
+  model.registration.failure = Failure{Reason::wrong_model, "femur: another bone", {}, {}};
+  EXPECT_EQ(card_of(model).status, StepStatus::refused);
+  EXPECT_EQ(card_of(model).why, "femur: another bone (wrong_model)");
+}
+
+}  // namespace
+}  // namespace helicarm::gui

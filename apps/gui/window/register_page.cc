@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/window/register_page.h"
+
+#include <QGridLayout>
+#include <QSignalBlocker>
+#include <QVBoxLayout>
+#include <algorithm>
+
+#include "gui/controller/steps.h"
+#include "gui/window/page_parts.h"
+#include "helicarm/localization/error_bound.h"
+
+namespace helicarm::gui {
+namespace {
+
+using case_registration::CaseRegistration;
+using case_registration::RegisteredModel;
+
+QString three(const Eigen::Vector3d& values, int decimals) {
+  return QString("%1, %2, %3")
+      .arg(number(values.x(), decimals), number(values.y(), decimals), number(values.z(), decimals));
+}
+
+QStringList row_of(const RegisteredModel& model) {
+  const registration::Registration& found = model.registration;
+  QStringList scores;
+  for (const registration::RegisteredView& view : found.views) scores << number(view.score, 3);
+  const Eigen::Matrix<double, 6, 1> sigma = found.covariance.diagonal().cwiseSqrt();
+  return {text(found.name),
+          text(std::string(registration::word(found.decision))),
+          scores.join(", "),
+          three(sigma.tail<3>(), 3),
+          three(sigma.head<3>() * 180 / EIGEN_PI, 3),
+          model.by_landmarks_only ? QString() : QString("%1/%2").arg(found.agree).arg(found.starts)};
+}
+
+/// Decision's reason, warnings and notes of every model, a line each.
+QString reasons_of(const CaseRegistration& done) {
+  QStringList lines;
+  for (const RegisteredModel& model : done.models) {
+    const registration::Registration& found = model.registration;
+    if (found.failure) lines << sentence_of(*found.failure);
+    for (const auto* list : {&found.warnings, &found.notes})
+      for (const Warning& each : *list) lines << sentence_of(each);
+  }
+  return lines.join("\n");
+}
+
+}  // namespace
+
+RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
+    : Page(tr("Registers the case's models to the calibrated views. Check that each outline follows the "
+              "bone's edges in every X-ray image."),
+           controller, parent) {
+  register_ = add_button(tr("Register models"), "registerModels", [this] {
+    reset_hand();
+    nudge();  // none: the case's start
+    controller_.register_models();
+  });
+  says_ = new QLabel;
+  says_->setObjectName("registerSays");
+  says_->setWordWrap(true);
+  layout()->addWidget(says_);
+  models_ = add_table(
+      {{tr("Model"), tr("Name of the model in case.json")},
+       {tr("Decision"), tr("accept, warn or refuse; the reasons stand above the table")},
+       {tr("Agreement"), tr("With each view's image, at most 1")},
+       {tr("Sigma mm"), tr("Standard deviation of the model's centre along the calibrator's x, y, z, mm")},
+       {tr("Sigma °"), tr("Standard deviation of the rotation about the calibrator's x, y, z, degrees")},
+       {tr("Starts"), tr("Starting poses that led to this result, of all")}},
+      "modelTable");
+  points_ = add_table(
+      {{tr("Planned point"), tr("Name of the point in the model's plan")},
+       {tr("Model"), tr("Name of the model in case.json")},
+       {tr("x, y, z mm"), tr("Position in the calibrator's frame at the first view's acquisition, mm")},
+       {tr("±mm (95 %)"), tr("Predicted error (TRE): length that 95 % of the errors do not exceed, mm")}},
+      "modelPointTable");
+  add_hand();
+}
+
+void RegisterPage::add_hand() {
+  hand_ = new QWidget;
+  auto* grid = new QGridLayout(hand_);
+  grid->setContentsMargins(0, 0, 0, 0);
+  model_ = new QComboBox;
+  model_->setObjectName("nudgedModel");
+  model_->setAccessibleName(tr("Model that is moved by hand"));
+  grid->addWidget(model_, 0, 0);
+  for (int i = 0; i < 6; ++i) {
+    const bool turns = i >= 3;
+    const QString axis = QStringList{"x", "y", "z"}[i % 3];
+    auto* by = by_[std::size_t(i)] = new QDoubleSpinBox;
+    by->setObjectName((turns ? "turn" : "shift") + axis.toUpper());
+    by->setAccessibleName((turns ? tr("Turn about %1, degrees") : tr("Shift along %1, mm")).arg(axis));
+    by->setToolTip((turns ? tr("Turns the model about its centre, about the calibrator's %1")
+                          : tr("Moves the model along the calibrator's %1"))
+                       .arg(axis));
+    by->setPrefix(axis + " ");
+    by->setSuffix(turns ? tr(" °") : tr(" mm"));
+    by->setRange(-180, 180);
+    by->setSingleStep(0.5);
+    by->setDecimals(1);
+    by->setKeyboardTracking(false);
+    grid->addWidget(by, 1 + i / 3, i % 3);
+    connect(by, &QDoubleSpinBox::valueChanged, this, &RegisterPage::nudge);
+  }
+  connect(model_, &QComboBox::currentIndexChanged, this, [this] {
+    reset_hand();
+    nudge();
+  });
+  layout()->addWidget(hand_);
+  from_here_ =
+      add_button(tr("Register from here"), "registerFromHere", [this] { controller_.register_models(); });
+  from_here_->setToolTip(tr("Starts the search from the model's present pose"));
+  grid->addWidget(from_here_, 0, 1, 1, 2);
+}
+
+void RegisterPage::reset_hand() {
+  for (QDoubleSpinBox* by : by_) {
+    const QSignalBlocker quiet(by);
+    by->setValue(0);
+  }
+}
+
+void RegisterPage::nudge() {
+  registration::RigidStep step;
+  for (int i = 0; i < 3; ++i) {
+    step[i] = by_[std::size_t(i + 3)]->value() * EIGEN_PI / 180;
+    step[i + 3] = by_[std::size_t(i)]->value();
+  }
+  if (model_->currentIndex() >= 0) controller_.nudge(std::size_t(model_->currentIndex()), step);
+}
+
+void RegisterPage::show_state(const ApplicationState& state) {
+  const bool can = state.has_models && state.measured && !state.busy;
+  register_->setEnabled(can);
+  hand_->setEnabled(can && state.registration);
+  from_here_->setEnabled(can && state.nudged);
+  if (const auto refusal = state.refusals.find(Phase::registration); refusal != state.refusals.end())
+    says_->setText(sentence_of(refusal->second));
+  else if (!state.has_models)
+    says_->setText(
+        tr("This case has no models: name a CT volume or a surface under \"models\" in case.json."));
+  else if (state.busy == Phase::registration)
+    says_->setText(text(state.doing));
+  else
+    says_->setText(state.registration ? reasons_of(*state.registration) : QString());
+  if (shown_ == state.registration) return;
+  shown_ = state.registration;
+  std::vector<QStringList> models, points;
+  const QSignalBlocker quiet(model_);
+  const int chosen = model_->currentIndex();
+  model_->clear();
+  reset_hand();
+  if (shown_)
+    for (const RegisteredModel& model : shown_->models) {
+      models.push_back(row_of(model));
+      model_->addItem(text(model.registration.name));
+      for (const case_registration::RegisteredPoint& point : model.points)
+        points.push_back({text(point.name), text(model.registration.name),
+                          three(point.place.in_calibrator, 2),
+                          number(localization::length_at_95(point.place.covariance_in_calibrator), 2)});
+    }
+  model_->setCurrentIndex(std::clamp(chosen, std::min(0, model_->count() - 1), model_->count() - 1));
+  fill(models_, models);
+  fill(points_, points);
+}
+
+std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t view) {
+  std::vector<ModelOutline> outlines;
+  if (!state.registration) return outlines;
+  for (std::size_t i = 0; i < state.registration->models.size(); ++i) {
+    const RegisteredModel& model = state.registration->models[i];
+    const bool is_nudged = state.nudged && state.nudged->model == i;
+    const auto& dots = is_nudged ? state.nudged->outlines : model.outlines;
+    ModelOutline& outline = outlines.emplace_back();
+    if (view < dots.size()) outline.dots = dots[view];
+    if (is_nudged || view >= model.views.size()) continue;
+    for (const case_registration::RegisteredPoint& point : model.points)
+      if (const Eigen::Vector3d& at = point.place.in_calibrator; model.views[view].depth(at) > 1)
+        outline.points.emplace_back(text(point.name), model.views[view].project(at));
+  }
+  return outlines;
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QDoubleSpinBox>
+#include <array>
+
+#include "gui/window/pages.h"
+#include "gui/xray/live_marks.h"
+#include "helicarm/case_registration/register_case.h"
+
+namespace helicarm::gui {
+
+/// Registration of the case's models: decisions and figures, and moving a model by hand to start from there.
+class RegisterPage : public Page {
+  Q_OBJECT
+
+ public:
+  RegisterPage(Controller& controller, QWidget* parent);
+  void show_state(const ApplicationState& state) override;
+
+ private:
+  void add_hand();
+  void nudge();
+  void reset_hand();
+
+  QPushButton *register_, *from_here_;
+  QLabel* says_;
+  QTableWidget *models_, *points_;
+  QWidget* hand_;
+  QComboBox* model_;
+  std::array<QDoubleSpinBox*, 6> by_{};  ///< mm, then degrees
+  std::shared_ptr<const case_registration::CaseRegistration> shown_;
+};
+
+/// The registered models over a view, the nudged one at its pose.
+std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t view);
+
+}  // namespace helicarm::gui
