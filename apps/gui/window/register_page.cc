@@ -69,13 +69,14 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
        {tr("Sigma °"), tr("Standard deviation of the rotation about the calibrator's x, y, z, degrees")},
        {tr("Starts"), tr("Starting poses that led to this result, of all")}},
       "modelTable");
+  models_->setFixedHeight(104);
+  add_hand();
   points_ = add_table(
       {{tr("Planned point"), tr("Name of the point in the model's plan")},
        {tr("Model"), tr("Name of the model in case.json")},
        {tr("x, y, z mm"), tr("Position in the calibrator's frame at the first view's acquisition, mm")},
        {tr("±mm (95 %)"), tr("Predicted error (TRE): length that 95 % of the errors do not exceed, mm")}},
       "modelPointTable");
-  add_hand();
 }
 
 void RegisterPage::add_hand() {

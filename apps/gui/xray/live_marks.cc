@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gui/xray/live_marks.h"
 
+#include <cmath>
 #include <utility>
 
 #include "gui/xray/label_placer.h"
@@ -54,6 +55,15 @@ void LiveMarks::forget_layer() {
   for (CarriedPick& pick : picks_) pick.in_layer.reset();
 }
 
+namespace {
+
+bool is_inside(const pipeline::ViewResult& view, const Eigen::Vector2d& place) {
+  const image::Image<float>& pixels = view.xray_image->pixels;
+  return pixels.contains(int(std::lround(place.x())), int(std::lround(place.y())));
+}
+
+}  // namespace
+
 void LiveMarks::carry(const pipeline::ViewResult& view, Layer layer) {
   const auto carry_one = [&](Carried& one) {
     if (std::exchange(one.is_carried, true)) return;
@@ -66,7 +76,8 @@ void LiveMarks::carry(const pipeline::ViewResult& view, Layer layer) {
     if (std::exchange(outline.is_carried, true)) continue;
     outline.in_layer = {};
     for (const Eigen::Vector2d& dot : outline.given.dots)
-      if (const auto place = in_layer(view, layer, dot)) outline.in_layer.dots.push_back(*place);
+      if (const auto place = in_layer(view, layer, dot); place && is_inside(view, *place))
+        outline.in_layer.dots.push_back(*place);
     for (const auto& [name, at] : outline.given.points)
       if (const auto place = in_layer(view, layer, at)) outline.in_layer.points.emplace_back(name, *place);
   }
