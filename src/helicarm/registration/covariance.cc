@@ -38,14 +38,19 @@ Reduced reduced(const ViewObservation& view, const MatrixXd& map) {
 }
 
 /// Columns: motions of the model that shift its image by one pixel along u and along v.
-Eigen::Matrix<double, affine_parameters, 2> image_shifts(const geometry::View& camera,
-                                                         const Vector3d& centre) {
-  Eigen::Matrix<double, affine_parameters, 2> map = Eigen::Matrix<double, affine_parameters, 2>::Zero();
+using ImageShifts = Eigen::Matrix<double, affine_parameters, 2>;
+ImageShifts image_shifts(const geometry::View& camera, const Vector3d& centre) {
+  ImageShifts map = ImageShifts::Zero();
   const double depth = camera.depth(centre);
   const Eigen::Matrix3d& rotation = camera.camera_from_world.rotation;
   map.topRows<3>().col(0) = rotation.row(0).transpose() * depth / camera.intrinsics.fx;
   map.topRows<3>().col(1) = rotation.row(1).transpose() * depth / camera.intrinsics.fy;
   return map;
+}
+
+/// The model grown about its centre, by its own size.
+Eigen::Matrix<double, affine_parameters, 1> growth() {
+  return affine_from_strain(Eigen::Matrix3d::Identity()).leftCols<3>().rowwise().sum();
 }
 
 /// The response of the pose to motions that only one view shows.
@@ -113,7 +118,7 @@ RigidCovariance camera_part(const Observation& observation, const std::vector<Re
 }
 
 RigidCovariance edge_part(const Observation& observation, const std::vector<RegistrationView>& views,
-                          const Vector3d& centre, double sigma_mm, const Part& part) {
+                          const Vector3d& centre, double radius_mm, double sigma_mm, const Part& part) {
   RigidCovariance sum = RigidCovariance::Zero();
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!takes_part(part.views, i)) continue;
@@ -121,6 +126,9 @@ RigidCovariance edge_part(const Observation& observation, const std::vector<Regi
     const double sigma_px = sigma_mm * std::abs(view.intrinsics.fy) / view.depth(centre);
     const MatrixXd by_shift = response(observation, i, image_shifts(view, centre), part);
     sum += sigma_px * sigma_px * by_shift * by_shift.transpose();
+    // All edges further out: the model is taken for nearer than it is.
+    const MatrixXd by_size = response(observation, i, growth(), part) / radius_mm;
+    sum += sigma_mm * sigma_mm * by_size * by_size.transpose();
   }
   return sum;
 }

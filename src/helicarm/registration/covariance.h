@@ -36,9 +36,11 @@ RigidCovariance camera_part(const Observation& observation, const std::vector<Re
                             const Eigen::Vector3d& centre, const Eigen::MatrixXd& camera_covariance,
                             const Part& part = {});
 
-/// Covariance of the pose that a shift common to a view's edges causes, `sigma_mm` per axis at the model.
+/// Covariance of the pose that errors common to a view's edges cause: `sigma_mm` at the model in a shift
+/// along each axis, and outward at `radius_mm` from the centre.
 RigidCovariance edge_part(const Observation& observation, const std::vector<RegistrationView>& views,
-                          const Eigen::Vector3d& centre, double sigma_mm, const Part& part = {});
+                          const Eigen::Vector3d& centre, double radius_mm, double sigma_mm,
+                          const Part& part = {});
 
 /// Local shifts (full-resolution pixels) that the comparisons of a view still ask for, each along its own
 /// best determined direction; root mean square by weight.

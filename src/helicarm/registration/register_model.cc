@@ -21,7 +21,8 @@ using geometry::RigidTransform;
 
 constexpr double same_mm = 1.5;        // between solutions that count as one, before the last level
 constexpr double correlation_mm = 12;  // of residuals along a bone's edge
-constexpr double edge_sigma = 0.1;     // of the finest spacing: bias of a CT's edges, common to a view
+constexpr double edge_sigma =
+    0.1;  // of the finest spacing: bias of a CT's edges in a view, shifted or outward
 constexpr double alone_prior_mm = 10;  // keeps a single view from running along its rays
 
 /// Levels from coarse to fine for this model and these views.
@@ -37,10 +38,10 @@ std::vector<SearchStage> stages_for(const Scene& scene, const Vector3d& at) {
             {{true, std::max(pixel, 0.5), 5, std::max(1.0, 0.3 / pixel)}, 2}};
   }
   const double fine = std::max(model.resolution_mm, 2 * pixel);
-  std::vector<SearchStage> stages = {{{false, fine}, 2}};
+  std::vector<SearchStage> stages = {{{false, fine}, 3}};
   const double coarsest = std::max(fine, std::min(5.0, model.radius_mm / 5));
   for (double spacing = 2 * fine; spacing < 1.5 * coarsest; spacing *= 2)
-    stages.insert(stages.begin(), {{false, spacing}, stages.size() < 2 ? 8 : 16});
+    stages.insert(stages.begin(), {{false, spacing}, stages.size() < 2 ? 8 : 32});
   return stages;
 }
 
@@ -120,7 +121,7 @@ struct ErrorModel {
   RigidCovariance covariance(const Observation& observation, const Vector3d& centre, const Part& part) const {
     Linearised sum = linearised(observation, part.views, affine_from_rigid(), part.prior, correlation_px);
     return sum.covariance() + camera_part(observation, scene.views(), centre, cameras, part) +
-           edge_part(observation, scene.views(), centre, edge_mm, part);
+           edge_part(observation, scene.views(), centre, scene.model().radius_mm, edge_mm, part);
   }
 };
 

@@ -102,7 +102,8 @@ TEST(Covariance, MatchesTheScatterOfNoise) {
         linearised(estimate.observation, {}, affine_from_rigid(), RigidCovariance::Zero(), {20, 20});
     const RigidStep error = step_about(estimate.pose, true_pose(), centre);
     const RigidCovariance covariance =
-        RigidCovariance(sum.covariance()) + edge_part(estimate.observation, views, centre, 0.1);
+        RigidCovariance(sum.covariance()) +
+        edge_part(estimate.observation, views, centre, scene.model().radius_mm, 0.1);
     mean += error.dot(covariance.inverse() * error) / trials;
   }
   EXPECT_GT(mean, 1);

@@ -112,9 +112,12 @@ SearchResult search(Scene& scene, const std::vector<SearchStage>& stages,
     for (const Estimate& estimate : estimates)
       reached.push_back(estimate.pose), scores.push_back(estimate.score);
     const std::size_t keep = last ? estimates.size() : std::size_t((&stage)[1].keep);
-    auto kept = best_of(model, reached, scores, int(std::max<std::size_t>(2, keep)), same_mm);
-    if (kept.size() > 1) {
-      result.runner_up = estimates[kept[1]];
+    auto kept = best_of(model, reached, scores, int(std::max<std::size_t>(2, keep + !last)), same_mm);
+    // What goes on and merges with the best was no rival; at the last level nothing goes on.
+    const std::size_t rival = last ? 1 : keep;
+    if (kept.size() > rival &&
+        (last || separation(model, reached[kept[rival]], reached[kept[0]]) > 2 * stage.level.spacing_mm)) {
+      result.runner_up = estimates[kept[rival]];
       result.runner_up_best = scores[kept[0]];
     }
     kept.resize(std::min(kept.size(), keep));

@@ -17,12 +17,13 @@ struct SearchStage {
 struct SearchOptions {
   double shift_mm = 15;  ///< per axis, about each start
   double turn_deg = 15;
-  int candidates = 600;  ///< scored at the first level; 0: the starts alone are refined
+  int candidates = 8000;  ///< scored at the first level; 0: the starts alone are refined
 };
 
 struct SearchResult {
   std::vector<Estimate> solutions;  ///< of the last level, distinct, best first
-  /// Best distinct one at the last level that two of them reached, and the best's score there.
+  /// Best distinct one of the last level or, where all became one there, of those that a level before left
+  /// behind; and the best's score at its level.
   std::optional<Estimate> runner_up;
   double runner_up_best = 0;
   int starts = 0;  ///< refined
