@@ -66,7 +66,7 @@ struct Quadric {
 
   double at(const Eigen::Vector3d& x) const { return std::max(0.0, x.dot(a * x + 2 * b) + c); }
 
-  /// The minimum, drawn to `near` along the directions that the planes leave free.
+  /// The minimum; along directions that the planes leave free, the point next to `near`.
   Eigen::Vector3d least(const Eigen::Vector3d& near) const {
     constexpr double pull = 1e-3;
     const Eigen::Matrix3d drawn = a + pull * area * Eigen::Matrix3d::Identity();
