@@ -246,7 +246,7 @@ void add_import(CLI::App& app, Action& action) {
       ->add_option(
           "FILE", a.file,
           "MayaCam 2, NRRD header, OpenCV (YAML, XML), RTK (XML), a 3x4 matrix as text or JSON, XMALab's DLT "
-          "coefficients, or an ITK transform (.tfm)")
+          "coefficients, or an ITK transform (.tfm, .h5)")
       ->required();
   command->add_option("--unit", a.unit, "Unit of length in the file: mm or cm")
       ->type_name("WORD")

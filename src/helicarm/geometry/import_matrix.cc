@@ -173,7 +173,7 @@ ImportedMatrix parse_text_matrix(const std::string& text, const std::string& ori
 void refuse_other_formats(const std::string& text, const std::string& origin) {
   constexpr std::pair<std::string_view, std::string_view> formats[] = {
       {"#Insight Transform File", "an ITK transform, which has no projection"},
-      {"\x89HDF", "an HDF5 file; in 3D Slicer save the transform as .tfm"},
+      {"\x89HDF", "an HDF5 file, which has no projection"},
       {"%YAML", "a YAML file that OpenCV did not write"},
       {"<?xml", "an XML file of neither RTK nor OpenCV"}};
   const std::string_view beginning = std::string_view(text).substr(0, 1000);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/geometry/hdf5_file.h"
 #include "helicarm/geometry/import_formats.h"
 #include "helicarm/geometry/rotation.h"
 
@@ -24,6 +25,11 @@ struct ItkFile {
   std::vector<double> parameters, fixed;
 };
 
+[[noreturn]] void refuse_several(const std::string& origin) {
+  throw BadInput(Reason::unsupported,
+                 fmt::format("{}: holds several transforms; harden or combine them into one", origin));
+}
+
 ItkFile itk_file_from(const std::string& text, const std::string& origin) {
   ItkFile file;
   std::istringstream lines(text);
@@ -31,9 +37,7 @@ ItkFile itk_file_from(const std::string& text, const std::string& origin) {
     const auto colon = line.find(':');
     if (line.starts_with('#') || colon == line.npos) continue;
     const std::string name = trimmed(std::string_view(line).substr(0, colon)), value = line.substr(colon + 1);
-    if (name == "Transform" && !file.type.empty())
-      throw BadInput(Reason::unsupported,
-                     fmt::format("{}: holds several transforms; harden or combine them into one", origin));
+    if (name == "Transform" && !file.type.empty()) refuse_several(origin);
     if (name == "Transform") file.type = trimmed(value);
     if (name == "Parameters") file.parameters = numbers_in(value, origin + ": Parameters");
     if (name == "FixedParameters") file.fixed = numbers_in(value, origin + ": FixedParameters");
@@ -81,7 +85,7 @@ struct ItkType {
   std::size_t parameters;  ///< the last three are the translation
 };
 
-const ItkType& type_of(const ItkFile& file, const std::string& origin) {
+const ItkType& type_named(const std::string& given, const std::string& origin) {
   static constexpr std::array types{ItkType{"AffineTransform", ItkKind::matrix, 12},
                                     ItkType{"MatrixOffsetTransformBase", ItkKind::matrix, 12},
                                     ItkType{"Rigid3DTransform", ItkKind::matrix, 12},
@@ -89,22 +93,47 @@ const ItkType& type_of(const ItkFile& file, const std::string& origin) {
                                     ItkType{"VersorRigid3DTransform", ItkKind::versor, 6},
                                     ItkType{"QuaternionRigidTransform", ItkKind::quaternion, 7},
                                     ItkType{"TranslationTransform", ItkKind::translation, 3}};
-  if (file.type.empty()) throw BadInput(Reason::truncated, fmt::format("{}: Transform is missing", origin));
-  const std::string name = file.type.substr(0, file.type.find('_'));
+  if (given.empty()) throw BadInput(Reason::truncated, fmt::format("{}: Transform is missing", origin));
+  const std::string name = given.substr(0, given.find('_'));
   for (const ItkType& type : types)
-    if (type.name == name && (file.type.ends_with("_double_3_3") || file.type.ends_with("_float_3_3"))) {
-      if (file.parameters.size() != type.parameters)
-        throw BadInput(Reason::bad_size, fmt::format("{}: Parameters: {} numbers, must be {}", origin,
-                                                     file.parameters.size(), type.parameters));
-      return type;
-    }
+    if (type.name == name && (given.ends_with("_double_3_3") || given.ends_with("_float_3_3"))) return type;
   throw BadInput(Reason::unsupported,
                  fmt::format("{}: a transform {} is not read; save a linear one of 3D space", origin,
-                             file.type.substr(0, 60)));
+                             given.substr(0, 60)));
+}
+
+/// Groups, datasets and, before ITK 5, their misspelt names as in ITK's HDF5TransformIO.
+ItkFile itk_file_from_hdf5(std::string_view bytes, const std::string& origin) {
+  const Hdf5File hdf5(bytes, origin);
+  const auto root = hdf5.root();
+  const auto group = root.find("TransformGroup");
+  if (group == root.end())
+    throw BadInput(Reason::unsupported,
+                   fmt::format("{}: an HDF5 file without TransformGroup is no ITK transform", origin));
+  const auto transforms = hdf5.links(group->second);
+  if (transforms.size() > 1) refuse_several(origin);
+  if (transforms.empty()) return {};
+  const auto fields = hdf5.links(transforms.begin()->second);
+  const auto numbers = [&](const std::string& name) {
+    for (const std::string beginning : {"Transform", "Tranform"})
+      if (const auto found = fields.find(beginning + name); found != fields.end())
+        return hdf5.numbers(found->second);
+    return std::vector<double>();
+  };
+  ItkFile file;
+  if (const auto type = fields.find("TransformType"); type != fields.end())
+    file.type = hdf5.text(type->second);
+  type_named(file.type, origin);  // first: transforms of other types have more numbers
+  file.parameters = numbers("Parameters");
+  file.fixed = numbers("FixedParameters");
+  return file;
 }
 
 RigidTransform rigid_from(const ItkFile& file, const std::string& origin) {
-  const ItkType& type = type_of(file, origin);
+  const ItkType& type = type_named(file.type, origin);
+  if (file.parameters.size() != type.parameters)
+    throw BadInput(Reason::bad_size, fmt::format("{}: Parameters: {} numbers, must be {}", origin,
+                                                 file.parameters.size(), type.parameters));
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
   auto rotation = matrix.topLeftCorner<3, 3>();
   if (type.kind == ItkKind::matrix) rotation = Eigen::Map<const ItkRows>(file.parameters.data());
@@ -129,10 +158,11 @@ Expected<std::optional<RigidTransform>> read_itk_transform(const std::filesystem
   const auto text = read_file(path, most_bytes);
   // A larger file is no transform; `import_matrix` names what is wrong with it.
   if (!text && text.error().reason == Reason::missing_file) return tl::unexpected<Failure>(text.error());
-  if (!text || !text->starts_with(itk_mark)) return std::nullopt;
+  const bool hdf5 = text && Hdf5File::is_one(*text);
+  if (!text || (!hdf5 && !text->starts_with(itk_mark))) return std::nullopt;
   return guarded([&]() -> std::optional<RigidTransform> {
     const std::string origin = path.filename().string();
-    return rigid_from(itk_file_from(*text, origin), origin);
+    return rigid_from(hdf5 ? itk_file_from_hdf5(*text, origin) : itk_file_from(*text, origin), origin);
   });
 }
 
