@@ -10,30 +10,13 @@
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/advice.h"
 #include "helicarm/pipeline/case.h"
-#include "helicarm/pipeline/outcome.h"
 #include "helicarm/pipeline/run_case.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/report/report.h"
+#include "helicarm/report/tables.h"
 
 namespace helicarm::cli {
 namespace {
-
-std::string coordinates(const Eigen::Vector3d& p) {
-  return fmt::format("{:9.3f} {:9.3f} {:9.3f}", p.x(), p.y(), p.z());
-}
-
-std::string statistics_line(std::string_view what, const localization::Statistics& s) {
-  if (s.n == 0) return {};
-  return fmt::format("  {:<8} mean {:7.3f}   rms {:7.3f}   max {:7.3f}   n {}\n", what, s.mean, s.rms, s.max,
-                     s.n);
-}
-
-/// The codes of a point's warnings, for the end of its line.
-std::string marks_of(const pipeline::PointResult& point) {
-  std::string marks;
-  for (const Warning& warning : point.warnings) marks += fmt::format("   {}", code(warning.reason));
-  return marks;
-}
 
 /// Each kind once, with the number of further points.
 void print_notes(const std::vector<Warning>& notes, std::ostream& out) {
@@ -130,40 +113,15 @@ Expected<rectification::Method> method_named(const std::string& name) {
   return fail(Reason::usage, fmt::format("--method: \"{}\" is none of: best, paper", name));
 }
 
-/// "   within 0.812 (95 %)" of a tunnel's end.
-std::string within_in_tool(const pipeline::Result& result, const std::string& tunnel, bool start) {
-  const auto error = pipeline::tunnel_end_error_in_tool(result, tunnel, start);
-  return error ? fmt::format("   within {:.3f} (95 %)", *error) : "";
-}
-
 std::string summary_of(const pipeline::Result& result) {
-  std::string text = statistics_line("FLE px", result.accuracy.fle_px) +
-                     statistics_line("FRE mm", result.accuracy.fre_mm) +
-                     statistics_line("TRE mm", result.accuracy.tre_mm);
-  if (!result.points.empty())
-    text += fmt::format("\n  {:<12} {:>9} {:>9} {:>9}  mm, calibrator frame\n", "point", "x", "y", "z");
-  for (const pipeline::PointResult& point : result.points)
-    text +=
-        point.place
-            ? fmt::format("  {:<12} {}   within {:.3f} (95 %){}\n", point.name,
-                          coordinates(point.place->in_calibrator),
-                          localization::length_at_95(point.place->covariance_in_calibrator), marks_of(point))
-            : fmt::format("  {:<12} {}\n", point.name, point.reason ? code(point.reason->reason) : "");
-  for (const guidance::Tunnel& tunnel : result.tunnels)
-    if (tunnel.start_in_tool && tunnel.end_in_tool)
-      text += fmt::format(
-          "\n  tunnel {:<8} in the tool's frame, length {:.2f} mm, axis sigma {:.2f} degrees\n"
-          "    start {}{}\n    end   {}{}\n",
-          tunnel.name, tunnel.length_mm.value_or(0), tunnel.axis_sigma_deg().value_or(0),
-          coordinates(*tunnel.start_in_tool), within_in_tool(result, tunnel.name, true),
-          coordinates(*tunnel.end_in_tool), within_in_tool(result, tunnel.name, false));
-  for (const verification::Verification& v : result.verifications)
-    for (const auto& [end, error] : {std::pair{"start", &v.start}, {"end", &v.end}})
-      if (*error)
-        text += fmt::format(
-            "\n  tool line {:<8} distance from the {}: {:.2f} px, {:.2f} mm (Eq. 17), {:.2f} mm in space",
-            v.name, end, (*error)->combined_px, (*error)->combined_mm, (*error)->distance_mm);
-  return text + (result.verifications.empty() ? "" : "\n");
+  std::string text;
+  for (const report::Table& table : {report::statistics_table(result.accuracy),
+                                     report::points_table(result.points), report::tunnels_table(result),
+                                     report::verification_table(report::tools_at_ends(result.verifications))})
+    if (!table.rows.empty())
+      text += fmt::format("{}{}\n{}", text.empty() ? "" : "\n", table.heading,
+                          report::text_of(report::without_empty_columns(table)));
+  return text;
 }
 
 Expected<pipeline::Result> measure(const RunArguments& arguments, Console& console) {

@@ -34,8 +34,6 @@ QColor colour_of(PdfLayout::Tone tone) {
   }
 }
 
-QString bare(const QString& heading) { return heading.startsWith('#') ? heading.mid(1) : heading; }
-
 }  // namespace
 
 PdfLayout::PdfLayout(QPdfWriter& writer, QString footer)
@@ -125,57 +123,70 @@ void PdfLayout::cards(const std::vector<LayoutCard>& cards) {
   y_ += mm(height + gap_mm);
 }
 
-double PdfLayout::row_height(const QStringList& cells, const std::vector<double>& widths,
-                             const QFont& font) const {
-  const QFontMetricsF metrics(font, &writer_);
+struct PdfLayout::Row {
+  QStringList words;
+  std::vector<QColor> inks;
+  QFont font;
+  const std::vector<double>& widths;
+  QColor line;
+};
+
+double PdfLayout::row_height(const Row& row) const {
+  const QFontMetricsF metrics(row.font, &writer_);
   double height = metrics.height();
-  for (qsizetype i = 0; i < cells.size(); ++i)
-    height = std::max(
-        height,
-        metrics.boundingRect(QRectF(0, 0, widths[std::size_t(i)], height_), Qt::TextWordWrap, cells[i])
-            .height());
+  for (qsizetype i = 0; i < row.words.size(); ++i) {
+    const QRectF space(0, 0, row.widths[std::size_t(i)], height_);
+    height = std::max(height, metrics.boundingRect(space, Qt::TextWordWrap, row.words[i]).height());
+  }
   return height + 2 * mm(cell_mm);
 }
 
-void PdfLayout::row(const QStringList& cells, const QStringList& headings, const std::vector<double>& widths,
-                    const QFont& font, const QColor& colour) {
-  const double height = row_height(cells, widths, font);
-  painter_.setFont(font);
-  painter_.setPen(colour);
+void PdfLayout::draw(const Row& row, const std::vector<report::Column>& columns) {
+  const double height = row_height(row);
+  painter_.setFont(row.font);
   double x = 0;
-  for (qsizetype i = 0; i < cells.size(); ++i) {
-    const double width = widths[std::size_t(i)];
-    const auto side = headings[i].startsWith('#') ? Qt::AlignRight : Qt::AlignLeft;
-    painter_.drawText(QRectF(x, y_ + mm(cell_mm), width, height), int(Qt::TextWordWrap | side), cells[i]);
-    x += width + mm(column_mm);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const auto side = columns[i].is_number ? Qt::AlignRight : Qt::AlignLeft;
+    painter_.setPen(row.inks[i]);
+    painter_.drawText(QRectF(x, y_ + mm(cell_mm), row.widths[i], height), int(Qt::TextWordWrap | side),
+                      row.words[qsizetype(i)]);
+    x += row.widths[i] + mm(column_mm);
   }
   y_ += height;
-  painter_.setPen(QPen(colour == soft ? soft : rule, mm(0.2)));
+  painter_.setPen(QPen(row.line, mm(0.2)));
   painter_.drawLine(QPointF(0, y_), QPointF(std::min(width_, x - mm(column_mm)), y_));
 }
 
-void PdfLayout::table(const QStringList& headings, const std::vector<QStringList>& rows) {
-  const QFont font = font_of(8.5), head = font_of(8, QFont::DemiBold);
-  const QFontMetricsF metrics(font, &writer_), head_metrics(head, &writer_);
-  QStringList titles;
-  std::vector<double> widths;
-  for (qsizetype i = 0; i < headings.size(); ++i) {
-    titles << bare(headings[i]);
-    double width = head_metrics.horizontalAdvance(titles[i]);
-    for (const QStringList& cells : rows) width = std::max(width, metrics.horizontalAdvance(cells[i]));
-    widths.push_back(width + mm(0.5));
+void PdfLayout::table(const report::Table& table) {
+  std::vector<double> widths(table.columns.size(), 0);
+  Row titles{{}, std::vector(widths.size(), soft), font_of(8, QFont::DemiBold), widths, soft};
+  for (const report::Column& column : table.columns) titles.words << QString::fromStdString(column.title);
+  std::vector<Row> rows;
+  for (const auto& cells : table.rows) {
+    Row& row = rows.emplace_back(Row{{}, {}, font_of(8.5), widths, rule});
+    for (const report::Cell& cell : cells) {
+      row.words << QString::fromStdString(cell.text);
+      row.inks.push_back(cell.is_bad ? bad : ink);
+    }
+  }
+  const QFontMetricsF metrics(font_of(8.5), &writer_), title_metrics(titles.font, &writer_);
+  for (std::size_t i = 0; i < widths.size(); ++i) {
+    widths[i] = title_metrics.horizontalAdvance(titles.words[qsizetype(i)]);
+    for (const Row& row : rows)
+      widths[i] = std::max(widths[i], metrics.horizontalAdvance(row.words[qsizetype(i)]));
+    widths[i] += mm(0.5);
   }
   const double space = width_ - double(widths.size() - 1) * mm(column_mm);
   while (std::accumulate(widths.begin(), widths.end(), 0.0) > space)  // the widest column wraps
     *std::ranges::max_element(widths) *= 0.95;
-  need(row_height(titles, widths, head) + (rows.empty() ? 0 : row_height(rows[0], widths, font)));
-  row(titles, headings, widths, head, soft);
-  for (const QStringList& cells : rows) {
-    if (y_ + row_height(cells, widths, font) > height_) {
+  need(row_height(titles) + (rows.empty() ? 0 : row_height(rows[0])));
+  draw(titles, table.columns);
+  for (const Row& row : rows) {
+    if (y_ + row_height(row) > height_) {
       next_page();
-      row(titles, headings, widths, head, soft);
+      draw(titles, table.columns);
     }
-    row(cells, headings, widths, font, ink);
+    draw(row, table.columns);
   }
   y_ += mm(gap_mm);
 }

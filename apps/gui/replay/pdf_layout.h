@@ -8,6 +8,8 @@
 #include <QStringList>
 #include <vector>
 
+#include "helicarm/report/table.h"
+
 namespace helicarm::gui {
 
 /// A figure as SVG text with its caption.
@@ -32,8 +34,8 @@ class PdfLayout {
   enum class Tone { plain, soft, bad, good };
   void paragraph(const QString& text, Tone tone = Tone::plain);
   void cards(const std::vector<LayoutCard>& cards);
-  /// A heading that begins with '#' marks a numeric column. Headings repeat on each page.
-  void table(const QStringList& headings, const std::vector<QStringList>& rows);
+  /// Headings repeat on each page.
+  void table(const report::Table& table);
   /// Two side by side.
   void figures(const std::vector<LayoutFigure>& figures);
 
@@ -44,9 +46,9 @@ class PdfLayout {
   /// Starts a new page if less than this height remains.
   void need(double height);
   double write(const QString& text, const QFont& font, const QColor& ink);
-  double row_height(const QStringList& cells, const std::vector<double>& widths, const QFont& font) const;
-  void row(const QStringList& cells, const QStringList& headings, const std::vector<double>& widths,
-           const QFont& font, const QColor& ink);
+  struct Row;
+  double row_height(const Row& row) const;
+  void draw(const Row& row, const std::vector<report::Column>& columns);
 
   QPdfWriter& writer_;
   QString footer_;

@@ -3,21 +3,25 @@
 
 #include <QTableWidget>
 #include <string>
-#include <vector>
+
+#include "helicarm/report/table.h"
 
 namespace helicarm::gui {
 
 inline QString text(const std::string& words) { return QString::fromStdString(words); }
 
-inline void fill(QTableWidget* table, const std::vector<QStringList>& rows) {
-  table->setRowCount(int(rows.size()));
+/// Bad cells are red, numbers to the right.
+inline void fill(QTableWidget* table, const report::Table& content) {
+  table->setRowCount(int(content.rows.size()));
   for (int row = 0; row < table->rowCount(); ++row)
     for (int column = 0; column < table->columnCount(); ++column) {
-      const QString words = rows[std::size_t(row)].value(column);
-      if (auto* item = table->item(row, column); item != nullptr)
-        item->setText(words);
-      else
-        table->setItem(row, column, new QTableWidgetItem(words));
+      const report::Cell& cell = content.rows[std::size_t(row)][std::size_t(column)];
+      auto* item = table->item(row, column);
+      if (item == nullptr) table->setItem(row, column, item = new QTableWidgetItem);
+      item->setText(text(cell.text));
+      item->setForeground(cell.is_bad ? QBrush(Qt::red) : QBrush());
+      const auto side = content.columns[std::size_t(column)].is_number ? Qt::AlignRight : Qt::AlignLeft;
+      item->setTextAlignment(side | Qt::AlignVCenter);
     }
 }
 

@@ -7,9 +7,9 @@
 #include <QHeaderView>
 #include <QRadioButton>
 #include <QVBoxLayout>
-#include <algorithm>
 
 #include "gui/window/page_parts.h"
+#include "helicarm/report/tables.h"
 
 namespace helicarm::gui {
 
@@ -39,12 +39,12 @@ HoldButton* Page::add_hold(const QString& words, const char* name, std::function
   return button;
 }
 
-QTableWidget* Page::add_table(const std::vector<Column>& columns, const char* name) {
-  auto* table = new QTableWidget(0, int(columns.size()));
+QTableWidget* Page::add_table(const report::Table& content, const char* name) {
+  auto* table = new QTableWidget(0, int(content.columns.size()));
   table->setObjectName(name);
   for (int i = 0; i < table->columnCount(); ++i) {
-    auto* header = new QTableWidgetItem(columns[std::size_t(i)].title);
-    header->setToolTip(columns[std::size_t(i)].definition);
+    auto* header = new QTableWidgetItem(text(content.columns[std::size_t(i)].title));
+    header->setToolTip(text(content.columns[std::size_t(i)].definition));
     table->setHorizontalHeaderItem(i, header);
   }
   table->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
@@ -118,6 +118,15 @@ void AcquirePage::show_state(const ApplicationState& state) {
                                         : QString());
 }
 
+namespace {
+
+const std::vector<pipeline::ViewResult>& views_of(const ApplicationState& state) {
+  static const std::vector<pipeline::ViewResult> none;
+  return state.result ? state.result->views : none;
+}
+
+}  // namespace
+
 RectifyPage::RectifyPage(Controller& controller, QWidget* parent)
     : Page(
           tr("Corrects the intensifier's distortion from the dots of the plate. Check that the residuals are "
@@ -136,85 +145,23 @@ RectifyPage::RectifyPage(Controller& controller, QWidget* parent)
     connect(choice, &QRadioButton::clicked, this, [this, wanted = layer] { emit layer_wanted(wanted); });
   }
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
-  table_ = add_table(
-      {{tr("View"), tr("Name of the X-ray view")},
-       {tr("Dots"), tr("Dots of the plate that the correction uses; 0 for a flat panel or a given map")},
-       {tr("Distortion px"), tr("Distance of the dots from an undistorted lattice before the correction, "
-                                "mean and largest, raw px")},
-       {tr("Residual px"), tr("Distance of the dots from the correction, root mean square, px")},
-       {tr("Cross-val. px"),
-        tr("The same for dots that were left out of the fit: the error to expect between the dots, px")}},
-      "rectifyTable");
+  table_ = add_table(report::rectification_table({}), "rectifyTable");
 }
 
 void RectifyPage::show_state(const ApplicationState& state) {
-  std::vector<QStringList> rows;
-  if (state.result)
-    for (const pipeline::ViewResult& view : state.result->views)
-      if (view.rectification) {
-        const rectification::Rectification& done = *view.rectification;
-        rows.push_back({text(view.name), QString::number(done.plate_dots.size()),
-                        tr("%1 (max %2)").arg(done.raw_mean_px, 0, 'f', 1).arg(done.raw_max_px, 0, 'f', 1),
-                        number(done.map.residual_rms_px, 3), number(done.map.held_out_rms_px, 3)});
-      }
-  fill(table_, rows);
+  fill(table_, report::rectification_table(views_of(state)));
 }
 
 CalibratePage::CalibratePage(Controller& controller, QWidget* parent)
     : Page(tr("Labels the calibrator's fiducials and calibrates each view from them."), controller, parent) {
-  views_ = add_table(
-      {{tr("View"), tr("Name of the X-ray view")},
-       {tr("Fiducials"), tr("Balls of the calibrator that the calibration uses, of all")},
-       {tr("Residual px"),
-        tr("Distance of the fiducials from their projections, root mean square, rectified px")},
-       {tr("fx px"), tr("Distance of the source from the detector, in px along a row; negative in a mirrored "
-                        "image")},
-       {tr("Source mm"), tr("Position of the X-ray source in the calibrator's frame, x, y, z, mm")}},
-      "viewTable");
+  views_ = add_table(report::calibration_table({}), "viewTable");
   views_->setFixedHeight(104);
-  balls_ =
-      add_table({{tr("Fiducial"), tr("Label of the ball in the calibrator's file")},
-                 {tr("View"), tr("Name of the X-ray view")},
-                 {tr("State"),
-                  tr("used; rejected: its residual is too large; hidden, outside the image, or not found")},
-                 {tr("Sigma px"), tr("Standard deviation of the centre's image per axis, rectified px")},
-                 {tr("Residual px"), tr("Distance of the centre's image from its projection, rectified px")}},
-                "ballTable");
+  balls_ = add_table(report::fiducials_table({}), "ballTable");
 }
 
 void CalibratePage::show_state(const ApplicationState& state) {
-  static const std::map<fiducials::FiducialStatus, QString> words{
-      {fiducials::FiducialStatus::used, tr("used")},
-      {fiducials::FiducialStatus::occluded, tr("hidden")},
-      {fiducials::FiducialStatus::outside, tr("outside")},
-      {fiducials::FiducialStatus::rejected, tr("rejected")},
-      {fiducials::FiducialStatus::not_found, tr("not found")}};
-  std::vector<QStringList> views, balls;
-  if (state.result)
-    for (const pipeline::ViewResult& view : state.result->views) {
-      if (!view.found) continue;
-      const auto used = std::ranges::count(view.found->fiducials, fiducials::FiducialStatus::used,
-                                           &fiducials::Fiducial::status);
-      if (view.calibrated) {
-        const Eigen::Vector3d source = view.calibrated->view.source_in_world();
-        views.push_back({text(view.name), QString("%1/%2").arg(used).arg(view.found->fiducials.size()),
-                         number(view.calibrated->reprojection_rms_px, 3),
-                         number(view.calibrated->view.intrinsics.fx, 1),
-                         QString("%1, %2, %3")
-                             .arg(source.x(), 0, 'f', 0)
-                             .arg(source.y(), 0, 'f', 0)
-                             .arg(source.z(), 0, 'f', 0)});
-      }
-      for (const fiducials::Fiducial& ball : view.found->fiducials) {
-        const bool measured = ball.status == fiducials::FiducialStatus::used ||
-                              ball.status == fiducials::FiducialStatus::rejected;
-        balls.push_back({text(ball.label), text(view.name), words.at(ball.status),
-                         measured ? number(ball.sigma_px, 3) : QString(),
-                         measured && view.calibrated ? number(ball.residual_px, 3) : QString()});
-      }
-    }
-  fill(views_, views);
-  fill(balls_, balls);
+  fill(views_, report::calibration_table(views_of(state)));
+  fill(balls_, report::fiducials_table(views_of(state)));
 }
 
 }  // namespace helicarm::gui

@@ -11,13 +11,9 @@
 #include "gui/scene/tre_slice.h"
 #include "gui/window/hold_button.h"
 #include "gui/xray/layers.h"
+#include "helicarm/report/table.h"
 
 namespace helicarm::gui {
-
-/// A column of a table: its title with the unit, and what its values are.
-struct Column {
-  QString title, definition;
-};
 
 /// The actions of each step, one page per step. Pages use the controller and hold no state of their own.
 class Page : public QWidget {
@@ -30,7 +26,7 @@ class Page : public QWidget {
  protected:
   QPushButton* add_button(const QString& text, const char* name, std::function<void()> act);
   HoldButton* add_hold(const QString& text, const char* name, std::function<void()> act);
-  QTableWidget* add_table(const std::vector<Column>& columns, const char* name);
+  QTableWidget* add_table(const report::Table& content, const char* name);
 
   Controller& controller_;
 };

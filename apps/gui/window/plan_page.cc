@@ -9,9 +9,62 @@
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "gui/window/pages.h"
-#include "helicarm/localization/error_bound.h"
+#include "helicarm/report/tables.h"
 
 namespace helicarm::gui {
+
+namespace {
+
+/// A tunnel's end, landmark or target, and what it is.
+struct PlannedPoint {
+  std::string name;
+  QString kind;
+};
+
+QString words_of(const pipeline::BoneLabel& bone) {
+  if (!bone.side) return text(bone.name);
+  return (*bone.side == pipeline::Side::left ? PlanPage::tr("left %1") : PlanPage::tr("right %1"))
+      .arg(text(bone.name));
+}
+
+QString views_with(const ApplicationState& state, const std::string& point) {
+  QStringList views;
+  for (const std::string& view : state.views)
+    if (pick_of(state, point, view) != nullptr) views << text(view);
+  return views.join(", ");
+}
+
+/// The points as the report shows them, and where each is marked. One without a result has a name only.
+report::Table ends_table(const ApplicationState& state, const std::vector<PlannedPoint>& planned) {
+  std::vector<pipeline::PointResult> located;
+  for (const PlannedPoint& each : planned) {
+    pipeline::PointResult& point = located.emplace_back();
+    point.name = each.name;
+    point.source = localization::PointSource::pick;
+    if (!state.result) continue;
+    const auto& points = state.result->points;
+    const auto found = std::ranges::find(points, each.name, &pipeline::PointResult::name);
+    if (found != points.end()) point = *found;
+  }
+  const auto kind = [&](const PlannedPoint& point) {
+    const auto bone = bone_of(state, point.name);
+    return report::Cell{(bone ? point.kind + ", " + words_of(*bone) : point.kind).toStdString()};
+  };
+  return report::beside(
+      report::table_of<PlannedPoint>(
+          "",
+          {{{"Point", "Name of the tunnel end, landmark or check target"},
+            [](const PlannedPoint& point) { return report::Cell{point.name}; }},
+           {{"Is", "enters: where the drill enters; ends: where it stops; landmark; target"}, kind},
+           {{"Clicked in", "Views in which it is picked"},
+            [&](const PlannedPoint& point) {
+              return report::Cell{views_with(state, point.name).toStdString()};
+            }}},
+          planned),
+      report::positions_table(located));
+}
+
+}  // namespace
 
 PlanPage::PlanPage(Controller& controller, QWidget* parent)
     : Page(tr("Click each tunnel end in two X-ray images; the dashed line is the epipolar line of its click "
@@ -23,18 +76,7 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
   next_->setWordWrap(true);
   next_->setProperty("class", "attention");
   layout()->addWidget(next_);
-  ends_ = add_table(
-      {{tr("Point"), tr("Name of the tunnel end, landmark or check target")},
-       {tr("Is"), tr("enters: where the drill enters; ends: where it stops; landmark; target")},
-       {tr("Clicked in"), tr("Views in which it is picked")},
-       {tr("x, y, z mm"), tr("Position in the calibrator's frame at the first view's acquisition, mm")},
-       {tr("±mm (95 %)"),
-        tr("Length that 95 % of the errors do not exceed, mm; of a target its error (TRE) and "
-           "that bound")},
-       {tr("Ray gap mm"), tr("Largest distance between two of the point's rays, mm")}},
-      "endTable");
-  for (const auto& [error, shown_at] : {std::pair(4, 1), {5, 2}})  // visible in a narrow window
-    ends_->horizontalHeader()->moveSection(error, shown_at);
+  ends_ = add_table(ends_table({}, {}), "endTable");
   connect(ends_, &QTableWidget::itemSelectionChanged, this, [this] {
     const int row = ends_->currentRow();
     chosen_.reset();
@@ -74,12 +116,6 @@ std::optional<pipeline::BoneLabel> bone_in(const QString& name, int side) {
   pipeline::BoneLabel bone{name.trimmed().toStdString()};
   if (side > 0) bone.side = side == 1 ? pipeline::Side::left : pipeline::Side::right;
   return bone;
-}
-
-QString words_of(const pipeline::BoneLabel& bone) {
-  if (!bone.side) return text(bone.name);
-  return (*bone.side == pipeline::Side::left ? PlanPage::tr("left %1") : PlanPage::tr("right %1"))
-      .arg(text(bone.name));
 }
 
 }  // namespace
@@ -177,46 +213,18 @@ std::optional<WantedPick> PlanPage::target() const {
   return std::nullopt;
 }
 
-namespace {
-
-/// Columns of a point: where it is clicked, its place, 95 % error and ray gap, or why it is not located.
-QStringList columns_of(const ApplicationState& state, const std::string& name, const QString& kind) {
-  QStringList in;
-  for (const std::string& view : state.views)
-    if (pick_of(state, name, view) != nullptr) in << text(view);
-  QString place, within, gap;
-  if (state.result)
-    for (const pipeline::PointResult& point : state.result->points) {
-      if (point.name != name) continue;
-      if (point.reason) within = sentence_of(*point.reason);
-      if (!point.place) continue;
-      const Eigen::Vector3d& at = point.place->in_calibrator;
-      place = QString("%1, %2, %3").arg(number(at.x(), 2), number(at.y(), 2), number(at.z(), 2));
-      within = number(localization::length_at_95(point.place->covariance_in_calibrator), 2);
-      gap = number(point.ray_gap_mm, 2);
-    }
-  const auto bone = bone_of(state, name);
-  return {text(name), bone ? kind + ", " + words_of(*bone) : kind, in.join(", "), place, within, gap};
-}
-
-}  // namespace
-
 void PlanPage::show_state(const ApplicationState& state) {
-  std::vector<QStringList> rows;
+  std::vector<PlannedPoint> points;
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end}) {
       const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (end == tunnel.start);
-      rows.push_back(columns_of(state, end, enters ? tr("enters") : tr("ends")));
+      points.push_back({end, enters ? tr("enters") : tr("ends")});
     }
-  for (const std::string& landmark : state.landmarks)
-    rows.push_back(columns_of(state, landmark, tr("landmark")));
+  for (const std::string& landmark : state.landmarks) points.push_back({landmark, tr("landmark")});
   if (state.result)
-    for (const localization::TargetError& target : state.result->accuracy.targets) {
-      rows.push_back(columns_of(state, target.name, tr("target")));
-      rows.back()[4] =
-          tr("error %1 of %2").arg(number(target.error_mm, 3), number(target.predicted_95_mm, 3));
-    }
-  fill(ends_, rows);
+    for (const localization::TargetError& target : state.result->accuracy.targets)
+      points.push_back({target.name, tr("target, error %1 mm").arg(number(target.error_mm, 3))});
+  fill(ends_, ends_table(state, points));
   offered_->setVisible(!state.offered_picks.empty());
   landmark_row_->setVisible(state.source == Source::files);
   unsaved_->setVisible(state.has_unsaved_picks || state.picks_not_kept);

@@ -8,6 +8,7 @@
 
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
+#include "helicarm/case_registration/registration_tables.h"
 #include "helicarm/localization/error_bound.h"
 
 namespace helicarm::gui {
@@ -15,24 +16,6 @@ namespace {
 
 using case_registration::CaseRegistration;
 using case_registration::RegisteredModel;
-
-QString three(const Eigen::Vector3d& values, int decimals) {
-  return QString("%1, %2, %3")
-      .arg(number(values.x(), decimals), number(values.y(), decimals), number(values.z(), decimals));
-}
-
-QStringList row_of(const RegisteredModel& model) {
-  const registration::Registration& found = model.registration;
-  QStringList scores;
-  for (const registration::RegisteredView& view : found.views) scores << number(view.score, 3);
-  const Eigen::Matrix<double, 6, 1> sigma = found.covariance.diagonal().cwiseSqrt();
-  return {text(found.name),
-          text(std::string(registration::word(found.decision))),
-          scores.join(", "),
-          three(sigma.tail<3>(), 3),
-          three(sigma.head<3>() * 180 / EIGEN_PI, 3),
-          model.by_landmarks_only ? QString() : QString("%1/%2").arg(found.agree).arg(found.starts)};
-}
 
 /// Decision's reason, warnings and notes of every model, a line each.
 QString reasons_of(const CaseRegistration& done) {
@@ -61,22 +44,10 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
   says_->setObjectName("registerSays");
   says_->setWordWrap(true);
   layout()->addWidget(says_);
-  models_ = add_table(
-      {{tr("Model"), tr("Name of the model in case.json")},
-       {tr("Decision"), tr("accept, warn or refuse; the reasons stand above the table")},
-       {tr("Agreement"), tr("With each view's image, at most 1")},
-       {tr("Sigma mm"), tr("Standard deviation of the model's centre along the calibrator's x, y, z, mm")},
-       {tr("Sigma °"), tr("Standard deviation of the rotation about the calibrator's x, y, z, degrees")},
-       {tr("Starts"), tr("Starting poses that led to this result, of all")}},
-      "modelTable");
+  models_ = add_table(case_registration::models_table({}), "modelTable");
   models_->setFixedHeight(104);
   add_hand();
-  points_ = add_table(
-      {{tr("Planned point"), tr("Name of the point in the model's plan")},
-       {tr("Model"), tr("Name of the model in case.json")},
-       {tr("x, y, z mm"), tr("Position in the calibrator's frame at the first view's acquisition, mm")},
-       {tr("±mm (95 %)"), tr("Predicted error (TRE): length that 95 % of the errors do not exceed, mm")}},
-      "modelPointTable");
+  points_ = add_table(case_registration::points_table({}), "modelPointTable");
 }
 
 void RegisterPage::add_hand() {
@@ -148,23 +119,16 @@ void RegisterPage::show_state(const ApplicationState& state) {
     says_->setText(state.registration ? reasons_of(*state.registration) : QString());
   if (shown_ == state.registration) return;
   shown_ = state.registration;
-  std::vector<QStringList> models, points;
   const QSignalBlocker quiet(model_);
   const int chosen = model_->currentIndex();
   model_->clear();
   reset_hand();
-  if (shown_)
-    for (const RegisteredModel& model : shown_->models) {
-      models.push_back(row_of(model));
-      model_->addItem(text(model.registration.name));
-      for (const case_registration::RegisteredPoint& point : model.points)
-        points.push_back({text(point.name), text(model.registration.name),
-                          three(point.place.in_calibrator, 2),
-                          number(localization::length_at_95(point.place.covariance_in_calibrator), 2)});
-    }
+  const std::vector<RegisteredModel> none;
+  const std::vector<RegisteredModel>& models = shown_ ? shown_->models : none;
+  for (const RegisteredModel& model : models) model_->addItem(text(model.registration.name));
   model_->setCurrentIndex(std::clamp(chosen, std::min(0, model_->count() - 1), model_->count() - 1));
-  fill(models_, models);
-  fill(points_, points);
+  fill(models_, case_registration::models_table(models));
+  fill(points_, case_registration::points_table(models));
 }
 
 std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t view) {

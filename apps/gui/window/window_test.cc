@@ -19,8 +19,8 @@ class WholeOperation : public Window {
     for (int row = 0; row < 4; ++row)
       for (const Json& point : measured["points"])
         if (point["name"] == ends->item(row, 0)->text().toStdString()) {
-          EXPECT_EQ(ends->item(row, 5)->text().toStdString(),
-                    fmt::format("{:.2f}", point["ray_gap_mm"].get<double>()));
+          EXPECT_EQ(ends->item(row, 4)->text().toStdString(),
+                    fmt::format("{:.3f}", point["ray_gap_mm"].get<double>()));
         }
     EXPECT_GE(state().measurements, 2)
         << "one for the images; ends picked during a measurement are measured together";
@@ -51,7 +51,7 @@ class WholeOperation : public Window {
     const Json checked = read_json(case_folder(last) / "result.json").value();
     const Json& line = checked.at("verification").at(0);
     const int row = state().tunnels.back().name > state().tunnels.front().name ? 2 : 0;
-    EXPECT_EQ(table->item(row, 3)->text().toStdString(),
+    EXPECT_EQ(table->item(row, 4)->text().toStdString(),
               fmt::format("{:.2f}", line.at("err_start_px").get<double>()));
   }
   void expect_export_and_replay() {

@@ -5,6 +5,7 @@
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "gui/window/pages.h"
+#include "helicarm/report/tables.h"
 
 namespace helicarm::gui {
 
@@ -109,42 +110,21 @@ VerifyPage::VerifyPage(Controller& controller, QWidget* parent)
               "its predicted value. From the X-ray images alone: Eq. 17 in px and mm, and the distance in "
               "space, mm."),
            controller, parent) {
-  table_ = add_table(
-      {{tr("Tunnel, end"), tr("Name of the tunnel, and its start or end")},
-       {tr("Error"), tr("Distance of the end from the tool's axis by tracker and X-ray images, mm")},
-       {tr("Predicted"), tr("Expected value of that distance by the covariances, root mean square, mm")},
-       {tr("px"), tr("Distance in the X-ray images, both views combined (Eq. 17), px")},
-       {tr("mm"), tr("The same, converted to mm at the depth of the end")},
-       {tr("Space"), tr("Distance in space by the X-ray images alone, mm")}},
-      "outcomeTable");
+  table_ = add_table(report::verification_table({}), "outcomeTable");
   add_button(tr("&Export report, CSV, JSON and other formats..."), "export",
              [this] { emit report_wanted(); });
 }
 
 void VerifyPage::show_state(const ApplicationState& state) {
-  std::vector<QStringList> rows;
+  std::vector<report::ToolAtEnd> tools;
   for (const auto& [name, outcome] : state.outcomes)
-    for (const auto& [end, miss, in_xrays] :
-         {std::tuple(tr("start"), &outcome.start, &verification::Verification::start),
-          std::tuple(tr("end"), &outcome.end, &verification::Verification::end)}) {
-      QStringList row{QString("%1, %2").arg(text(name), end), number(miss->distance_mm(), 2),
-                      number(miss->predicted_mm(), 2)};
-      if (outcome.verification)
-        if (const auto& seen = (*outcome.verification).*in_xrays)
-          row << number(seen->combined_px, 2) << number(seen->combined_mm, 2) << number(seen->distance_mm, 2);
-      rows.push_back(row);
-    }
-  if (rows.empty() && state.result)
-    for (const verification::Verification& line : state.result->verifications)
-      for (const auto& [end, seen] : {std::pair(tr("start"), &line.start), {tr("end"), &line.end}})
-        if (*seen)
-          rows.push_back({QString("%1, %2").arg(text(line.name), end),
-                          {},
-                          {},
-                          number((*seen)->combined_px, 2),
-                          number((*seen)->combined_mm, 2),
-                          number((*seen)->distance_mm, 2)});
-  fill(table_, rows);
+    for (const auto& [end, miss, in_images] :
+         {std::tuple("start", &outcome.start, &verification::Verification::start),
+          std::tuple("end", &outcome.end, &verification::Verification::end)})
+      tools.push_back({name, end, miss->distance_mm(), miss->predicted_mm(),
+                       outcome.verification ? (*outcome.verification).*in_images : std::nullopt});
+  if (tools.empty() && state.result) tools = report::tools_at_ends(state.result->verifications);
+  fill(table_, report::verification_table(tools));
 }
 
 }  // namespace helicarm::gui

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "helicarm/case_registration/register_case.h"
+#include "helicarm/case_registration/registration_tables.h"
 #include "helicarm/core/files.h"
 #include "helicarm/image/grey_window.h"
 #include "helicarm/image/opencv.h"
@@ -45,21 +46,8 @@ std::string model_section(const RegisteredModel& model) {
   for (const auto* list : {&r.warnings, &r.notes})
     for (const Warning& each : *list)
       html += fmt::format("<p class=\"soft\">{}: {}</p>\n", code(each.reason), report::escaped(each.message));
-  report::HtmlTable pose({"", "# x", "# y", "# z"});
-  const Eigen::Matrix<double, 6, 1> sigma = r.covariance.diagonal().cwiseSqrt();
-  const auto row = [&](const char* what, const Eigen::Vector3d& value, int digits) {
-    pose.row({what, report::fixed(value.x(), digits), report::fixed(value.y(), digits),
-              report::fixed(value.z(), digits)});
-  };
-  row("centre, mm", r.centre, 2);
-  row("sigma of the centre, mm", sigma.tail<3>(), 3);
-  row("sigma of the rotation, degrees", sigma.head<3>() * 180 / EIGEN_PI, 3);
-  html += pose.html();
-  report::HtmlTable views({"view", "# agreement", "# residual px", "# other views mm", "# comparisons"});
-  for (const auto& view : r.views)
-    views.row({report::escaped(view.name), report::fixed(view.score, 3), report::fixed(view.residual_px, 2),
-               report::fixed(view.held_out_mm, 2), std::to_string(view.comparisons)});
-  if (!views.empty()) html += views.html();
+  html += html_of(report::without_empty_columns(models_table({model})));
+  if (!r.views.empty()) html += html_of(report::without_empty_columns(views_table(r)));
   if (!model.by_landmarks_only)
     html += fmt::format(
         "<p class=\"soft\">{} of {} starts ended here. Runner-up: {}. Strain that would fit better: {:.2f} "
@@ -73,14 +61,7 @@ std::string model_section(const RegisteredModel& model) {
   if (model.landmarks)
     html += fmt::format("<p>Landmarks: FRE {:.2f} mm, FLE {:.2f} mm (rms).</p>\n", model.landmarks->fre_mm,
                         model.landmarks->fle_mm);
-  report::HtmlTable points({"point", "# x mm", "# y mm", "# z mm", "# within mm (95 %)"});
-  for (const RegisteredPoint& point : model.points) {
-    const Eigen::Vector3d& at = point.place.in_calibrator;
-    points.row({report::escaped(point.name), report::fixed(at.x(), 2), report::fixed(at.y(), 2),
-                report::fixed(at.z(), 2),
-                report::fixed(localization::length_at_95(point.place.covariance_in_calibrator), 2)});
-  }
-  return points.empty() ? html : html + points.html();
+  return model.points.empty() ? html : html + html_of(points_table({model}));
 }
 
 }  // namespace

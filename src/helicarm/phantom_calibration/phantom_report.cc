@@ -11,6 +11,7 @@
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/image/png.h"
 #include "helicarm/report/markup.h"
+#include "helicarm/report/table.h"
 
 namespace helicarm::phantom_calibration {
 namespace {
@@ -122,46 +123,72 @@ std::string view_figure(const MeasuredView& view, const std::vector<MeasuredBall
                        : "");
 }
 
+report::Table views_table(const std::vector<MeasuredView>& views) {
+  using View = MeasuredView;
+  return report::without_empty_columns(report::table_of<View>(
+      "Views",
+      {{{"View", "Name of the X-ray view"}, [](const View& v) { return report::Cell{v.name}; }},
+       {{"Balls", "Balls that the view shows", true},
+        [](const View& v) { return report::Cell{std::to_string(v.residuals_px.size())}; }},
+       {{"Residual rms, px", "Distance of the balls from their projections per axis, px", true},
+        [](const View& v) { return report::Cell{report::fixed(v.rms_px, 3)}; }},
+       {{"Left out, px", "The same for the phantom as measured by the other views, px", true},
+        [](const View& v) { return report::Cell{report::fixed(v.left_out_rms_px, 3)}; }}},
+      views));
+}
+
 std::string views_section(const PhantomResult& result) {
   if (result.views.empty()) return "";
-  report::HtmlTable table({"view", "# balls", "# rms px per axis", "# left out px"});
   std::string figures;
-  for (const MeasuredView& view : result.views) {
-    table.row({report::escaped(view.name), std::to_string(view.residuals_px.size()),
-               report::fixed(view.rms_px, 3), report::fixed(view.left_out_rms_px, 3)});
-    figures += view_figure(view, result.balls);
-  }
-  return "<h2>Views</h2>\n" + table.html() +
+  for (const MeasuredView& view : result.views) figures += view_figure(view, result.balls);
+  return "<h2>Views</h2>\n" + html_of(views_table(result.views)) +
          "<p class=\"soft\">left out: the phantom is measured by the other views, which then predict this "
          "one's "
          "images.</p>\n<div class=\"views\">" +
          figures + "</div>\n";
 }
 
+report::Table balls_table(const PhantomResult& result) {
+  using Ball = MeasuredBall;
+  const auto number = [](const char* title, const char* definition, auto value) {
+    return report::ColumnOf<Ball>{{title, definition, true},
+                                  [value](const Ball& b) { return report::Cell{value(b)}; }};
+  };
+  const auto along = [&](const char* title, Eigen::Index i) {
+    return number(title, "Position in the phantom's frame, mm",
+                  [i](const Ball& b) { return report::fixed(b.centre[i], 3); });
+  };
+  const auto off = [&](const char* title, Eigen::Index i) {
+    return number(title, "Measured less nominal position, mm", [i](const Ball& b) {
+      return b.from_nominal ? report::fixed((*b.from_nominal)[i], 3) : "–";
+    });
+  };
+  const double limit = off_by * tolerance_of(result);
+  const std::string remark = fmt::format("off by more than {:g} x {:g} mm", off_by, tolerance_of(result));
+  return report::without_empty_columns(report::table_of<Ball>(
+      "Balls",
+      {{{"Ball", "Label of the ball"}, [](const Ball& b) { return report::Cell{b.label}; }},
+       along("x, mm", 0),
+       along("y, mm", 1),
+       along("z, mm", 2),
+       number("σ, mm", "Standard deviation of the position, mean of the axes, mm",
+              [](const Ball& b) { return report::fixed(std::sqrt(b.covariance_mm2.trace() / 3), 4); }),
+       number("Views", "Views that show the ball", [](const Ball& b) { return std::to_string(b.views); }),
+       off("dx, mm", 0),
+       off("dy, mm", 1),
+       off("dz, mm", 2),
+       number("From nominal, mm", "Length of that difference, mm",
+              [](const Ball& b) { return b.from_nominal ? report::fixed(b.from_nominal->norm(), 3) : "–"; }),
+       {{"Remark", "A ball whose position is far from nominal"},
+        [limit, remark](const Ball& b) {
+          return b.from_nominal && b.from_nominal->cwiseAbs().maxCoeff() > limit ? report::Cell{remark, true}
+                                                                                 : report::Cell{};
+        }}},
+      result.balls));
+}
+
 std::string balls_section(const PhantomResult& result) {
-  if (result.balls.empty()) return "";
-  std::vector<std::string> headings = {"ball", "# x mm", "# y mm", "# z mm", "# sigma mm", "# views"};
-  if (result.nominal)
-    headings.insert(headings.end(), {"# dx mm", "# dy mm", "# dz mm", "# from nominal mm", ""});
-  report::HtmlTable table(headings);
-  for (const MeasuredBall& ball : result.balls) {
-    std::vector<std::string> cells = {report::escaped(ball.label),
-                                      report::fixed(ball.centre.x(), 3),
-                                      report::fixed(ball.centre.y(), 3),
-                                      report::fixed(ball.centre.z(), 3),
-                                      report::fixed(std::sqrt(ball.covariance_mm2.trace() / 3), 4),
-                                      std::to_string(ball.views)};
-    if (ball.from_nominal) {
-      const Vector3d& d = *ball.from_nominal;
-      const bool off = d.cwiseAbs().maxCoeff() > off_by * tolerance_of(result);
-      for (const double number : {d.x(), d.y(), d.z(), d.norm()}) cells.push_back(report::fixed(number, 3));
-      cells.push_back(off ? fmt::format("<span class=\"bad\">off by more than {:g} x {:g} mm</span>", off_by,
-                                        tolerance_of(result))
-                          : "");
-    }
-    table.row(std::move(cells));
-  }
-  return "<h2>Balls</h2>\n" + table.html();
+  return result.balls.empty() ? "" : "<h2>Balls</h2>\n" + html_of(balls_table(result));
 }
 
 /// The phantom seen along an axis, with the differences from nominal as arrows.
@@ -198,21 +225,32 @@ std::string nominal_section(const PhantomResult& result) {
   if (result.balls.empty() || !result.nominal) return "";
   const std::vector<Vector3d> centres = centres_of(result);
   const Vector3d mean = mean_of(centres);
-  report::HtmlTable table({"point", "# nominal file mm", "# measured file mm"});
   double extent = 0;
   for (const Vector3d& centre : centres) extent = std::max(extent, (centre - mean).norm());
-  for (const auto& [name, point] :
-       {std::pair{"middle of the balls", mean},
-        {"at the farthest ball's distance, along x", Vector3d(mean + Vector3d(extent, 0, 0))},
-        {"at the farthest ball's distance, along z", Vector3d(mean + Vector3d(0, 0, extent))}})
-    table.row({name, report::fixed(predicted_tre_mm(centres, nominal_rms(result), point), 3),
-               report::fixed(std::hypot(predicted_tre_mm(centres, measured_rms(result), point),
-                                        result.scale.relative_sigma * (point - mean).norm()),
-                             3)});
+  struct Place {
+    const char* name;
+    Vector3d point;
+  };
+  const auto with_nominal = [&](const Place& at) {
+    return report::Cell{report::fixed(predicted_tre_mm(centres, nominal_rms(result), at.point), 3)};
+  };
+  const auto with_measured = [&](const Place& at) {
+    return report::Cell{report::fixed(std::hypot(predicted_tre_mm(centres, measured_rms(result), at.point),
+                                                 result.scale.relative_sigma * (at.point - mean).norm()),
+                                      3)};
+  };
+  const report::Table table = report::table_of<Place>(
+      "Effect",
+      {{{"Point", "Position relative to the balls"}, [](const Place& at) { return report::Cell{at.name}; }},
+       {{"Nominal file, mm", "rms error with the nominal coordinates, mm", true}, with_nominal},
+       {{"Measured file, mm", "rms error with the measured coordinates, mm", true}, with_measured}},
+      {{"middle of the balls", mean},
+       {"at the farthest ball's distance, along x", mean + Vector3d(extent, 0, 0)},
+       {"at the farthest ball's distance, along z", mean + Vector3d(0, 0, extent)}});
   return "<h2>From nominal</h2>\n<div class=\"views\">" +
          arrows_figure(result, 0, 2, "along y: x to the right, z up") +
          arrows_figure(result, 0, 1, "along z: x to the right, y up") +
-         "</div>\n<h2>Effect of the balls' errors on a located point</h2>\n" + table.html() +
+         "</div>\n<h2>Effect of the balls' errors on a located point</h2>\n" + html_of(table) +
          "<p class=\"soft\">rms error caused by the errors of the coordinates alone, taken as independent "
          "(Fitzpatrick, West and Maurer 1998). Image noise adds to it.</p>\n";
 }

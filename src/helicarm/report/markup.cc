@@ -70,20 +70,4 @@ std::string fixed(std::optional<double> value, int digits) {
   return fmt::format("{:.{}f}", *value, digits);
 }
 
-std::string HtmlTable::html() const {
-  const auto is_number = [&](std::size_t column) { return headings_[column].starts_with('#'); };
-  std::string html = "<div class=\"scroll\"><table><thead><tr>";
-  for (std::size_t i = 0; i < headings_.size(); ++i)
-    html += is_number(i) ? "<th class=\"n\">" + headings_[i].substr(1) + "</th>"
-                         : "<th>" + headings_[i] + "</th>";
-  html += "</tr></thead>\n<tbody>\n";
-  for (const auto& row : rows_) {
-    html += "<tr>";
-    for (std::size_t i = 0; i < row.size(); ++i)
-      html += (is_number(i) ? "<td class=\"n\">" : "<td>") + row[i] + "</td>";
-    html += "</tr>\n";
-  }
-  return html + "</tbody></table></div>\n";
-}
-
 }  // namespace helicarm::report

@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace helicarm::report {
 
@@ -20,18 +19,5 @@ std::string page_html(std::string_view title, std::string_view heading, std::str
 
 /// `digits` decimals, or an en dash without a value.
 std::string fixed(std::optional<double> value, int digits);
-
-/// An HTML table. Cells are HTML; a heading that begins with '#' marks a numeric column.
-class HtmlTable {
- public:
-  explicit HtmlTable(std::vector<std::string> headings) : headings_(std::move(headings)) {}
-  void row(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
-  bool empty() const { return rows_.empty(); }
-  std::string html() const;
-
- private:
-  std::vector<std::string> headings_;
-  std::vector<std::vector<std::string>> rows_;
-};
 
 }  // namespace helicarm::report

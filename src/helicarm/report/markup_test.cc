@@ -30,13 +30,5 @@ TEST(Fixed, MissingValueIsADash) {
   EXPECT_EQ(fixed(std::numeric_limits<double>::quiet_NaN(), 2), "–");
 }
 
-TEST(HtmlTable, NumericColumnsAreMarked) {
-  HtmlTable table({"Ball", "#u"});
-  table.row({"P1", "1.5"});
-  const std::string html = table.html();
-  EXPECT_NE(html.find("<th>Ball</th><th class=\"n\">u</th>"), std::string::npos);
-  EXPECT_NE(html.find("<td>P1</td><td class=\"n\">1.5</td>"), std::string::npos);
-}
-
 }  // namespace
 }  // namespace helicarm::report

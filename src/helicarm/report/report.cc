@@ -13,8 +13,7 @@ namespace helicarm::report {
 std::string report_html(const pipeline::Result& result) {
   std::string body;
   for (const auto section :
-       {summary_section, warnings_section, views_section, accuracy_section, points_section, guidance_section,
-        fiducials_section, rectification_section, notes_section, timing_section})
+       {summary_section, warnings_section, views_section, tables_section, distortion_section, notes_section})
     body += section(result);
   return page_html(
       "helicarm report", "helicarm", body,

@@ -10,12 +10,8 @@ namespace helicarm::report {
 // Each returns one part of the report as HTML, empty without data.
 std::string summary_section(const pipeline::Result& result);
 std::string views_section(const pipeline::Result& result);
-std::string points_section(const pipeline::Result& result);
-std::string accuracy_section(const pipeline::Result& result);
-std::string guidance_section(const pipeline::Result& result);
-std::string fiducials_section(const pipeline::Result& result);
-std::string rectification_section(const pipeline::Result& result);
-std::string timing_section(const pipeline::Result& result);
+std::string tables_section(const pipeline::Result& result);
+std::string distortion_section(const pipeline::Result& result);
 std::string notes_section(const pipeline::Result& result);
 std::string warnings_section(const pipeline::Result& result);
 

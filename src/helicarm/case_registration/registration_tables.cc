@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/registration_tables.h"
+
+#include <fmt/format.h>
+
+#include "helicarm/report/markup.h"
+
+namespace helicarm::case_registration {
+namespace {
+
+using registration::RegisteredView;
+
+std::string three(const Eigen::Vector3d& values, int digits) {
+  return fmt::format("{0:.{3}f}, {1:.{3}f}, {2:.{3}f}", values.x(), values.y(), values.z(), digits);
+}
+
+struct NamedPoint {
+  const RegisteredModel* model;
+  const RegisteredPoint* point;
+};
+
+report::ColumnOf<NamedPoint> coordinate(const char* title, Eigen::Index i) {
+  return {{title, "Position in the calibrator's frame, mm", true}, [i](const NamedPoint& row) {
+            return report::Cell{report::fixed(row.point->place.in_calibrator[i], 2)};
+          }};
+}
+
+}  // namespace
+
+report::Table models_table(const std::vector<RegisteredModel>& models) {
+  using Model = RegisteredModel;
+  const auto sigma = [](const Model& m) -> Eigen::Matrix<double, 6, 1> {
+    return m.registration.covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  };
+  const auto agreement = [](const Model& m) {
+    std::string scores;
+    for (const RegisteredView& view : m.registration.views)
+      scores += (scores.empty() ? "" : ", ") + report::fixed(view.score, 3);
+    return report::Cell{scores};
+  };
+  const auto starts = [](const Model& m) {
+    return m.by_landmarks_only
+               ? report::Cell{}
+               : report::Cell{fmt::format("{} of {}", m.registration.agree, m.registration.starts)};
+  };
+  return report::table_of<Model>(
+      "Models",
+      {{{"Model", "Name of the model in case.json"},
+        [](const Model& m) { return report::Cell{m.registration.name}; }},
+       {{"Decision", "accept, warn or refuse"},
+        [](const Model& m) {
+          return report::Cell{std::string(registration::word(m.registration.decision)),
+                              m.registration.failure.has_value()};
+        }},
+       {{"Agreement", "With each view's image, at most 1"}, agreement},
+       {{"Centre x, y, z, mm", "Position of the model's centre in the calibrator's frame, mm"},
+        [](const Model& m) { return report::Cell{three(m.registration.centre, 2)}; }},
+       {{"Centre σ, mm", "Standard deviation of the centre along the calibrator's x, y, z, mm"},
+        [sigma](const Model& m) { return report::Cell{three(sigma(m).tail<3>(), 3)}; }},
+       {{"Rotation σ, °", "Standard deviation of the rotation about the calibrator's x, y, z, degrees"},
+        [sigma](const Model& m) { return report::Cell{three(sigma(m).head<3>() * 180 / EIGEN_PI, 3)}; }},
+       {{"Starts", "Starting poses that led to this result, of all"}, starts}},
+      models);
+}
+
+report::Table views_table(const registration::Registration& of) {
+  return report::table_of<RegisteredView>(
+      "Views",
+      {{{"View", "Name of the X-ray view"}, [](const RegisteredView& v) { return report::Cell{v.name}; }},
+       {{"Agreement", "Correlation of the image's patches with the model's, 1 at best", true},
+        [](const RegisteredView& v) { return report::Cell{report::fixed(v.score, 3)}; }},
+       {{"Residual, px", "Shift that a patch of the image would still make, root mean square, px", true},
+        [](const RegisteredView& v) { return report::Cell{report::fixed(v.residual_px, 2)}; }},
+       {{"Other views, mm", "Distance between this view's pose and the others', along what both can see, mm",
+         true},
+        [](const RegisteredView& v) { return report::Cell{report::fixed(v.held_out_mm, 2)}; }},
+       {{"Comparisons", "Patches or contour points compared", true},
+        [](const RegisteredView& v) { return report::Cell{std::to_string(v.comparisons)}; }}},
+      of.views);
+}
+
+report::Table points_table(const std::vector<RegisteredModel>& models) {
+  std::vector<NamedPoint> rows;
+  for (const RegisteredModel& model : models)
+    for (const RegisteredPoint& point : model.points) rows.push_back({&model, &point});
+  return report::table_of<NamedPoint>(
+      "Planned points",
+      {{{"Planned point", "Name of the point in the model's plan"},
+        [](const NamedPoint& row) { return report::Cell{row.point->name}; }},
+       {{"Model", "Name of the model in case.json"},
+        [](const NamedPoint& row) { return report::Cell{row.model->registration.name}; }},
+       {{"±95 %, mm", "Predicted error (TRE): length that 95 % of the errors do not exceed, mm", true},
+        [](const NamedPoint& row) {
+          return report::Cell{
+              report::fixed(localization::length_at_95(row.point->place.covariance_in_calibrator), 2)};
+        }},
+       coordinate("x, mm", 0),
+       coordinate("y, mm", 1),
+       coordinate("z, mm", 2)},
+      rows);
+}
+
+}  // namespace helicarm::case_registration
