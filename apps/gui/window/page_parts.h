@@ -19,7 +19,7 @@ inline void fill(QTableWidget* table, const report::Table& content) {
       auto* item = table->item(row, column);
       if (item == nullptr) table->setItem(row, column, item = new QTableWidgetItem);
       item->setText(text(cell.text));
-      item->setForeground(cell.is_bad ? QBrush(Qt::red) : QBrush());
+      item->setForeground(cell.is_bad ? QBrush(QColor("#e05252")) : QBrush());
       const auto side = content.columns[std::size_t(column)].is_number ? Qt::AlignRight : Qt::AlignLeft;
       item->setTextAlignment(side | Qt::AlignVCenter);
     }

@@ -118,17 +118,18 @@ RigidCovariance camera_part(const Observation& observation, const std::vector<Re
 }
 
 RigidCovariance edge_part(const Observation& observation, const std::vector<RegistrationView>& views,
-                          const Vector3d& centre, double radius_mm, double sigma_mm, const Part& part) {
+                          const Vector3d& centre, double radius_mm, const EdgeSigma& sigma,
+                          const Part& part) {
   RigidCovariance sum = RigidCovariance::Zero();
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!takes_part(part.views, i)) continue;
     const geometry::View& view = views[i].view;
-    const double sigma_px = sigma_mm * std::abs(view.intrinsics.fy) / view.depth(centre);
+    const double sigma_px = sigma.shift_mm * std::abs(view.intrinsics.fy) / view.depth(centre);
     const MatrixXd by_shift = response(observation, i, image_shifts(view, centre), part);
     sum += sigma_px * sigma_px * by_shift * by_shift.transpose();
     // All edges further out: the model is taken for nearer than it is.
     const MatrixXd by_size = response(observation, i, growth(), part) / radius_mm;
-    sum += sigma_mm * sigma_mm * by_size * by_size.transpose();
+    sum += sigma.outward_mm * sigma.outward_mm * by_size * by_size.transpose();
   }
   return sum;
 }

@@ -36,10 +36,15 @@ RigidCovariance camera_part(const Observation& observation, const std::vector<Re
                             const Eigen::Vector3d& centre, const Eigen::MatrixXd& camera_covariance,
                             const Part& part = {});
 
-/// Covariance of the pose that errors common to a view's edges cause: `sigma_mm` at the model in a shift
-/// along each axis, and outward at `radius_mm` from the centre.
+/// Standard deviations of an error common to the edges of a view, mm at the model.
+struct EdgeSigma {
+  double shift_mm;    ///< along each axis of the image
+  double outward_mm;  ///< of a growth about the centre, at the model's radius
+};
+
+/// Covariance of the pose that such errors cause. `radius_mm`: of the model.
 RigidCovariance edge_part(const Observation& observation, const std::vector<RegistrationView>& views,
-                          const Eigen::Vector3d& centre, double radius_mm, double sigma_mm,
+                          const Eigen::Vector3d& centre, double radius_mm, const EdgeSigma& sigma,
                           const Part& part = {});
 
 /// Local shifts (full-resolution pixels) that the comparisons of a view still ask for, each along its own

@@ -21,8 +21,9 @@ using geometry::RigidTransform;
 
 constexpr double same_mm = 1.5;        // between solutions that count as one, before the last level
 constexpr double correlation_mm = 12;  // of residuals along a bone's edge
-constexpr double edge_sigma =
-    0.1;  // of the finest spacing: bias of a CT's edges in a view, shifted or outward
+// Bias of a CT's edges in a view, of the finest spacing.
+constexpr double edge_shift_sigma = 0.1;
+constexpr double edge_growth_sigma = 0.05;
 constexpr double alone_prior_mm = 10;  // keeps a single view from running along its rays
 
 /// Levels from coarse to fine for this model and these views.
@@ -116,12 +117,12 @@ struct ErrorModel {
   const Scene& scene;
   MatrixXd cameras;
   std::vector<double> correlation_px;
-  double edge_mm;
+  EdgeSigma edge;
 
   RigidCovariance covariance(const Observation& observation, const Vector3d& centre, const Part& part) const {
     Linearised sum = linearised(observation, part.views, affine_from_rigid(), part.prior, correlation_px);
     return sum.covariance() + camera_part(observation, scene.views(), centre, cameras, part) +
-           edge_part(observation, scene.views(), centre, scene.model().radius_mm, edge_mm, part);
+           edge_part(observation, scene.views(), centre, scene.model().radius_mm, edge, part);
   }
 };
 
@@ -224,12 +225,14 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
                         (1 - found.runner_up->score) / (1 - found.runner_up_best)};
   describe(scene, best, result);
   step("errors");
-  const ErrorModel errors{scene, camera_covariance_of(views, options),
+  const double finest_mm = std::max(result.spacing_mm, model.resolution_mm);
+  const ErrorModel errors{scene,
+                          camera_covariance_of(views, options),
                           correlations_px(views, model, result.centre),
-                          edge_sigma * std::max(result.spacing_mm, model.resolution_mm)};
+                          {edge_shift_sigma * finest_mm, edge_growth_sigma * finest_mm}};
   result.covariance = errors.covariance(best.observation, result.centre, {});
   result.deformation =
-      deformation_of(best.observation, errors.correlation_px, errors.edge_mm / model.radius_mm);
+      deformation_of(best.observation, errors.correlation_px, errors.edge.shift_mm / model.radius_mm);
   compare_views(errors, stages.back().level, best, result);
   if (result.disagreement) result.covariance *= result.disagreement->ratio();
   if (options.search.candidates > 0) {
