@@ -77,6 +77,8 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
   next_->setProperty("class", "attention");
   layout()->addWidget(next_);
   ends_ = add_table(ends_table({}, {}), "endTable");
+  for (const auto& [error, shown_at] : {std::pair(3, 1), {4, 2}})  // visible in a narrow window
+    ends_->horizontalHeader()->moveSection(error, shown_at);
   connect(ends_, &QTableWidget::itemSelectionChanged, this, [this] {
     const int row = ends_->currentRow();
     chosen_.reset();
