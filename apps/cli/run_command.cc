@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_command.h"
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 

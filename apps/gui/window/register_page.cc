@@ -9,7 +9,6 @@
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "helicarm/case_registration/registration_tables.h"
-#include "helicarm/localization/error_bound.h"
 
 namespace helicarm::gui {
 namespace {

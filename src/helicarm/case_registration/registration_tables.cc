@@ -10,10 +10,6 @@ namespace {
 
 using registration::RegisteredView;
 
-std::string three(const Eigen::Vector3d& values, int digits) {
-  return fmt::format("{0:.{3}f}, {1:.{3}f}, {2:.{3}f}", values.x(), values.y(), values.z(), digits);
-}
-
 struct NamedPoint {
   const RegisteredModel* model;
   const RegisteredPoint* point;
@@ -29,8 +25,21 @@ report::ColumnOf<NamedPoint> coordinate(const char* title, Eigen::Index i) {
 
 report::Table models_table(const std::vector<RegisteredModel>& models) {
   using Model = RegisteredModel;
-  const auto sigma = [](const Model& m) -> Eigen::Matrix<double, 6, 1> {
-    return m.registration.covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  // A model refused before its pose was estimated has no covariance.
+  const auto pose = [](auto value, int digits) {
+    return [value, digits](const Model& m) {
+      if (m.registration.covariance.isZero(0)) return report::Cell{};
+      return report::Cell{report::coordinates(Eigen::Vector3d(value(m.registration)), digits)};
+    };
+  };
+  using registration::Registration;
+  const auto centre = [](const Registration& r) { return r.centre; };
+  const auto sigma = [](const Registration& r) -> Eigen::Matrix<double, 6, 1> {
+    return r.covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  };
+  const auto centre_sigma = [sigma](const Registration& r) -> Eigen::Vector3d { return sigma(r).tail<3>(); };
+  const auto rotation_sigma = [sigma](const Registration& r) -> Eigen::Vector3d {
+    return sigma(r).head<3>() * 180 / EIGEN_PI;
   };
   const auto agreement = [](const Model& m) {
     std::string scores;
@@ -54,11 +63,11 @@ report::Table models_table(const std::vector<RegisteredModel>& models) {
         }},
        {{"Agreement", "With each view's image, at most 1"}, agreement},
        {{"Centre x, y, z, mm", "Position of the model's centre in the calibrator's frame, mm"},
-        [](const Model& m) { return report::Cell{three(m.registration.centre, 2)}; }},
+        pose(centre, 2)},
        {{"Centre σ, mm", "Standard deviation of the centre along the calibrator's x, y, z, mm"},
-        [sigma](const Model& m) { return report::Cell{three(sigma(m).tail<3>(), 3)}; }},
+        pose(centre_sigma, 3)},
        {{"Rotation σ, °", "Standard deviation of the rotation about the calibrator's x, y, z, degrees"},
-        [sigma](const Model& m) { return report::Cell{three(sigma(m).head<3>() * 180 / EIGEN_PI, 3)}; }},
+        pose(rotation_sigma, 3)},
        {{"Starts", "Starting poses that led to this result, of all"}, starts}},
       models);
 }

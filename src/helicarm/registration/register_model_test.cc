@@ -103,7 +103,7 @@ TEST(Covariance, MatchesTheScatterOfNoise) {
     const RigidStep error = step_about(estimate.pose, true_pose(), centre);
     const RigidCovariance covariance =
         RigidCovariance(sum.covariance()) +
-        edge_part(estimate.observation, views, centre, scene.model().radius_mm, {0.1, 0.1});
+        edge_part(estimate.observation, views, centre, scene.model().radius_mm, {0.1, 0.05});
     mean += error.dot(covariance.inverse() * error) / trials;
   }
   EXPECT_GT(mean, 1);

@@ -70,4 +70,10 @@ std::string fixed(std::optional<double> value, int digits) {
   return fmt::format("{:.{}f}", *value, digits);
 }
 
+std::string coordinates(const std::optional<Eigen::Vector3d>& values, int digits) {
+  if (!values) return "–";
+  return fmt::format("{}, {}, {}", fixed(values->x(), digits), fixed(values->y(), digits),
+                     fixed(values->z(), digits));
+}
+
 }  // namespace helicarm::report

@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include <Eigen/Core>
+
 namespace helicarm::report {
 
 /// Escapes markup for HTML and SVG content and attributes, and replaces control characters.
@@ -19,5 +21,8 @@ std::string page_html(std::string_view title, std::string_view heading, std::str
 
 /// `digits` decimals, or an en dash without a value.
 std::string fixed(std::optional<double> value, int digits);
+
+/// "x, y, z", each as `fixed`; an en dash without a value.
+std::string coordinates(const std::optional<Eigen::Vector3d>& values, int digits);
 
 }  // namespace helicarm::report

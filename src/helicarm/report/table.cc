@@ -76,14 +76,14 @@ std::string text_of(const Table& table) {
     auto& line = lines.emplace_back();
     for (const Cell& cell : row) line.push_back(words_of(cell));
   }
+  std::vector<std::size_t> widths(table.columns.size(), 0);
+  for (const auto& line : lines)
+    for (std::size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], width_of(line[i]));
   std::string text;
   for (const auto& line : lines) {
     std::string written;
-    for (std::size_t i = 0; i < line.size(); ++i) {
-      std::size_t width = 0;
-      for (const auto& each : lines) width = std::max(width, width_of(each[i]));
-      written += "  " + padded(line[i], width, table.columns[i].is_number);
-    }
+    for (std::size_t i = 0; i < line.size(); ++i)
+      written += "  " + padded(line[i], widths[i], table.columns[i].is_number);
     text += written.substr(0, written.find_last_not_of(' ') + 1) + '\n';
   }
   return text;

@@ -20,11 +20,6 @@ Column number(std::string title, std::string definition) {
   return {std::move(title), std::move(definition), true};
 }
 
-std::string coordinates(const std::optional<Eigen::Vector3d>& point, int digits) {
-  return point ? fmt::format("{0:.{3}f}, {1:.{3}f}, {2:.{3}f}", point->x(), point->y(), point->z(), digits)
-               : "–";
-}
-
 double error_95_of(const pipeline::PointResult& point) {
   return point.place ? localization::length_at_95(point.place->covariance_in_calibrator) : 0;
 }

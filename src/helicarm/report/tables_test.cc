@@ -68,11 +68,16 @@ TEST(VerificationTable, TrackerAndImagesMayEachBeMissing) {
   EXPECT_EQ(cell(table, 1, "Eq. 17, mm"), "2.00");
 }
 
-TEST(CalibrationTable, RefusedViewHasItsFiducialsOnly) {
+pipeline::ViewResult view_with(std::size_t fiducials) {
   pipeline::ViewResult view;
   view.name = "AP";
   view.found = fiducials::LabelledFiducials{};
-  view.found->fiducials.resize(12);
+  view.found->fiducials.resize(fiducials);
+  return view;
+}
+
+TEST(CalibrationTable, RefusedViewHasItsFiducialsOnly) {
+  pipeline::ViewResult view = view_with(12);
   view.found->fiducials[3].status = fiducials::FiducialStatus::used;
   const Table table = calibration_table({view});
   EXPECT_EQ(cell(table, 0, "Fiducials"), "1 of 12");
@@ -80,10 +85,7 @@ TEST(CalibrationTable, RefusedViewHasItsFiducialsOnly) {
 }
 
 TEST(FiducialsTable, OneThatIsNotSeenHasNoPosition) {
-  pipeline::ViewResult view;
-  view.name = "AP";
-  view.found = fiducials::LabelledFiducials{};
-  view.found->fiducials.resize(2);
+  pipeline::ViewResult view = view_with(2);
   view.found->fiducials[0].status = fiducials::FiducialStatus::occluded;
   view.found->fiducials[1].status = fiducials::FiducialStatus::used;
   view.found->fiducials[1].uv = {3, 4};
