@@ -44,8 +44,10 @@ Box patches_of(const Raster& raster, const geometry::View& view, const Density& 
   return {first(low.x(), width), first(low.y(), height), end(high.x(), width), end(high.y(), height)};
 }
 
-/// Differences between neighbours along u, then along v, each without their mean.
-Eigen::VectorXf differences(const Eigen::Ref<const Eigen::VectorXf>& pixels, int side) {
+/// Differences between neighbours along u, then along v, each without their mean over what is `shown` (1 or 0
+/// per difference; empty: all), and zero elsewhere.
+Eigen::VectorXf differences(const Eigen::Ref<const Eigen::VectorXf>& pixels, const Eigen::VectorXf& shown,
+                            int side) {
   const int half = side * (side - 1);
   Eigen::VectorXf rows(2 * half);
   int row = 0;
@@ -53,21 +55,31 @@ Eigen::VectorXf differences(const Eigen::Ref<const Eigen::VectorXf>& pixels, int
     for (int u = 0; u + 1 < side; ++u) rows[row++] = pixels[v * side + u + 1] - pixels[v * side + u];
   for (int v = 0; v + 1 < side; ++v)
     for (int u = 0; u < side; ++u) rows[row++] = pixels[(v + 1) * side + u] - pixels[v * side + u];
-  rows.head(half).array() -= rows.head(half).mean();
-  rows.tail(half).array() -= rows.tail(half).mean();
+  for (const int first : {0, half}) {
+    auto along = rows.segment(first, half);
+    if (shown.size() == 0) {
+      along.array() -= along.mean();
+      continue;
+    }
+    const auto use = shown.segment(first, half);
+    along.array() *= use.array();
+    along -= use * (along.sum() / std::max(1.0F, use.sum()));
+  }
   return rows;
 }
 
 struct Patch {
-  int u, v;             ///< first pixel
-  Eigen::VectorXf drr;  ///< differences
-  Eigen::VectorXf seen;
-  float contrast = 0;  ///< norm of `drr`
-  bool shown = true;   ///< wholly in the usable part of the image
+  int u, v;                    ///< first pixel
+  Eigen::VectorXf shown = {};  ///< 1 or 0 per difference; empty: all are in the usable part of the image
+  Eigen::VectorXf drr = {};    ///< differences
+  Eigen::VectorXf seen = {};
+  float contrast = 0;  ///< norm of all the DRR's differences
+  float share = 1;     ///< of its square, that is shown
 };
 
 /// What the image does not show counts as half a disagreement: to hide parts must not raise the score.
 constexpr float hidden_weight = 0.5F;
+constexpr float least_share = 0.25F;  // of a patch that takes part
 
 class Comparer {
  public:
@@ -80,12 +92,8 @@ class Comparer {
         options_(options) {}
 
   Patch rendered(int u, int v) const {
-    Patch patch{u, v, {}, {}, 0, true};
+    Patch patch{u, v};
     const int side = options_.side;
-    for (int j = 0; j < side; ++j)
-      for (int i = 0; i < side; ++i)
-        patch.shown =
-            patch.shown && raster_.attenuation.contains(u + i, v + j) && raster_.valid(u + i, v + j);
     if (is_empty(u, v)) return patch;
     Eigen::VectorXf pixels(side * side);
     std::array<Vector3d, 8> directions;
@@ -97,8 +105,14 @@ class Comparer {
         posed_.integrate_eight(directions, values);
         for (int k = 0; k < std::min(8, side - i); ++k) pixels[j * side + i + k] = values[std::size_t(k)];
       }
-    patch.drr = differences(pixels, side);
+    patch.drr = differences(pixels, {}, side);
     patch.contrast = patch.drr.norm();
+    patch.shown = shown(u, v);
+    if (patch.shown.size() > 0 && patch.contrast > 0) {
+      patch.drr = differences(pixels, patch.shown, side);
+      patch.share = patch.drr.squaredNorm() / (patch.contrast * patch.contrast);
+      if (patch.share < least_share) patch.share = 0;
+    }
     return patch;
   }
 
@@ -106,15 +120,17 @@ class Comparer {
     const int side = options_.side;
     Eigen::VectorXf pixels(side * side);
     for (int j = 0; j < side; ++j)
-      for (int i = 0; i < side; ++i) pixels[j * side + i] = raster_.attenuation(patch.u + i, patch.v + j);
-    return differences(pixels, side);
+      for (int i = 0; i < side; ++i)
+        pixels[j * side + i] =
+            usable(patch.u + i, patch.v + j) ? raster_.attenuation(patch.u + i, patch.v + j) : 0;
+    return differences(pixels, patch.shown, side);
   }
 
   Comparison compare(const Patch& patch, float noise, bool derivatives, double& residual) const {
     Comparison comparison;
     const int side = options_.side;
     comparison.pixel = raster_.pixel_at(Vector2d(patch.u, patch.v) + Vector2d::Constant(0.5 * (side - 1)));
-    comparison.weight = patch.contrast;
+    comparison.weight = patch.contrast * patch.share;
     const float seen2 = patch.seen.squaredNorm() + noise, drr2 = patch.drr.squaredNorm();
     const float both = patch.seen.dot(patch.drr);
     comparison.agreement = both / std::sqrt(seen2 * drr2);
@@ -129,7 +145,8 @@ class Comparer {
         pixels.row(j * side + i) =
             posed_.differentiate(direction(patch.u + i, patch.v + j)).by_motion.transpose();
     Eigen::Matrix<float, Eigen::Dynamic, affine_parameters> jacobian(patch.drr.size(), affine_parameters);
-    for (int k = 0; k < affine_parameters; ++k) jacobian.col(k) = differences(pixels.col(k), side);
+    for (int k = 0; k < affine_parameters; ++k)
+      jacobian.col(k) = differences(pixels.col(k), patch.shown, side);
     jacobian -= patch.drr * (patch.drr.transpose() * jacobian / drr2).eval();
     jacobian *= gain;
     const Eigen::VectorXf difference = patch.seen - gain * patch.drr;
@@ -142,6 +159,24 @@ class Comparer {
   }
 
  private:
+  bool usable(int u, int v) const { return raster_.attenuation.contains(u, v) && raster_.valid(u, v); }
+
+  /// As `Patch::shown`.
+  Eigen::VectorXf shown(int u, int v) const {
+    const int side = options_.side;
+    Eigen::VectorXf pixels(side * side);
+    for (int j = 0; j < side; ++j)
+      for (int i = 0; i < side; ++i) pixels[j * side + i] = usable(u + i, v + j) ? 1.0F : 0.0F;
+    if (pixels.minCoeff() > 0) return {};
+    Eigen::VectorXf both(2 * side * (side - 1));
+    int row = 0;
+    for (int j = 0; j < side; ++j)
+      for (int i = 0; i + 1 < side; ++i) both[row++] = pixels[j * side + i] * pixels[j * side + i + 1];
+    for (int j = 0; j + 1 < side; ++j)
+      for (int i = 0; i < side; ++i) both[row++] = pixels[j * side + i] * pixels[(j + 1) * side + i];
+    return both;
+  }
+
   /// Whether nine rays spread over the patch miss the model.
   bool is_empty(int u, int v) const {
     const int last = options_.side - 1;
@@ -190,7 +225,7 @@ ViewObservation compare_patches(const Raster& raster, const geometry::View& view
   std::vector<Patch> patches;
   for (int v = box.v0; v < box.v1; ++v)
     for (int u = box.u0; u < box.u1; ++u)
-      if (!cut.contains({u, v})) patches.push_back({u * side, v * side, {}, {}, 0, true});
+      if (!cut.contains({u, v})) patches.push_back({u * side, v * side});
   const Comparer comparer(raster, view, density, world_from_model, centre, options);
   parallel_for(patches.size(), threads,
                [&](std::size_t i) { patches[i] = comparer.rendered(patches[i].u, patches[i].v); });
@@ -203,9 +238,10 @@ ViewObservation compare_patches(const Raster& raster, const geometry::View& view
   std::ranges::nth_element(contrasts, strong);
   const auto limit = static_cast<float>(options.least_contrast) * *strong;
   double total = 0;
-  for (const Patch& patch : patches) total += patch.shown ? patch.contrast : hidden_weight * patch.contrast;
+  for (const Patch& patch : patches)
+    total += patch.contrast * (patch.share + hidden_weight * (1 - patch.share));
   std::erase_if(patches, [&](const Patch& patch) {
-    return !patch.shown || patch.contrast < limit || patch.contrast == 0;
+    return patch.share == 0 || patch.contrast < limit || patch.contrast == 0;
   });
   float noise = 0;
   for (Patch& patch : patches) {

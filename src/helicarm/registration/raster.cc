@@ -83,18 +83,18 @@ Raster coarser(const Raster& full, int factor) {
   if (factor == 1) return full;
   const int width = full.attenuation.width() / factor, height = full.attenuation.height() / factor;
   Raster coarse{factor, Image<float>(width, height), Image<std::uint8_t>(width, height, 1)};
-  const float share = 1.0F / static_cast<float>(factor * factor);
   for (int v = 0; v < height; ++v)
     for (int u = 0; u < width; ++u) {
       float sum = 0;
-      bool valid = true;
+      int valid = 0;
       for (int j = 0; j < factor; ++j)
         for (int i = 0; i < factor; ++i) {
+          if (!full.valid(u * factor + i, v * factor + j)) continue;
           sum += full.attenuation(u * factor + i, v * factor + j);
-          valid = valid && full.valid(u * factor + i, v * factor + j);
+          ++valid;
         }
-      coarse.attenuation(u, v) = sum * share;
-      coarse.valid(u, v) = valid;
+      coarse.attenuation(u, v) = sum / static_cast<float>(std::max(1, valid));
+      coarse.valid(u, v) = 2 * valid > factor * factor;
     }
   return coarse;
 }

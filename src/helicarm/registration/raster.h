@@ -46,7 +46,7 @@ struct Raster {
 /// field with a margin.
 Raster attenuation_raster(const RegistrationView& view);
 
-/// Means over blocks; a block is valid if all its pixels are.
+/// Means over the valid pixels of blocks; a block is valid if more than half of its pixels are.
 Raster coarser(const Raster& full, int factor);
 
 }  // namespace helicarm::registration

@@ -17,7 +17,7 @@ struct SearchStage {
 struct SearchOptions {
   double shift_mm = 15;  ///< per axis, about each start
   double turn_deg = 15;
-  int candidates = 8000;  ///< scored at the first level; 0: the starts alone are refined
+  int candidates = 600;  ///< scored at the first level; 0: the starts alone are refined
 };
 
 struct SearchResult {
