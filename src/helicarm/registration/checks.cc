@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/registration/covariance.h"
 
 namespace helicarm::registration {
@@ -31,6 +31,10 @@ constexpr double refused_ratio = 9;  // three standard deviations
 constexpr double refused_ratio_exact = 50;  // cameras of unknown error
 constexpr double usual_error_mm = 2;
 
+RigidCovariance inverse_of(const RigidCovariance& matrix) {
+  return geometry::solve_spd(matrix, RigidCovariance::Identity()).solution;
+}
+
 }  // namespace
 
 Disagreement disagreement_of(const std::vector<RegistrationView>& views, const Vector3d& centre,
@@ -41,16 +45,17 @@ Disagreement disagreement_of(const std::vector<RegistrationView>& views, const V
   RigidStep weighted = RigidStep::Zero();
   std::vector<RigidCovariance> weights;
   for (const OwnSolution& each : own) {
-    weights.push_back(each.covariance.inverse());
+    weights.push_back(inverse_of(each.covariance));
     total += weights.back();
     weighted += weights.back() * each.step;
   }
-  const RigidStep mean = total.ldlt().solve(weighted);
+  const RigidStep mean = geometry::solve_spd(total, weighted).solution;
   for (std::size_t i = 0; i < own.size(); ++i) {
     const RigidStep apart = own[i].step - mean;
     result.chi2 += apart.dot(weights[i] * apart);
     const RigidCovariance others = total - weights[i];
-    const RigidStep from_others = own[i].step - others.ldlt().solve(weighted - weights[i] * own[i].step);
+    const RigidStep from_others =
+        own[i].step - geometry::solve_spd(others, weighted - weights[i] * own[i].step).solution;
     // The other view whose rays cross this one's most steeply.
     Vector3d axis = Vector3d::Zero();
     const auto ray = [&](std::size_t k) { return (centre - views[k].view.source_in_world()).normalized(); };
@@ -61,7 +66,7 @@ Disagreement disagreement_of(const std::vector<RegistrationView>& views, const V
     result.held_out_mm.push_back(distance);
     if (distance >= result.distance_mm) {
       result.distance_mm = distance;
-      const RigidCovariance both = own[i].covariance + RigidCovariance(others.inverse());
+      const RigidCovariance both = own[i].covariance + inverse_of(others);
       result.sigma_mm = std::sqrt(axis.dot(both.bottomRightCorner<3, 3>() * axis));
     }
   }
@@ -74,11 +79,11 @@ Deformation deformation_of(const Observation& observation, const std::vector<dou
   map << affine_from_rigid(), affine_from_strain(Eigen::Matrix3d::Identity());
   const Linearised plain =
       linearised(observation, {}, affine_from_rigid(), MatrixXd::Zero(6, 6), correlation_px);
-  const double unit = plain.information.ldlt().solve(plain.meat).trace() / 6;
+  const double unit = geometry::solve_spd(plain.information, plain.meat).solution.trace() / 6;
   MatrixXd prior = MatrixXd::Zero(12, 12);
   prior.bottomRightCorner<6, 6>().diagonal().setConstant(unit / (strain_prior * strain_prior));
   const Linearised both = linearised(observation, {}, map, prior, correlation_px);
-  const Eigen::VectorXd step = both.information.ldlt().solve(both.gradient);
+  const Eigen::VectorXd step = geometry::solve_spd(both.information, both.gradient).solution;
   Eigen::Matrix3d strain;
   const auto e = step.tail<6>();
   strain << e[0], e[3] / 2, e[4] / 2, e[3] / 2, e[1], e[5] / 2, e[4] / 2, e[5] / 2, e[2];

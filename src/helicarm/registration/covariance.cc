@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::registration {
 namespace {
@@ -63,15 +63,14 @@ MatrixXd response(const Observation& observation, std::size_t view, const Matrix
   MatrixXd both(affine_parameters, 6 + motions.cols());
   both << map, motions;
   const MatrixXd of_view = reduced(observation.views[view], both).information;
-  return information.ldlt().solve(of_view.topRightCorner(6, motions.cols()));
+  return geometry::solve_spd(information, of_view.topRightCorner(6, motions.cols())).solution;
 }
 
 }  // namespace
 
 MatrixXd Linearised::covariance() const {
-  const MatrixXd inverse =
-      information.ldlt().solve(MatrixXd::Identity(information.rows(), information.cols()));
-  return inverse * meat * inverse;
+  const MatrixXd half = geometry::solve_spd(information, meat).solution;
+  return geometry::solve_spd(information, half.transpose()).solution;
 }
 
 Linearised linearised(const Observation& observation, const std::vector<bool>& views, const MatrixXd& map,

@@ -120,79 +120,139 @@ float PosedDensity::integrate(const Vector3d& direction) const {
   return sum * static_cast<float>(path.mm_per_plane);
 }
 
-void PosedDensity::integrate_eight(const std::array<Vector3d, 8>& directions,
-                                   std::array<float, 8>& values) const {
-  constexpr std::size_t lanes = 8;
-  std::array<Path, lanes> paths;
-  alignas(32) float p0[lanes], q0[lanes], per_p[lanes], per_q[lanes], low[lanes], high[lanes],
-      sum[lanes] = {};
+/// Eight rays with one main axis; `low` > `high` where a ray misses the grid.
+struct PosedDensity::Bundle {
+  static constexpr std::size_t rays = 8;
+  std::array<Path, rays> paths;
   int k = -1, first = 1 << 30, last = -1;
-  bool together = true;
-  for (std::size_t i = 0; i < lanes; ++i) {
-    const bool crosses = clip(directions[i], paths[i]);
-    low[i] = crosses ? float(paths[i].first) : 1e9F;
-    high[i] = crosses ? float(paths[i].last) : -1e9F;
+  alignas(32) float p0[rays], q0[rays], per_p[rays], per_q[rays], low[rays], high[rays];
+};
+
+/// Over the planes of a path, numbered from `first`: values, slopes in the plane, slopes times the number.
+struct PosedDensity::Sums {
+  int first = 0;
+  float value = 0, by_p = 0, by_q = 0, by_p_plane = 0, by_q_plane = 0;
+};
+
+bool PosedDensity::bundle(const std::array<Vector3d, 8>& directions, Bundle& made) const {
+  for (std::size_t i = 0; i < Bundle::rays; ++i) {
+    Path& path = made.paths[i];
+    const bool crosses = clip(directions[i], path);
+    made.low[i] = crosses ? float(path.first) : 1e9F;
+    made.high[i] = crosses ? float(path.last) : -1e9F;
     if (!crosses) continue;
-    together = together && (k < 0 || k == paths[i].k);
-    k = paths[i].k;
-    first = std::min(first, paths[i].first);
-    last = std::max(last, paths[i].last);
+    if (made.k >= 0 && made.k != path.k) return false;
+    made.k = path.k;
+    made.first = std::min(made.first, path.first);
+    made.last = std::max(made.last, path.last);
   }
-  if (!together) {
-    for (std::size_t i = 0; i < lanes; ++i) values[i] = integrate(directions[i]);
-    return;
+  for (std::size_t i = 0; i < Bundle::rays; ++i) {
+    const Path& path = made.paths[i];
+    const bool crosses = made.low[i] <= made.high[i];
+    made.per_p[i] = crosses ? float(path.per_p) : 0;
+    made.per_q[i] = crosses ? float(path.per_q) : 0;
+    made.p0[i] = crosses ? float(path.at_p + path.per_p * made.first) : 0;
+    made.q0[i] = crosses ? float(path.at_q + path.per_q * made.first) : 0;
   }
-  values.fill(0);
-  if (k < 0) return;
-  for (std::size_t i = 0; i < lanes; ++i) {
-    const bool crosses = low[i] <= high[i];
-    per_p[i] = crosses ? float(paths[i].per_p) : 0;
-    per_q[i] = crosses ? float(paths[i].per_q) : 0;
-    p0[i] = crosses ? float(paths[i].at_p + paths[i].per_p * first) : 0;
-    q0[i] = crosses ? float(paths[i].at_q + paths[i].per_q * first) : 0;
-  }
-  const int strides[3] = {1, density_->size.x(), density_->size.x() * density_->size.y()};
-  const int p_axis = k == 0 ? 1 : 0, q_axis = 3 - k - p_axis;
+  return true;
+}
+
+namespace {
+
+/// Calls `take(ray, plane's number, v00, v10, v01, v11, fraction along p, along q, 1 within the grid or 0)`
+/// for eight rays at every plane.
+template <class Bundle, class Take>
+void for_bundle(const Density& density, const Bundle& bundle, const Take& take) {
+  const int strides[3] = {1, density.size.x(), density.size.x() * density.size.y()};
+  const int p_axis = bundle.k == 0 ? 1 : 0, q_axis = 3 - bundle.k - p_axis;
   const int step_p = strides[p_axis], step_q = strides[q_axis];
-  const int last_p = density_->size[p_axis] - 2, last_q = density_->size[q_axis] - 2;
-  for (int plane = first; plane <= last; ++plane) {
-    const float* slab = density_->values.data() + std::ptrdiff_t{plane} * strides[k];
-    const auto along = float(plane - first), at = float(plane);
+  const int last_p = density.size[p_axis] - 2, last_q = density.size[q_axis] - 2;
+  for (int plane = bundle.first; plane <= bundle.last; ++plane) {
+    const float* slab = density.values.data() + std::ptrdiff_t{plane} * strides[bundle.k];
+    const auto along = float(plane - bundle.first), at = float(plane);
 #pragma GCC ivdep
-    for (std::size_t i = 0; i < lanes; ++i) {
-      const float p = p0[i] + per_p[i] * along, q = q0[i] + per_q[i] * along;
+    for (std::size_t i = 0; i < Bundle::rays; ++i) {
+      const float p = bundle.p0[i] + bundle.per_p[i] * along, q = bundle.q0[i] + bundle.per_q[i] * along;
       const int whole_p = std::min(std::max(int(p), 0), last_p),
                 whole_q = std::min(std::max(int(q), 0), last_q);
       const int index = whole_p * step_p + whole_q * step_q;
-      const float u = p - float(whole_p), v = q - float(whole_q);
-      const float v00 = slab[index], v10 = slab[index + step_p];
-      const float v01 = slab[index + step_q], v11 = slab[index + step_p + step_q];
-      const float near = v00 + u * (v10 - v00);
-      const float value = near + v * (v01 + u * (v11 - v01) - near);
-      sum[i] += at >= low[i] && at <= high[i] ? value : 0.0F;
+      const float inside = at >= bundle.low[i] && at <= bundle.high[i] ? 1.0F : 0.0F;
+      take(i, along, slab[index], slab[index + step_p], slab[index + step_q], slab[index + step_p + step_q],
+           p - float(whole_p), q - float(whole_q), inside);
     }
   }
-  for (std::size_t i = 0; i < lanes; ++i)
-    if (low[i] <= high[i]) values[i] = sum[i] * float(paths[i].mm_per_plane);
+}
+
+}  // namespace
+
+void PosedDensity::integrate_eight(const std::array<Vector3d, 8>& directions,
+                                   std::array<float, 8>& values) const {
+  Bundle rays;
+  if (!bundle(directions, rays)) {
+    for (std::size_t i = 0; i < Bundle::rays; ++i) values[i] = integrate(directions[i]);
+    return;
+  }
+  values.fill(0);
+  if (rays.k < 0) return;
+  alignas(32) float sum[Bundle::rays] = {};
+  for_bundle(
+      *density_, rays,
+      [&](std::size_t i, float, float v00, float v10, float v01, float v11, float p, float q, float inside) {
+        const float low = v00 + p * (v10 - v00);
+        sum[i] += inside * (low + q * (v01 + p * (v11 - v01) - low));
+      });
+  for (std::size_t i = 0; i < Bundle::rays; ++i)
+    if (rays.low[i] <= rays.high[i]) values[i] = sum[i] * float(rays.paths[i].mm_per_plane);
 }
 
 RayIntegral PosedDensity::differentiate(const Vector3d& direction) const {
-  RayIntegral integral;
   Path path;
-  if (!clip(direction, path)) return integral;
-  float sum = 0, by_p = 0, by_q = 0, by_p_plane = 0, by_q_plane = 0;
+  if (!clip(direction, path)) return {};
+  Sums sums{path.first};
   for_planes(*density_, path, [&](int plane, float v00, float v10, float v01, float v11, float p, float q) {
     const float low = v00 + p * (v10 - v00);
-    const float high = v01 + p * (v11 - v01);
     const float slope_p = v10 - v00 + q * (v11 - v01 - v10 + v00);
-    const float slope_q = high - low;
+    const float slope_q = v01 + p * (v11 - v01) - low;
     const auto k = static_cast<float>(plane - path.first);
-    sum += low + q * slope_q;
-    by_p += slope_p;
-    by_q += slope_q;
-    by_p_plane += k * slope_p;
-    by_q_plane += k * slope_q;
+    sums.value += low + q * slope_q;
+    sums.by_p += slope_p;
+    sums.by_q += slope_q;
+    sums.by_p_plane += k * slope_p;
+    sums.by_q_plane += k * slope_q;
   });
+  return assembled(direction, path, sums);
+}
+
+void PosedDensity::differentiate_eight(const std::array<Vector3d, 8>& directions,
+                                       std::array<RayIntegral, 8>& integrals) const {
+  Bundle rays;
+  if (!bundle(directions, rays)) {
+    for (std::size_t i = 0; i < Bundle::rays; ++i) integrals[i] = differentiate(directions[i]);
+    return;
+  }
+  integrals.fill({});
+  if (rays.k < 0) return;
+  alignas(32) float value[Bundle::rays] = {}, by_p[Bundle::rays] = {}, by_q[Bundle::rays] = {},
+                    by_p_plane[Bundle::rays] = {}, by_q_plane[Bundle::rays] = {};
+  for_bundle(*density_, rays,
+             [&](std::size_t i, float k, float v00, float v10, float v01, float v11, float p, float q,
+                 float inside) {
+               const float low = v00 + p * (v10 - v00);
+               const float slope_p = inside * (v10 - v00 + q * (v11 - v01 - v10 + v00));
+               const float slope_q = inside * (v01 + p * (v11 - v01) - low);
+               value[i] += inside * low + q * slope_q;
+               by_p[i] += slope_p;
+               by_q[i] += slope_q;
+               by_p_plane[i] += k * slope_p;
+               by_q_plane[i] += k * slope_q;
+             });
+  for (std::size_t i = 0; i < Bundle::rays; ++i)
+    if (rays.low[i] <= rays.high[i])
+      integrals[i] = assembled(directions[i], rays.paths[i],
+                               {rays.first, value[i], by_p[i], by_q[i], by_p_plane[i], by_q_plane[i]});
+}
+
+RayIntegral PosedDensity::assembled(const Vector3d& direction, const Path& path, const Sums& sums) const {
   // A motion along the ray changes nothing: the slope along k is what makes the gradient normal to the ray.
   const auto gradient = [&](double p, double q) {
     Vector3d in_voxels;
@@ -202,11 +262,12 @@ RayIntegral PosedDensity::differentiate(const Vector3d& direction) const {
     return Vector3d(path.mm_per_plane * voxel_from_world_.transpose() * in_voxels);
   };
   const double per_plane = 1 / path.along[path.k];
-  const Vector3d total = gradient(by_p, by_q);
+  const Vector3d total = gradient(sums.by_p, sums.by_q);
   // Distance from the source at plane n: (n - source) per_plane.
   const Vector3d by_distance =
-      per_plane * (gradient(by_p_plane, by_q_plane) + (path.first - source_[path.k]) * total);
-  const double value = double(sum) * path.mm_per_plane;
+      per_plane * (gradient(sums.by_p_plane, sums.by_q_plane) + (sums.first - source_[path.k]) * total);
+  const double value = double(sums.value) * path.mm_per_plane;
+  RayIntegral integral;
   integral.value = static_cast<float>(value);
   integral.by_motion.head<3>() = -total.cast<float>();
   // Turning the grid changes the ray's length between two planes.

@@ -46,10 +46,16 @@ class PosedDensity {
   /// The same for eight neighbouring rays, together.
   void integrate_eight(const std::array<Eigen::Vector3d, 8>& directions, std::array<float, 8>& values) const;
   RayIntegral differentiate(const Eigen::Vector3d& direction) const;
+  void differentiate_eight(const std::array<Eigen::Vector3d, 8>& directions,
+                           std::array<RayIntegral, 8>& integrals) const;
 
  private:
   struct Path;
+  struct Bundle;
+  struct Sums;
   bool clip(const Eigen::Vector3d& direction, Path& path) const;
+  bool bundle(const std::array<Eigen::Vector3d, 8>& directions, Bundle& made) const;
+  RayIntegral assembled(const Eigen::Vector3d& direction, const Path& path, const Sums& sums) const;
 
   const Density* density_;
   Eigen::Matrix3d voxel_from_world_;

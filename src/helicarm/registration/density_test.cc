@@ -77,7 +77,16 @@ TEST(EightRays, EqualSingleOnes) {
       directions[std::size_t(i)] = (Vector3d(i - 3, 4 * i - 14, 2.5 * i - 9) - source).normalized();
     std::array<float, 8> values;
     posed.integrate_eight(directions, values);
-    for (std::size_t i = 0; i < 8; ++i) EXPECT_NEAR(values[i], posed.integrate(directions[i]), 2e-4) << i;
+    std::array<RayIntegral, 8> integrals;
+    posed.differentiate_eight(directions, integrals);
+    for (std::size_t i = 0; i < 8; ++i) {
+      EXPECT_NEAR(values[i], posed.integrate(directions[i]), 2e-4) << i;
+      const RayIntegral alone = posed.differentiate(directions[i]);
+      EXPECT_NEAR(integrals[i].value, alone.value, 2e-4) << i;
+      EXPECT_LT((integrals[i].by_motion - alone.by_motion).cwiseAbs().maxCoeff(),
+                1e-3F * (1 + alone.by_motion.cwiseAbs().maxCoeff()))
+          << i;
+    }
   }
 }
 

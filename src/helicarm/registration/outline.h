@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "helicarm/geometry/view.h"
 #include "helicarm/registration/model.h"
 
 namespace helicarm::registration {

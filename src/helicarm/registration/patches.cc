@@ -96,15 +96,11 @@ class Comparer {
     const int side = options_.side;
     if (is_empty(u, v)) return patch;
     Eigen::VectorXf pixels(side * side);
-    std::array<Vector3d, 8> directions;
     std::array<float, 8> values;
-    for (int j = 0; j < side; ++j)
-      for (int i = 0; i < side; i += 8) {
-        for (int k = 0; k < 8; ++k)
-          directions[std::size_t(k)] = direction(u + std::min(i + k, side - 1), v + j);
-        posed_.integrate_eight(directions, values);
-        for (int k = 0; k < std::min(8, side - i); ++k) pixels[j * side + i + k] = values[std::size_t(k)];
-      }
+    for_eights(u, v, [&](const std::array<Vector3d, 8>& directions, int first, int count) {
+      posed_.integrate_eight(directions, values);
+      for (int k = 0; k < count; ++k) pixels[first + k] = values[std::size_t(k)];
+    });
     patch.drr = differences(pixels, {}, side);
     patch.contrast = patch.drr.norm();
     patch.shown = shown(u, v);
@@ -140,10 +136,11 @@ class Comparer {
     const double robust = std::pow(1 + misfit / options_.robust_misfit, -2);
     const float gain = both / drr2;
     Eigen::Matrix<float, Eigen::Dynamic, affine_parameters> pixels(side * side, affine_parameters);
-    for (int j = 0; j < side; ++j)
-      for (int i = 0; i < side; ++i)
-        pixels.row(j * side + i) =
-            posed_.differentiate(direction(patch.u + i, patch.v + j)).by_motion.transpose();
+    std::array<RayIntegral, 8> rays;
+    for_eights(patch.u, patch.v, [&](const std::array<Vector3d, 8>& directions, int first, int count) {
+      posed_.differentiate_eight(directions, rays);
+      for (int k = 0; k < count; ++k) pixels.row(first + k) = rays[std::size_t(k)].by_motion.transpose();
+    });
     Eigen::Matrix<float, Eigen::Dynamic, affine_parameters> jacobian(patch.drr.size(), affine_parameters);
     for (int k = 0; k < affine_parameters; ++k)
       jacobian.col(k) = differences(pixels.col(k), patch.shown, side);
@@ -177,13 +174,29 @@ class Comparer {
     return both;
   }
 
-  /// Whether nine rays spread over the patch miss the model.
+  /// Calls `take(directions, first, count)` for the rays of a patch, eight at a time.
+  template <class Take>
+  void for_eights(int u, int v, const Take& take) const {
+    const int side = options_.side;
+    std::array<Vector3d, 8> directions;
+    for (int j = 0; j < side; ++j)
+      for (int i = 0; i < side; i += 8) {
+        for (int k = 0; k < 8; ++k)
+          directions[std::size_t(k)] = direction(u + std::min(i + k, side - 1), v + j);
+        take(directions, j * side + i, std::min(8, side - i));
+      }
+  }
+
+  /// Whether eight rays spread over the patch miss the model.
   bool is_empty(int u, int v) const {
-    const int last = options_.side - 1;
-    for (const int j : {0, last / 2, last})
-      for (const int i : {0, last / 2, last})
-        if (posed_.integrate(direction(u + i, v + j)) != 0) return false;
-    return true;
+    const int last = options_.side - 1, half = last / 2;
+    std::array<float, 8> values;
+    posed_.integrate_eight(
+        {direction(u, v), direction(u + half, v), direction(u + last, v), direction(u + half / 2, v + half),
+         direction(u + last - half / 2, v + half), direction(u, v + last), direction(u + half, v + last),
+         direction(u + last, v + last)},
+        values);
+    return std::ranges::all_of(values, [](float value) { return value == 0; });
   }
 
   Vector3d direction(int u, int v) const {

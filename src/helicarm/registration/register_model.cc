@@ -5,9 +5,9 @@
 #include <chrono>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/registration/checks.h"
 #include "helicarm/registration/covariance.h"
@@ -39,7 +39,7 @@ std::vector<SearchStage> stages_for(const Scene& scene, const Vector3d& at) {
             {{true, std::max(pixel, 0.5), 5, std::max(1.0, 0.3 / pixel)}, 2}};
   }
   const double fine = std::max(model.resolution_mm, 2 * pixel);
-  std::vector<SearchStage> stages = {{{false, fine}, 3}};
+  std::vector<SearchStage> stages = {{{false, fine}, 3, 1.3}};
   const double coarsest = std::max(fine, std::min(5.0, model.radius_mm / 5));
   for (double spacing = 2 * fine; spacing < 1.5 * coarsest; spacing *= 2)
     stages.insert(stages.begin(), {{false, spacing}, stages.size() < 2 ? 8 : 32});
@@ -130,7 +130,7 @@ struct ErrorModel {
 RigidCovariance prior_information(const Observation& observation, const ErrorModel& errors, double sigma_mm) {
   const Linearised sum =
       linearised(observation, {}, affine_from_rigid(), RigidCovariance::Zero(), errors.correlation_px);
-  const double unit = sum.information.ldlt().solve(sum.meat).trace() / 6;
+  const double unit = geometry::solve_spd(sum.information, sum.meat).solution.trace() / 6;
   RigidCovariance information = RigidCovariance::Zero();
   information.topLeftCorner<3, 3>().diagonal().setConstant(
       std::pow(errors.scene.model().radius_mm / sigma_mm, 2));
@@ -158,7 +158,7 @@ void compare_views(const ErrorModel& errors, const Level& level, const Estimate&
     const Eigen::MatrixXd information =
         linearised(alone.observation, part.views, affine_from_rigid(), part.prior, errors.correlation_px)
             .information;
-    const RigidCovariance shrink = information.ldlt().solve(MatrixXd(part.prior));
+    const RigidCovariance shrink = geometry::solve_spd(information, part.prior).solution;
     own.push_back({step_about(joint.pose, alone.pose, result.centre),
                    errors.covariance(alone.observation, result.centre, part) +
                        shrink * prior_covariance * shrink.transpose()});

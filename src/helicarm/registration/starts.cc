@@ -104,15 +104,19 @@ SearchResult search(Scene& scene, const std::vector<SearchStage>& stages,
   for (const SearchStage& stage : stages) {
     const bool last = &stage == &stages.back();
     // Coarse levels can lead away from a good start.
-    if (&stage != &stages.front() && starts.size() <= most_given && options.candidates > 0)
+    if (&stage != &stages.front() && !last && starts.size() <= most_given && options.candidates > 0)
       for (std::size_t i = 0; i < starts.size(); ++i) descents.push_back({starts[i], {i}});
     auto estimates = refined(scene, stage.level, descents, last ? 0.002 : 0.02);
     std::vector<RigidTransform> reached;
     std::vector<double> scores;
     for (const Estimate& estimate : estimates)
       reached.push_back(estimate.pose), scores.push_back(estimate.score);
-    const std::size_t keep = last ? estimates.size() : std::size_t((&stage)[1].keep);
+    std::size_t keep = last ? estimates.size() : std::size_t((&stage)[1].keep);
     auto kept = best_of(model, reached, scores, int(std::max<std::size_t>(2, keep + !last)), same_mm);
+    if (!last)
+      while (keep > 1 && (kept.size() < keep ||
+                          1 - scores[kept[keep - 1]] > (&stage)[1].most_ratio * (1 - scores[kept[0]])))
+        --keep;
     // What goes on and merges with the best was no rival; at the last level nothing goes on.
     const std::size_t rival = last ? 1 : keep;
     if (kept.size() > rival &&

@@ -12,6 +12,7 @@ namespace helicarm::registration {
 struct SearchStage {
   Level level;
   int keep = 16;
+  double most_ratio = 1e9;  ///< of its cost, 1 - score, to the best one's: what is beyond does not go on
 };
 
 struct SearchOptions {
