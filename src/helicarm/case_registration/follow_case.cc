@@ -125,7 +125,11 @@ Expected<CaseSequence> follow_case(const pipeline::RegistrationCase& given, cons
       const auto views =
           value_or_throw(with_images(*loaded, value_or_throw(pipeline::at_frame(given, frame))));
       RegisteredFrame made{frame, {}};
-      for (const auto& body : bodies) made.models.push_back(body->follower->next(views, frame));
+      for (const auto& body : bodies) {
+        made.models.push_back(body->follower->next(views, frame));
+        // For the figures of a report, which a sequence has not.
+        for (registration::RegisteredView& view : made.models.back().views) view.agreements = {};
+      }
       sequence.frames.push_back(std::move(made));
       if (on_frame) on_frame(double(i + 1) / range.count());
     }

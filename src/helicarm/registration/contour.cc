@@ -160,8 +160,7 @@ ViewObservation compare_contour(const Raster& raster, const geometry::View& view
                                 const geometry::RigidTransform& world_from_model, const Vector3d& centre,
                                 const ContourOptions& options) {
   ViewObservation observation;
-  const double spacing = 2 * raster.factor;
-  const auto contour = apparent_contour(surface, view, world_from_model, spacing);
+  const auto contour = apparent_contour(surface, view, world_from_model, contour_spacing * raster.factor);
   double sum2 = 0, weights = 0;
   for (const ContourPoint& point : contour) {
     Comparison comparison;

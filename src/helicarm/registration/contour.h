@@ -22,6 +22,8 @@ std::vector<ContourPoint> apparent_contour(const Surface& surface, const geometr
                                            const geometry::RigidTransform& world_from_model,
                                            double spacing_px);
 
+inline constexpr double contour_spacing = 2;  ///< of the points that are compared, pixels of the raster
+
 struct ContourOptions {
   double reach = 6;     ///< pixels of the raster, on either side, where an edge is looked for
   double sigma_px = 1;  ///< full-resolution pixels; scale of the robust weight and of the information

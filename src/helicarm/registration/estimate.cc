@@ -55,6 +55,10 @@ double Scene::pixel_mm(const Vector3d& at) const {
   return finest;
 }
 
+double Scene::comparison_px(const Level& level, std::size_t view) const {
+  return prepared(level).rasters[view].factor * (level.contour ? contour_spacing : PatchOptions{}.side);
+}
+
 void Scene::prepare(const Level& level, const Vector3d& near) {
   if (levels_.contains({level.contour, level.spacing_mm})) return;
   Prepared made;

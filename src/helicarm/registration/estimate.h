@@ -36,6 +36,8 @@ class Scene {
                       unsigned threads) const;
   /// Spacing of the views' pixels at a place of the world, mm; the finest view's.
   double pixel_mm(const Eigen::Vector3d& at) const;
+  /// Side of a view's patches, or spacing of its contour points, px; after `prepare`.
+  double comparison_px(const Level& level, std::size_t view) const;
 
  private:
   struct Prepared {

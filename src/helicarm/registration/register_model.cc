@@ -167,12 +167,16 @@ void compare_views(const ErrorModel& errors, const Level& level, const Estimate&
   for (std::size_t i = 0; i < n; ++i) result.views[i].held_out_mm = result.disagreement->held_out_mm[i];
 }
 
-void describe(const Scene& scene, const Estimate& best, Registration& result) {
+void describe(const Scene& scene, const Level& level, const Estimate& best, Registration& result) {
   for (std::size_t i = 0; i < scene.views().size(); ++i) {
     const ViewObservation& seen = best.observation.views[i];
     result.views.push_back({scene.views()[i].name, seen.score,
                             local_shift_px(seen, scene.views()[i].view, result.centre), std::nullopt,
                             int(seen.comparisons.size())});
+    RegisteredView& view = result.views.back();
+    view.comparison_px = scene.comparison_px(level, i);
+    for (const Comparison& each : seen.comparisons)
+      view.agreements.push_back({each.pixel, each.agreement, each.weight});
   }
 }
 
@@ -223,7 +227,7 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
   if (found.runner_up)
     result.runner_up = {separation(model, best.pose, found.runner_up->pose),
                         (1 - found.runner_up->score) / (1 - found.runner_up_best)};
-  describe(scene, best, result);
+  describe(scene, stages.back().level, best, result);
   step("errors");
   const double finest_mm = std::max(result.spacing_mm, model.resolution_mm);
   const ErrorModel errors{scene,

@@ -26,12 +26,22 @@ struct RegistrationOptions {
   std::function<void(std::string_view step)> on_step = {};
 };
 
+/// Agreement of the image with a patch, or with a point of a surface's contour.
+struct LocalAgreement {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< its middle
+  double agreement = 0;                             ///< 1: as predicted; 0: unrelated; negative: reversed
+  double weight = 0;                                ///< in the view's score
+};
+
 struct RegisteredView {
   std::string name;
   double score = 0;                   ///< agreement with the image, at most 1
   double residual_px = 0;             ///< rms of the shifts that parts of the image still ask for
   std::optional<double> held_out_mm;  ///< between this view and the others, along what both can see
   int comparisons = 0;                ///< patches or contour points
+
+  std::vector<LocalAgreement> agreements = {};  ///< of the finest comparison
+  double comparison_px = 0;                     ///< side of a patch, or spacing of the contour points
 };
 
 struct RunnerUp {

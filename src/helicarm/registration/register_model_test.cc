@@ -39,6 +39,25 @@ TEST(RegisterModel, FindsAVolumeInImagesOfAnotherRenderer) {
   EXPECT_LT(worst_error_mm(model, result), 1.5);
 }
 
+TEST(RegisterModel, AgreementOfEachPatchIsInTheResult) {
+  const auto volume = lopsided_bone();
+  const Model model = model_of(volume);
+  const auto result = register_model(model, two_views(volume), {start_near(model, true_pose())}, quick());
+  for (const RegisteredView& view : result.views) {
+    ASSERT_EQ(view.agreements.size(), std::size_t(view.comparisons));
+    double score = 0, nearest = 1e9;
+    for (const LocalAgreement& each : view.agreements) {
+      score += each.weight * each.agreement;
+      // Patches lie side by side on a lattice.
+      const Eigen::Vector2d off = (each.pixel - view.agreements.front().pixel) / view.comparison_px;
+      EXPECT_LT((off - off.array().round().matrix()).norm(), 1e-6);
+      if (off.norm() > 0) nearest = std::min(nearest, off.norm());
+    }
+    EXPECT_NEAR(nearest, 1, 1e-6);
+    EXPECT_NEAR(score, view.score, 1e-9);
+  }
+}
+
 TEST(RegisterModel, ResultDoesNotDependOnThreads) {
   const auto volume = lopsided_bone();
   const Model model = model_of(volume);
