@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/case_registration/registration_figures.h"
 #include "helicarm/case_registration/start_poses.h"
 #include "helicarm/registration/outline.h"
 
@@ -95,6 +96,10 @@ class Registrar {
       if (options_.on_step) how.on_step = [&](std::string_view step) { options_.on_step(asked.name, step); };
       made.registration = registration::register_model(*model, views, starts, how);
       made.outlines = outlines(*model, made.views, made.registration.world_from_model);
+      made.is_surface = model->surface.has_value();
+      for (const RegistrationView& view : views)
+        made.drrs.push_back(drr_image(*model, view.view, made.registration.world_from_model,
+                                      {view.grey.width(), view.grey.height()}, options_.threads));
     } else {
       made.by_landmarks_only = true;
       made.registration = by_landmarks(asked.name, *made.landmarks);

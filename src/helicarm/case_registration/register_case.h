@@ -36,12 +36,15 @@ struct RegisteredModel {
   std::optional<registration::LandmarkRegistration> landmarks;  ///< of the start, or the result itself
   std::vector<std::string> landmark_names;
   bool by_landmarks_only = false;
+  bool is_surface = false;
   std::optional<guidance::Bone> moves_with;
   std::vector<RegisteredPoint> points;
   std::vector<guidance::Tunnel> tunnels;
   std::vector<geometry::View> views;  ///< as used: of a tracked bone at the first acquisition
   /// For overlays, per view: outlines of the model at its pose, rectified px.
   std::vector<std::vector<Eigen::Vector2d>> outlines;
+  /// For the report, per view: `drr_image` of the model at its pose.
+  std::vector<image::Image<std::uint8_t>> drrs;
 };
 
 struct CaseRegistration {

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "helicarm/case_registration/register_case.h"
+#include "helicarm/case_registration/registration_figures.h"
 #include "helicarm/case_registration/registration_tables.h"
 #include "helicarm/core/files.h"
 #include "helicarm/image/grey_window.h"
@@ -17,9 +18,6 @@ namespace helicarm::case_registration {
 namespace {
 
 using registration::Registration;
-
-// RGB, distinct for readers who do not see red and green apart.
-const cv::Scalar colours[] = {{250, 204, 21}, {96, 165, 250}, {240, 171, 252}, {74, 222, 128}};
 
 cv::Point pixel_of(const Eigen::Vector2d& at) {
   const Eigen::Vector2d safe = at.cwiseMax(-1e5).cwiseMin(1e5);
@@ -73,7 +71,8 @@ std::string overlay_png(const CaseRegistration& result, std::size_t index) {
   cv::cvtColor(image::as_mat(grey), image, cv::COLOR_GRAY2RGB);
   for (std::size_t m = 0; m < result.models.size(); ++m) {
     const RegisteredModel& model = result.models[m];
-    const cv::Scalar& colour = colours[m % std::size(colours)];
+    const auto& [red, green, blue] = outline_colour(m);
+    const cv::Scalar colour(red, green, blue);
     if (index < model.outlines.size())
       for (const Eigen::Vector2d& at : model.outlines[index])
         cv::circle(image, pixel_of(at), std::max(1, image.cols / 1024), colour, cv::FILLED);
@@ -90,15 +89,15 @@ std::string report_html(const CaseRegistration& result) {
   for (const Warning& warning : result.warnings)
     body +=
         fmt::format("<p class=\"soft\">{}: {}</p>\n", code(warning.reason), report::escaped(warning.message));
-  body += "<div class=\"views\">\n";
-  for (std::size_t i = 0; i < result.loaded.views.size(); ++i)
-    body += fmt::format(
-        "<figure><img style=\"width:100%\" alt=\"{0}\" src=\"data:image/png;base64,{1}\"/><figcaption>{0}: "
-        "outlines of "
-        "the registered models</figcaption></figure>\n",
-        report::escaped(result.loaded.views[i].name), report::base64(overlay_png(result, i)));
+  body += shared_images_html(result) + "<div class=\"views\">\n";
+  for (std::size_t i = 0; i < result.loaded.views.size(); ++i) body += overlay_figure(result, i);
   body += "</div>\n";
-  for (const RegisteredModel& model : result.models) body += model_section(model);
+  bool sliders = false;
+  for (std::size_t m = 0; m < result.models.size(); ++m) {
+    body += model_section(result.models[m]) + model_figures(result, m);
+    sliders = sliders || !result.models[m].drrs.empty();
+  }
+  if (sliders) body += slider_script();
   return report::page_html("helicarm registration", "Registration", body, ". Millimetres and pixels.");
 }
 

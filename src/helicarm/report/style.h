@@ -23,11 +23,15 @@ p { max-width: 42rem; }
 .card { background: var(--card); border: 1px solid var(--rule); border-radius: 0.6rem; padding: 0.9rem 1.1rem; }
 .card b { display: block; font-size: 1.7rem; font-weight: 600; font-variant-numeric: tabular-nums lining-nums; }
 .card span { color: var(--soft); font-size: 0.9rem; }
-.views { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 30rem), 1fr)); gap: 1.5rem; }
+.views { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 30rem), 1fr)); gap: 1.5rem; margin-top: 1rem; }
 figure { margin: 0; }
 figure svg { width: 100%; height: auto; display: block; border-radius: 0.4rem; background: #000; }
 figure.plain svg { background: var(--card); border: 1px solid var(--rule); }
 figcaption { padding-top: 0.4rem; }
+figure label { display: flex; align-items: center; gap: 0.8rem; padding-top: 0.4rem; font-size: 0.92rem; } figure label[hidden] { display: none; }
+figure input { flex: 1; accent-color: var(--accent); }
+.legend { display: flex; flex-wrap: wrap; gap: 0 0.9rem; }
+.key { display: inline-block; width: 0.8rem; height: 0.8rem; border-radius: 0.15rem; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums lining-nums; font-size: 0.96rem; }
 th { text-align: left; font-weight: 600; color: var(--soft); border-bottom: 1px solid var(--ink); }
