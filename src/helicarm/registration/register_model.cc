@@ -5,12 +5,11 @@
 #include <chrono>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/registration/checks.h"
 #include "helicarm/registration/covariance.h"
+#include "helicarm/registration/mirror.h"
 
 namespace helicarm::registration {
 namespace {
@@ -64,52 +63,6 @@ std::vector<double> correlations_px(const std::vector<RegistrationView>& views, 
     lengths.push_back(std::min(correlation_mm, model.radius_mm / 2) * std::abs(view.view.intrinsics.fy) /
                       view.view.depth(centre));
   return lengths;
-}
-
-/// The model as its mirror image, in the plane through its centre across the world-fixed model axis x.
-Model mirrored(const Model& model) {
-  Eigen::Affine3d flip = Eigen::Affine3d::Identity();
-  flip.linear()(0, 0) = -1;
-  flip.translation().x() = 2 * model.centre.x();
-  Model mirror = model;
-  mirror.density.model_from_voxel = flip * model.density.model_from_voxel;
-  for (auto* points : {&mirror.cuts, &mirror.samples})
-    for (Vector3d& point : *points) point = flip * point;
-  if (mirror.surface) {
-    for (Vector3d& corner : mirror.surface->mesh.corners) corner = flip * corner;
-    for (Vector3d& normal : mirror.surface->normals) normal = flip.linear() * normal;
-    for (auto& triangle : mirror.surface->mesh.triangles) std::swap(triangle[1], triangle[2]);
-  }
-  return mirror;
-}
-
-/// Cost of the mirrored model near a pose over the model's own: its mirror plane may lie across any principal
-/// axis.
-double mirrored_cost_ratio(const Scene& scene, const RigidTransform& pose, double own_score,
-                           const std::vector<SearchStage>& stages, const SearchOptions& options) {
-  const Model mirror = mirrored(scene.model());
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const Vector3d& point : scene.model().samples)
-    spread += (point - scene.model().centre) * (point - scene.model().centre).transpose();
-  const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
-  std::vector<RigidTransform> starts;
-  for (int axis = 0; axis < 3; ++axis) {
-    // A reflection across n is the one across x followed by a rotation.
-    Eigen::Matrix3d across_x = Eigen::Matrix3d::Identity();
-    across_x(0, 0) = -1;
-    const Eigen::Matrix3d across =
-        Eigen::Matrix3d::Identity() - 2 * axes.col(axis) * axes.col(axis).transpose();
-    const Eigen::Matrix3d turn = across * across_x;
-    const RigidTransform turned{turn, mirror.centre - turn * mirror.centre};
-    starts.push_back(pose * turned);
-  }
-  Scene other(scene, mirror);
-  std::vector<SearchStage> fewer = stages;
-  for (SearchStage& stage : fewer) stage.keep = std::min(stage.keep, 6);
-  fewer.back().keep = 1;
-  const SearchOptions less{options.shift_mm / 3, options.turn_deg / 2, 150};
-  const double score = search(other, fewer, starts, less, same_mm).solutions.front().score;
-  return (1 - score) / std::max(1e-6, 1 - own_score);
 }
 
 /// Errors of a solution from the views that take part: residuals, cameras, edges of the model.
@@ -241,7 +194,7 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
   if (result.disagreement) result.covariance *= result.disagreement->ratio();
   if (options.search.candidates > 0) {
     step("mirror image");
-    result.mirrored_ratio = mirrored_cost_ratio(scene, best.pose, best.score, stages, options.search);
+    result.mirrored_ratio = mirrored_cost_ratio(scene, best, stages, options.search, same_mm);
   }
   if (errors.cameras.isZero(0)) result.warnings.push_back(cameras_without_covariance(model.name));
   decide(model, starts, options, result);

@@ -81,8 +81,9 @@ struct Registration {
   double spacing_mm = 0;  ///< of the finest comparison
   int starts = 0, agree = 0;
   std::optional<RunnerUp> runner_up;
-  std::optional<double>
-      mirrored_ratio;  ///< cost ratio of the mirrored model; a search without candidates: none
+  /// Cost ratio of the mirrored model. None: a search without candidates, or a surface that is its own mirror
+  /// image.
+  std::optional<double> mirrored_ratio;
   Deformation deformation;
   std::optional<Disagreement> disagreement;  ///< of two or more views
   std::vector<RegisteredView> views;

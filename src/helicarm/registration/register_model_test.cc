@@ -3,9 +3,8 @@
 
 #include <gmock/gmock.h>
 
-#include "helicarm/phantom/mesh.h"
 #include "helicarm/registration/covariance.h"
-#include "helicarm/registration/scene_test.h"
+#include "helicarm/registration/surface_scene_test.h"
 
 namespace helicarm::registration {
 namespace {
@@ -151,23 +150,6 @@ TEST(Motion, CameraChangesAreMotionsOfTheModel) {
     const Vector3d moved = point + step * (map.col(k).head<3>() + linear * (point - centre));
     EXPECT_LT((changed.project(point) - view.project(moved)).norm(), 1e-6) << k;
   }
-}
-
-/// A lopsided closed surface.
-phantom::TriangleMesh lopsided_surface() {
-  const auto ball = [](const Vector3d& p, const Vector3d& c, double r) { return (p - c).norm() - r; };
-  return phantom::surface_of(
-      [&](const Vector3d& p) {
-        return std::min({ball(p, {0, 0, 0}, 14), ball(p, {12, 5, 10}, 9), ball(p, {-6, 12, -9}, 8)});
-      },
-      {Vector3d(-18, -18, -22), Vector3d(26, 24, 24)}, 1.0);
-}
-
-/// Metal: its density at the surface, filled and drawn by the exact renderer.
-volume::Volume filled_volume(const Model& model) {
-  volume::Volume volume{model.density.size, model.density.values, model.density.model_from_voxel, {}};
-  for (float& voxel : volume.voxels) voxel = voxel > 0 ? 3000.0F : -1024.0F;
-  return volume;
 }
 
 TEST(RegisterModel, FindsASurfaceByItsContour) {
