@@ -120,7 +120,7 @@ float PosedDensity::integrate(const Vector3d& direction) const {
   return sum * static_cast<float>(path.mm_per_plane);
 }
 
-/// Eight rays with one main axis; `low` > `high` where a ray misses the grid.
+/// Eight rays with one main axis; `low` > `high` where a ray does not cross the grid.
 struct PosedDensity::Bundle {
   static constexpr std::size_t rays = 8;
   std::array<Path, rays> paths;
