@@ -17,21 +17,22 @@ def smooth_field(rng, sigma_mm):
     return scaled(blurred_spectrum(noise, sigma_mm))
 
 
-def blurred_spectrum(spectrum, sigma_mm):
-    for axis, count in enumerate(SIZE[::-1]):
-        frequency = (np.fft.rfftfreq if axis == 2 else np.fft.fftfreq)(count, VOXEL_MM)
+def blurred_spectrum(spectrum, sigma_mm, size=SIZE, voxel_mm=VOXEL_MM):
+    """`size` and `voxel_mm` (one number or three) along L, P, S."""
+    for axis, (count, spacing) in enumerate(zip(size[::-1], np.broadcast_to(voxel_mm, 3)[::-1])):
+        frequency = (np.fft.rfftfreq if axis == 2 else np.fft.fftfreq)(count, spacing)
         shape = [1, 1, 1]
         shape[axis] = -1
         spectrum = spectrum * np.exp(-2 * (np.pi * sigma_mm * frequency.reshape(shape)) ** 2)
-    return np.fft.irfftn(spectrum, SIZE[::-1])
+    return np.fft.irfftn(spectrum, size[::-1])
 
 
 def scaled(field):
     return (field / field.std()).astype(np.float32)
 
 
-def blurred(volume, sigma_mm):
-    return blurred_spectrum(np.fft.rfftn(volume), sigma_mm)
+def blurred(volume, sigma_mm, voxel_mm=VOXEL_MM):
+    return blurred_spectrum(np.fft.rfftn(volume), sigma_mm, volume.shape[::-1], voxel_mm)
 
 
 def united(*distances):
@@ -103,12 +104,13 @@ class Knee:
         self.hu = (1 - share) * self.hu + share * (shell * CORTEX + (1 - shell) * spongy)
 
 
-def write_nrrd(path, array, voxel_mm=VOXEL_MM):
-    """(S, P, L) array; the volume's centre is the origin."""
+def write_nrrd(path, array, voxel_mm=VOXEL_MM, centre=(0, 0, 0)):
+    """(S, P, L) array; `voxel_mm` (one number or three) along L, P, S; `centre` of the volume, mm."""
     kind = {"int16": "int16", "uint8": "uint8"}[str(array.dtype)]
-    low = [-0.5 * voxel_mm * (n - 1) for n in SIZE]
-    header = (f"NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\nsizes: {SIZE[0]} {SIZE[1]} {SIZE[2]}\n"
-              f"space directions: ({voxel_mm},0,0) (0,{voxel_mm},0) (0,0,{voxel_mm})\nendian: little\nencoding: raw\n"
+    size, step = array.shape[::-1], [float(v) for v in np.broadcast_to(voxel_mm, 3)]
+    low = [float(c) - 0.5 * v * (n - 1) for c, v, n in zip(centre, step, size)]
+    header = (f"NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\nsizes: {size[0]} {size[1]} {size[2]}\n"
+              f"space directions: ({step[0]},0,0) (0,{step[1]},0) (0,0,{step[2]})\nendian: little\nencoding: raw\n"
               f"space origin: ({low[0]},{low[1]},{low[2]})\n\n")
     path.write_bytes(header.encode() + np.ascontiguousarray(array).tobytes())
 
