@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Registers a modelled knee's femur, or a patient's head, in simulated images from perturbed starts and with wrong input.
 
-  tools/registration_protocol.py --starts 200 --doc docs/registration.md
-  tools/registration_protocol.py --head --starts 200 --doc docs/registration.md
+  tools/registration_protocol.py --starts 200 --jobs 4 --doc docs/registration.md
+  tools/registration_protocol.py --head --starts 200 --jobs 4 --doc docs/registration.md
   tools/registration_protocol.py --kinds mirrored,tibia --cases 10 --keep folder
 
 Knees and their CTs are those of tools/bone_ct.py. The head is the CT of Debian's package invesalius-examples (apt-get install
@@ -24,8 +24,10 @@ Wrong cases, from a start within 5 mm of the best guess:
 One view (`one_view`, right input): error and predicted sigma along the view's central ray, and both views' sigma there.
 A wrong case that is accepted is a false accept; `hidden` cannot be seen, its error is compared with the covariance.
 
---rows keeps what is done; the same command goes on after an interruption. Needs NumPy. Exit code 1 if a visible wrong case is accepted."""
+Long runs: --jobs registers several cases at once, each by a process with one thread; poses do not depend on it, seconds do. --rows
+keeps what is done; the same command goes on after an interruption. Needs NumPy. Exit code 1 if a visible wrong case is accepted."""
 import argparse
+import concurrent.futures
 import json
 import math
 import os
@@ -34,6 +36,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 
 import numpy as np
 
@@ -150,6 +153,7 @@ class Protocol:
     def __init__(self, body, arguments, folder):
         self.body, self.program, self.threads, self.folder = body, arguments.program, arguments.threads, folder
         self.keep = arguments.keep is not None
+        self.lock = threading.Lock()
 
     def run(self, *words):
         done = subprocess.run([self.program, *map(str, words), "--quiet", "--threads", str(self.threads)], capture_output=True,
@@ -159,7 +163,8 @@ class Protocol:
 
     def volumes(self, subject):
         """Folder of a subject's volumes."""
-        return made(self.folder / f"{self.body.name}{subject}", lambda folder: self.body.write(folder, subject))
+        with self.lock:
+            return made(self.folder / f"{self.body.name}{subject}", lambda folder: self.body.write(folder, subject))
 
     def simulated(self, folder, number, shift=(0, 0, 0)):
         """Case folder. `shift`: of the body along L, P, S."""
@@ -363,6 +368,16 @@ def rows_in(path):
     return [json.loads(line) for line in path.read_text().splitlines()] if path and path.exists() else []
 
 
+def parallel(work, jobs, count):
+    """Results of `work(*job)` as they come."""
+    pool = concurrent.futures.ThreadPoolExecutor(count)
+    try:
+        for done in concurrent.futures.as_completed([pool.submit(work, *job) for job in jobs]):
+            yield done.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="build/bin/helicarm")
@@ -371,11 +386,14 @@ def main():
     parser.add_argument("--starts", type=int, default=20, help="right cases (default: 20)")
     parser.add_argument("--cases", type=int, default=10, help="of each wrong kind (default: 10)")
     parser.add_argument("--kinds", help=f"some of {','.join(KINDS)}; default: all that the body has")
-    parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1, help="cases at once (default: 1)")
+    parser.add_argument("--threads", type=int, help="of each case; 0: all cores (default: 0 for one job, 1 for several)")
     parser.add_argument("--rows", type=pathlib.Path, help="JSON lines of all cases; those it holds are not run again")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for cases and results (default: a temporary one)")
     parser.add_argument("--doc", type=pathlib.Path, help="renews the tables between the body's marks of that document")
     arguments = parser.parse_args()
+    if arguments.threads is None:
+        arguments.threads = 0 if arguments.jobs == 1 else 1
     body = Knees() if arguments.head is None else Heads(arguments.head or None)
     kinds = arguments.kinds.split(",") if arguments.kinds else body.kinds
     if unknown := [kind for kind in kinds if kind not in body.kinds]:
@@ -387,9 +405,7 @@ def main():
         folder.mkdir(parents=True, exist_ok=True)
         jobs = [(kind, number) for kind in kinds for number in range(arguments.starts if kind == "right" else arguments.cases)
                 if (kind, number) not in done]
-        protocol = Protocol(body, arguments, folder)
-        for job in jobs:
-            row = protocol.case(*job)
+        for row in parallel(Protocol(body, arguments, folder).case, jobs, arguments.jobs):
             rows.append(row)
             print(json.dumps(row), flush=True)
             if arguments.rows:
