@@ -74,6 +74,19 @@ registration::Registration by_landmarks(const std::string& name,
   return result;
 }
 
+/// What no image shows of a body whose poses at the acquisitions are not known.
+Warning motion_note(const pipeline::CaseModel& asked) {
+  return {
+      asked.moves_with ? Reason::bone_taken_as_fixed : Reason::unobservable_motion,
+      fmt::format("{}: motion between the acquisitions within the plane of the central rays is taken for a "
+                  "position; {}",
+                  asked.name,
+                  asked.moves_with ? "poses of the bone at every acquisition are missing"
+                                   : "put a marker on the bone, give its poses and \"moves_with\""),
+      {},
+      {}};
+}
+
 class Registrar {
  public:
   Registrar(const pipeline::RegistrationCase& given, const RegisterOptions& options,
@@ -108,14 +121,7 @@ class Registrar {
         made.registration.decision = registration::Decision::warn;
       }
     }
-    if (asked.moves_with && !follows && views.size() > 1)
-      made.registration.notes.push_back(
-          {Reason::bone_taken_as_fixed,
-           fmt::format("{}: without poses of the bone at every acquisition motion along "
-                       "a view's rays is not observable",
-                       asked.name),
-           {},
-           {}});
+    if (!follows && views.size() > 1) made.registration.notes.push_back(motion_note(asked));
     if (asked.plan) carry_plan(value_or_throw(read_plan(*asked.plan)), given_.base, made);
     return made;
   }

@@ -163,6 +163,12 @@ TEST_F(Report, HoldsSliderAndAgreementOfEachView) {
   EXPECT_THAT(html, Not(HasSubstr("src=\"http")));
 }
 
+TEST_F(Report, UntrackedBodyHasANoteOnItsMotion) {
+  const CaseRegistration result = registered(with_surface());
+  ASSERT_EQ(result.models[0].registration.notes.size(), 1u);
+  EXPECT_EQ(result.models[0].registration.notes[0].reason, Reason::unobservable_motion);
+}
+
 TEST_F(Report, RefusedModelHasItsFiguresToo) {
   CaseRegistration result = registered(with_surface());
   result.models[0].registration.failure = Failure{Reason::wrong_model, "another implant", {}, {}};
