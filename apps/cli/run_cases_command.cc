@@ -10,6 +10,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/localization/error_bound.h"
+#include "helicarm/pipeline/registration_case.h"
 #include "helicarm/pipeline/result.h"
 #include "run_models.h"
 
@@ -129,7 +130,7 @@ CommandResult run_cases_command(const RunCasesArguments& arguments, Console& con
   if (arguments.cases.size() > 1) return run_several(arguments, console);
   RunArguments run = arguments.run;
   run.folder = arguments.cases.front();
-  return has_models(run.folder) ? run_with_models(run, console) : run_command(run, console);
+  return pipeline::has_models(run.folder) ? run_with_models(run, console) : run_command(run, console);
 }
 
 }  // namespace helicarm::cli

@@ -7,8 +7,6 @@
 
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/core/files.h"
-#include "helicarm/pipeline/case.h"
-#include "helicarm/pipeline/registration_case.h"
 #include "register_command.h"
 
 namespace helicarm::cli {
@@ -25,12 +23,6 @@ Json with_tunnels(Json result, const Json& registration) {
 }
 
 }  // namespace
-
-bool has_models(const fs::path& folder) {
-  const auto json = read_json(pipeline::case_file(folder));
-  return json && json->is_object() && json->contains("models") && (*json)["models"].is_array() &&
-         !(*json)["models"].empty();
-}
 
 CommandResult run_with_models(const RunArguments& arguments, Console& console) {
   return guarded([&] {

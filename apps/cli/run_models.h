@@ -5,9 +5,6 @@
 
 namespace helicarm::cli {
 
-/// Whether case.json names models to be registered.
-bool has_models(const std::filesystem::path& folder);
-
 /// `run_command`, then the registration of the case's models: registration.json beside result.json, to whose
 /// tunnels those of the models' plans are added, and report and overlays in the folder registration/. A
 /// refused registration fails after everything is written.

@@ -6,6 +6,7 @@
 #include "gui/controller/equipment.h"
 #include "gui/controller/unsaved_picks.h"
 #include "helicarm/operation/plan_fields.h"
+#include "helicarm/pipeline/registration_case.h"
 #include "helicarm/rehearsal/rehearse.h"
 
 namespace helicarm::gui {
@@ -131,8 +132,7 @@ void Controller::open_case(const fs::path& folder, bool keeps_picks) {
   open(Source::files, folder, "reading " + folder.filename().string(),
        [=, this](Equipment& equipment) -> Change {
          pipeline::Case given = value_or_throw(pipeline::read_case(folder));
-         if (const auto json = read_json(pipeline::case_file(folder)); json && json->contains("models"))
-           equipment.with_models = pipeline::read_registration_case(folder);
+         if (pipeline::has_models(folder)) equipment.with_models = pipeline::read_registration_case(folder);
          if (!keeps_picks) return with_case(std::move(given), equipment);
          const auto unsaved = unsaved_picks(folder, given.views);
          return [change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)), folder,

@@ -108,6 +108,11 @@ std::optional<std::string> numbered(const std::string& name, int frame) {
 
 }  // namespace
 
+bool has_models(const fs::path& path) {
+  const auto json = read_json(case_file(path));
+  return json && json->is_object() && json->contains("models") && !(*json)["models"].empty();
+}
+
 Expected<RegistrationCase> read_registration_case(const fs::path& path) {
   return guarded([&] {
     const fs::path file = fs::absolute(case_file(path));

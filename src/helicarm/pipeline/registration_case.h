@@ -35,6 +35,10 @@ struct RegistrationCase {
   std::vector<CaseModel> models;
 };
 
+/// Whether a case's file names models to be registered: "models" that is not empty, in whatever form, so that
+/// a wrong one is refused where it is read.
+bool has_models(const std::filesystem::path& path);
+
 /// Reads a case with "models". Fails as `read_case`.
 Expected<RegistrationCase> read_registration_case(const std::filesystem::path& path);
 
