@@ -167,7 +167,9 @@ bool Controller::has_all_images() const {
 void Controller::cancel() {
   if (!state_.busy || !equipment_) return;
   if (equipment_->devices) return stop();
-  equipment_->stopped = true;
+  if (equipment_->stopped.exchange(true)) return;
+  state_.doing = "cancelling: " + state_.doing;
+  emit changed();
 }
 
 void Controller::export_to(const fs::path& folder) {

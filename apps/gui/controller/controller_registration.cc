@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Registration of a case's models, and moving one by hand.
+#include <mutex>
+
 #include "gui/controller/controller.h"
 #include "gui/controller/equipment.h"
 
@@ -7,19 +9,33 @@ namespace helicarm::gui {
 
 using case_registration::CaseRegistration;
 
+std::function<void(const std::string& model, std::string_view step)> on_registration_step(
+    const std::atomic<bool>& stopped, std::function<void(const std::string& step)> tell) {
+  struct Told {
+    std::mutex mutex;
+    std::string step;
+  };
+  return [&stopped, tell = std::move(tell), told = std::make_shared<Told>()](const std::string& model,
+                                                                             std::string_view step) {
+    if (stopped) throw BadInput(Reason::interrupted, "cancelled");
+    std::string words = model.empty() ? std::string(step) : model + ": " + std::string(step);
+    const std::lock_guard lock(told->mutex);
+    if (words == told->step) return;
+    told->step = std::move(words);
+    tell(told->step);
+  };
+}
+
 Expected<CaseRegistration> register_models(Equipment& equipment, const std::vector<pipeline::Pick>& picks,
                                            const std::optional<NudgedModel>& from,
-                                           const std::function<void(const std::string& step)>& on_step) {
+                                           const std::function<void(const std::string& step)>& tell) {
   return guarded([&] {
     pipeline::RegistrationCase given = value_or_throw(*equipment.with_models);
     given.base.picks = picks;
     if (from) given.models.at(from->model).world_from_model = from->world_from_model;
     case_registration::RegisterOptions options;
     options.threads = equipment.options.threads;
-    options.on_step = [&](const std::string& model, std::string_view step) {
-      if (equipment.stopped) throw BadInput(Reason::interrupted, "cancelled");
-      on_step(model + ": " + std::string(step));
-    };
+    options.on_step = on_registration_step(equipment.stopped, tell);
     return value_or_throw(case_registration::register_loaded(
         given, case_registration::views_of_calibration(given, *equipment.calibration), options));
   });
@@ -28,20 +44,6 @@ Expected<CaseRegistration> register_models(Equipment& equipment, const std::vect
 namespace {
 
 using Outlines = std::vector<std::vector<Eigen::Vector2d>>;
-
-Expected<Outlines> outlines_of(Equipment& equipment, const CaseRegistration& registration,
-                               const NudgedModel& nudged) {
-  return guarded([&] {
-    const case_registration::RegisteredModel& registered = registration.models.at(nudged.model);
-    const std::string& name = registered.registration.name;
-    if (!equipment.models.contains(name))
-      equipment.models.emplace(
-          name, value_or_throw(
-                    case_registration::load_model(equipment.with_models->value().models.at(nudged.model)))
-                    .value());
-    return case_registration::outlines(equipment.models.at(name), registered.views, nudged.world_from_model);
-  });
-}
 
 bool same_place(const NudgedModel& a, const NudgedModel& b) {
   return a.model == b.model && a.world_from_model.rotation == b.world_from_model.rotation &&
@@ -73,7 +75,7 @@ void Controller::nudge(std::size_t model, const registration::RigidStep& step) {
   Outlines until_then = state_.nudged && state_.nudged->model == model ? std::move(state_.nudged->outlines)
                                                                        : registered.outlines;
   state_.nudged.reset();
-  if (!step.isZero(0) && !registered.by_landmarks_only)
+  if (!step.isZero(0) && registered.model)
     state_.nudged = {model, registration::moved_about(from.world_from_model, from.centre, step),
                      std::move(until_then)};
   emit changed();
@@ -83,8 +85,11 @@ void Controller::nudge(std::size_t model, const registration::RigidStep& step) {
 void Controller::outline_nudged() {
   outlining_ = state_.nudged && !state_.busy;
   if (!outlining_) return;
-  worker_.post([this, equipment = equipment_, registration = state_.registration, of = *state_.nudged] {
-    const auto outlines = outlines_of(*equipment, *registration, of);
+  worker_.post([this, registration = state_.registration, of = *state_.nudged] {
+    const case_registration::RegisteredModel& registered = registration->models[of.model];
+    const auto outlines = guarded([&] {
+      return case_registration::outlines(*registered.model, registered.views, of.world_from_model);
+    });
     QMetaObject::invokeMethod(
         this,
         [this, of, outlines] {

@@ -2,11 +2,13 @@
 #include <QCoreApplication>
 #include <QElapsedTimer>
 #include <QThread>
+#include <thread>
 
 #include <gtest/gtest.h>
 
 #include "gui/controller/case_with_model_test.h"
 #include "gui/controller/controller.h"
+#include "gui/controller/equipment.h"
 #include "gui/controller/steps.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/core/temporary_folder.h"
@@ -85,6 +87,44 @@ TEST_F(ControllerRegistration, CancelEndsIt) {
   wait([&] { return !state().busy; });
   EXPECT_FALSE(state().registration);
   EXPECT_EQ(state().refusals.at(Phase::registration).reason, Reason::interrupted);
+}
+
+TEST_F(ControllerRegistration, CancelDuringTheSearchEndsIt) {
+  Equipment equipment;
+  equipment.given = pipeline::read_case(folder_->path()).value();
+  equipment.with_models = pipeline::read_registration_case(folder_->path());
+  ASSERT_TRUE(measure(equipment, {}));
+  std::vector<std::string> told;
+  const auto done = gui::register_models(equipment, {}, {}, [&](const std::string& step) {
+    told.push_back(step);
+    equipment.stopped = step == "bone: search";
+  });
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().reason, Reason::interrupted);
+  EXPECT_EQ(told.back(), "bone: search");
+}
+
+TEST(OnRegistrationStep, TellsEachStepOnceAndEndsWhatIsStopped) {
+  std::atomic<bool> stopped = false;
+  std::vector<std::string> told;
+  const auto step = on_registration_step(stopped, [&](const std::string& words) { told.push_back(words); });
+  step("", "read");
+  {
+    std::vector<std::jthread> threads;
+    for (int i = 0; i < 4; ++i)
+      threads.emplace_back([&] {
+        for (int k = 0; k < 1000; ++k) step("femur", "search");
+      });
+  }
+  step("femur", "errors");
+  EXPECT_EQ(told, (std::vector<std::string>{"read", "femur: search", "femur: errors"}));
+  stopped = true;
+  try {
+    step("femur", "search");
+    FAIL() << "not ended";
+  } catch (const BadInput& ended) {
+    EXPECT_EQ(ended.failure().reason, Reason::interrupted);
+  }
 }
 
 TEST(Steps, RegistrationIsOfCasesWithModels) {

@@ -22,7 +22,6 @@ struct Equipment {
   std::optional<pipeline::Case> given;
   std::optional<pipeline::CaseCalibration> calibration;             ///< of `given`
   std::optional<Expected<pipeline::RegistrationCase>> with_models;  ///< `given`, if it names models
-  std::map<std::string, registration::Model> models;                ///< those that were read
   rectification::Method calibrated_by = rectification::Method::best;
   pipeline::RunOptions options;
   std::optional<robot::RobotOrder> last_order;
@@ -48,11 +47,16 @@ Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipel
 
 inline constexpr std::size_t most_loose_images = 20;
 
+/// What a registration calls at its steps, from any thread and as often as it likes: ends it (interrupted)
+/// once `stopped`, and tells each step once.
+std::function<void(const std::string& model, std::string_view step)> on_registration_step(
+    const std::atomic<bool>& stopped, std::function<void(const std::string& step)> tell);
+
 /// Registers the case's models to its calibrated views. `from`: a model's start in place of the case's.
-/// `on_step` as `RegisterOptions`. Refuses interrupted once `equipment.stopped`.
+/// `tell` is called with each step. Refuses interrupted once `equipment.stopped`.
 Expected<case_registration::CaseRegistration> register_models(
     Equipment& equipment, const std::vector<pipeline::Pick>& picks, const std::optional<NudgedModel>& from,
-    const std::function<void(const std::string& step)>& on_step);
+    const std::function<void(const std::string& step)>& tell);
 
 /// Images of files, for looking; each with its file.
 struct LooseImages {

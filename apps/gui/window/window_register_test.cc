@@ -18,7 +18,7 @@ TEST_F(Window, AModelIsRegisteredAndMovedByHand) {
   EXPECT_TRUE(window_->strip().button(Phase::registration)->isChecked());
   auto* models = find<QTableWidget>("modelTable");
   ASSERT_EQ(models->rowCount(), 1);
-  EXPECT_EQ(models->item(0, 0)->text(), "femur");
+  EXPECT_EQ(models->item(0, 0)->text(), "bone");
   EXPECT_EQ(find<QTableWidget>("modelPointTable")->rowCount(), 2);
   ASSERT_TRUE(wait("the X-ray is shown", [&] { return !window_->xray(0).is_computing(); }));
   screenshot("register");

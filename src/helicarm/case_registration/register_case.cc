@@ -58,9 +58,11 @@ void carry_plan(const Plan& plan, const pipeline::Case& given, RegisteredModel& 
     model.points.push_back(
         {point.name, guidance::guide(located, anchor, dated, given.poses_now, given.tracker)});
   }
-  for (const PlanTunnel& tunnel : plan.tunnels)
+  for (const PlanTunnel& tunnel : plan.tunnels) {
     model.tunnels.push_back(value_or_throw(guidance::plan_tunnel(
         tunnel.name, model.points[tunnel.start].place, model.points[tunnel.end].place, {}, given.tracker)));
+    model.tunnel_ends.push_back({tunnel.start, tunnel.end});
+  }
 }
 
 registration::Registration by_landmarks(const std::string& name,
@@ -99,7 +101,7 @@ class Registrar {
     const bool follows = asked.moves_with && tracked(given_.base, *asked.moves_with);
     const auto views = follows ? following(loaded_.views, given_.base, *asked.moves_with) : loaded_.views;
     for (const RegistrationView& view : views) made.views.push_back(view.view);
-    const auto model = value_or_throw(load_model(asked));
+    auto model = value_or_throw(load_model(asked));
     StartPoses start = start_poses(given_, loaded_, asked, model, views);
     made.landmarks = std::move(start.landmarks);
     made.landmark_names = std::move(start.landmark_names);
@@ -113,6 +115,7 @@ class Registrar {
       for (const RegistrationView& view : views)
         made.drrs.push_back(drr_image(*model, view.view, made.registration.world_from_model,
                                       {view.grey.width(), view.grey.height()}, options_.threads));
+      made.model = std::make_shared<const registration::Model>(*std::move(model));
     } else {
       made.by_landmarks_only = true;
       made.registration = by_landmarks(asked.name, *made.landmarks);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/guidance/guide.h"
 #include "helicarm/guidance/tunnel.h"
+#include "helicarm/pipeline/result.h"
 #include "helicarm/registration/landmarks.h"
 #include "helicarm/registration/register_model.h"
 
@@ -33,6 +35,7 @@ struct RegisteredPoint {
 
 struct RegisteredModel {
   registration::Registration registration;
+  std::shared_ptr<const registration::Model> model;             ///< as read; null: by landmarks only
   std::optional<registration::LandmarkRegistration> landmarks;  ///< of the start, or the result itself
   std::vector<std::string> landmark_names;
   bool by_landmarks_only = false;
@@ -40,7 +43,8 @@ struct RegisteredModel {
   std::optional<guidance::Bone> moves_with;
   std::vector<RegisteredPoint> points;
   std::vector<guidance::Tunnel> tunnels;
-  std::vector<geometry::View> views;  ///< as used: of a tracked bone at the first acquisition
+  std::vector<pipeline::TunnelEnds> tunnel_ends;  ///< of each tunnel, among the points
+  std::vector<geometry::View> views;              ///< as used: of a tracked bone at the first acquisition
   /// For overlays, per view: outlines of the model at its pose, rectified px.
   std::vector<std::vector<Eigen::Vector2d>> outlines;
   /// For the report, per view: `drr_image` of the model at its pose.
