@@ -111,6 +111,44 @@ ResultScene scene_of(const pipeline::Result& result, const phantom::Calibrator& 
   return scene;
 }
 
+std::optional<ModelShape> shape_of(const case_registration::RegisteredModel& model,
+                                   const std::optional<geometry::RigidTransform>& by_hand,
+                                   const Colour& colour) {
+  const registration::Registration& found = model.registration;
+  const bool has_pose = by_hand || !found.covariance.isZero(0);
+  if (!has_pose || (!model.model && found.failure)) return std::nullopt;
+  ModelShape shape;
+  shape.name = found.name;
+  shape.state = by_hand         ? ModelShape::State::by_hand
+                : found.failure ? ModelShape::State::refused
+                                : ModelShape::State::registered;
+  shape.colour = colour;
+  shape.model = model.model;
+  shape.calibrator_from_model = by_hand.value_or(found.world_from_model);
+  shape.moves_with = model.moves_with;
+  if (shape.state != ModelShape::State::registered) return shape;
+  for (const case_registration::RegisteredPoint& point : model.points)
+    shape.points.push_back({point.name,
+                            localization::PointSource::pick,
+                            model.moves_with,
+                            ellipsoid_95(point.place.in_calibrator, point.place.covariance_in_calibrator),
+                            {}});
+  for (std::size_t i = 0; i < model.tunnels.size(); ++i)
+    shape.tunnels.push_back({model.tunnels[i].name,
+                             model.moves_with,
+                             {shape.points[model.tunnel_ends[i].start].error.centre,
+                              shape.points[model.tunnel_ends[i].end].error.centre}});
+  return shape;
+}
+
+ResultScene with_plans(ResultScene scene, const std::vector<ModelShape>& models) {
+  for (const ModelShape& model : models) {
+    scene.points.insert(scene.points.end(), model.points.begin(), model.points.end());
+    scene.tunnels.insert(scene.tunnels.end(), model.tunnels.begin(), model.tunnels.end());
+  }
+  return scene;
+}
+
 std::vector<DrawnLink> drawn_links(const LiveScene& live) {
   constexpr std::size_t thick = 3;  // links from the base on
   constexpr double foot_radius_mm = 60, thick_mm = 38, thin_mm = 26, joint = 1.15;

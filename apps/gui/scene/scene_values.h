@@ -2,10 +2,13 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "gui/scene/tre_slice.h"
+#include "helicarm/case_registration/register_case.h"
 #include "helicarm/devices/robot/kinematics.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/mesh.h"
@@ -65,6 +68,29 @@ struct ResultScene {
 };
 
 ResultScene scene_of(const pipeline::Result& result, const phantom::Calibrator& calibrator);
+
+/// A model of the case at its registered pose, or at one tried by hand.
+struct ModelShape {
+  enum class State { registered, refused, by_hand };
+
+  std::string name;
+  State state = State::registered;
+  Colour colour{};
+  std::shared_ptr<const registration::Model> model;
+  geometry::RigidTransform calibrator_from_model;
+  std::optional<guidance::Bone> moves_with;
+  std::vector<PointShape> points;  ///< of its plan; only of a registered one
+  std::vector<TunnelShape> tunnels;
+};
+
+/// `by_hand`: the pose that is tried instead of the registered one. Nothing for a model without a volume or
+/// surface whose registration is refused or, of any model, before it has a pose.
+std::optional<ModelShape> shape_of(const case_registration::RegisteredModel& model,
+                                   const std::optional<geometry::RigidTransform>& by_hand,
+                                   const Colour& colour);
+
+/// With the points and tunnels of the models' plans.
+ResultScene with_plans(ResultScene scene, const std::vector<ModelShape>& models);
 
 /// The outer wall of the cone that carries the balls; empty if they do not lie on a cone.
 std::optional<phantom::TriangleMesh> cone_of(const phantom::Calibrator& calibrator);

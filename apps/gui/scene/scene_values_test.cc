@@ -111,6 +111,68 @@ TEST(SceneValues, MovedBoneIsStatedAtItsPointsAndNotForNoise) {
                           geometry::RigidTransform{Matrix3d::Identity(), {0.2, 0, 0.2}}));
 }
 
+case_registration::RegisteredModel registered_femur() {
+  case_registration::RegisteredModel model;
+  model.registration.name = "femur";
+  model.registration.world_from_model.translation = {1, 2, 3};
+  model.registration.covariance.setIdentity();
+  model.model = std::make_shared<const registration::Model>();
+  model.moves_with = guidance::Bone::femur;
+  for (const double z : {10, 30}) {
+    case_registration::RegisteredPoint& point = model.points.emplace_back();
+    point.name = z < 20 ? "tunnel_start" : "tunnel_end";
+    point.place.in_calibrator = {0, 0, z};
+    point.place.covariance_in_calibrator = Matrix3d::Identity();
+  }
+  model.tunnels.push_back({"tunnel", {}, {}, {}, 20});
+  model.tunnel_ends.push_back({0, 1});
+  return model;
+}
+
+TEST(SceneValues, RegisteredModelHasItsPlan) {
+  const auto shape = shape_of(registered_femur(), {}, {1, 2, 3});
+  ASSERT_TRUE(shape);
+  EXPECT_EQ(shape->state, ModelShape::State::registered);
+  EXPECT_EQ(shape->colour, (Colour{1, 2, 3}));
+  EXPECT_EQ(shape->calibrator_from_model.translation, Vector3d(1, 2, 3));
+  const ResultScene scene = with_plans({}, {*shape});
+  ASSERT_EQ(scene.points.size(), 2u);
+  EXPECT_EQ(scene.points[1].name, "tunnel_end");
+  EXPECT_NEAR(scene.points[1].error.radii.x(), 2.795, 1e-3);
+  ASSERT_EQ(scene.tunnels.size(), 1u);
+  EXPECT_EQ(scene.tunnels[0].axis.to, Vector3d(0, 0, 30));
+  EXPECT_EQ(scene.tunnels[0].moves_with, guidance::Bone::femur);
+}
+
+TEST(SceneValues, RefusedOrMovedModelHasNoPlan) {
+  case_registration::RegisteredModel model = registered_femur();
+  const geometry::RigidTransform tried{Matrix3d::Identity(), {4, 4, 4}};
+  auto shape = shape_of(model, tried, {});
+  ASSERT_TRUE(shape);
+  EXPECT_EQ(shape->state, ModelShape::State::by_hand);
+  EXPECT_EQ(shape->calibrator_from_model.translation, tried.translation);
+  EXPECT_TRUE(shape->points.empty() && shape->tunnels.empty());
+
+  model.registration.failure = Failure{Reason::wrong_model, "femur: another bone", {}, {}};
+  shape = shape_of(model, {}, {});
+  ASSERT_TRUE(shape);
+  EXPECT_EQ(shape->state, ModelShape::State::refused);
+  EXPECT_TRUE(shape->points.empty() && shape->tunnels.empty());
+
+  model.registration.covariance.setZero();  // refused before its pose
+  EXPECT_FALSE(shape_of(model, {}, {}));
+}
+
+TEST(SceneValues, ModelOfLandmarksHasItsPlanWithoutASurface) {
+  case_registration::RegisteredModel model = registered_femur();
+  model.model.reset();
+  const auto shape = shape_of(model, {}, {});
+  ASSERT_TRUE(shape);
+  EXPECT_EQ(shape->tunnels.size(), 1u);
+  model.registration.failure = Failure{Reason::uncertain, "femur", {}, {}};
+  EXPECT_FALSE(shape_of(model, {}, {}));
+}
+
 TEST(SceneValues, RobotLinksEndAtTheFlange) {
   LiveScene live;
   EXPECT_TRUE(robot_links(live).empty());

@@ -9,12 +9,38 @@
 
 namespace helicarm::gui {
 
+namespace {
+
+/// A refused model is grey.
+Colour colour_of(const ModelShape& shape) {
+  return shape.state == ModelShape::State::refused ? palette::refused : shape.colour;
+}
+
+QString words_of(const ModelShape& shape) {
+  const QString name = QString::fromStdString(shape.name);
+  switch (shape.state) {
+    case ModelShape::State::refused:
+      return SceneView::tr("%1: refused").arg(name);
+    case ModelShape::State::by_hand:
+      return SceneView::tr("%1: moved by hand").arg(name);
+    case ModelShape::State::registered:
+      break;
+  }
+  return name;
+}
+
+}  // namespace
+
 SceneView::SceneView(QWidget* parent)
     : QWidget(parent), camera_(overview_of({}, 1)), stage_(std::make_unique<OffscreenStage>()) {
   setFocusPolicy(Qt::StrongFocus);
   setMinimumSize(120, 120);
   setAttribute(Qt::WA_OpaquePaintEvent);
   setAccessibleName(tr("Scene in space"));
+  connect(&surfaces_, &ModelSurfaces::computed, this, [this] {
+    models_changed_ = live_changed_ = true;
+    redraw();
+  });
 }
 
 SceneView::~SceneView() = default;
@@ -37,6 +63,15 @@ void SceneView::show_result(const std::shared_ptr<const pipeline::Result>& resul
 void SceneView::show_bones(std::optional<BoneMeshes> bones) {
   bones_ = std::move(bones);
   bones_changed_ = live_changed_ = true;
+  redraw();
+}
+
+void SceneView::show_models(std::vector<ModelShape> models) {
+  models_ = std::move(models);
+  std::vector<ModelSurfaces::Model> drawn;
+  for (const ModelShape& shape : models_) drawn.push_back(shape.model);
+  surfaces_.keep(drawn);
+  result_changed_ = models_changed_ = live_changed_ = true;
   redraw();
 }
 
@@ -70,14 +105,15 @@ void SceneView::draw() {
   QElapsedTimer timer;
   timer.start();
   drawn_ = stage_->draw(size() * devicePixelRatioF(), camera_, [this](Stage& stage) {
-    if (result_changed_) stage.set_result(scene_, error_scale_);
+    if (result_changed_) stage.set_result(with_plans(scene_, models_), error_scale_);
     if (bones_changed_) stage.set_bones(bones_);
+    if (models_changed_) stage.set_models(drawn_models());
     if (slice_changed_)
       stage.set_slice(tre_ ? std::optional(slice_of(*tre_, slice_axis_, slice_mm_)) : std::nullopt,
                       tre_scale_);
     if (live_changed_) stage.set_live(live_);
     stage.clear_sight(camera_);
-    result_changed_ = bones_changed_ = slice_changed_ = live_changed_ = false;
+    result_changed_ = bones_changed_ = models_changed_ = slice_changed_ = live_changed_ = false;
   });
   drawn_.setDevicePixelRatio(devicePixelRatioF());
   last_render_ms_ = double(timer.nsecsElapsed()) * 1e-6;
@@ -96,6 +132,14 @@ void SceneView::paintEvent(QPaintEvent*) {
   paint_overlay(painter);
 }
 
+std::vector<DrawnModel> SceneView::drawn_models() const {
+  std::vector<DrawnModel> drawn;
+  for (const ModelShape& shape : models_)
+    drawn.push_back(
+        {surfaces_.of(shape.model), colour_of(shape), shape.calibrator_from_model, shape.moves_with});
+  return drawn;
+}
+
 std::vector<SceneLabel> SceneView::labels() const {
   std::vector<SceneLabel> labels;
   const auto carried = [&](const std::optional<guidance::Bone>& bone, const Eigen::Vector3d& place) {
@@ -104,9 +148,13 @@ std::vector<SceneLabel> SceneView::labels() const {
         *bone == guidance::Bone::femur ? live_.calibrator_from_femur_now : live_.calibrator_from_tibia_now;
     return motion ? *motion * place : place;
   };
-  for (const PointShape& point : scene_.points)
+  for (const PointShape& point : with_plans(scene_, models_).points)
     labels.push_back(
         {carried(point.moves_with, point.error.centre), QString::fromStdString(point.name), palette::point});
+  for (const ModelShape& shape : models_)
+    if (shape.model)
+      labels.push_back({carried(shape.moves_with, shape.calibrator_from_model * shape.model->centre),
+                        words_of(shape), colour_of(shape)});
   for (std::size_t i = 0; i < scene_.views.size(); ++i) {
     const ViewShape& view = scene_.views[i];
     const QString name = QString::fromStdString(view.name);

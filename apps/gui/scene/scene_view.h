@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "gui/scene/model_surface.h"
 #include "gui/scene/overlay.h"
 #include "gui/scene/scene_camera.h"
 #include "gui/scene/scene_values.h"
@@ -14,6 +15,7 @@
 namespace helicarm::gui {
 
 class OffscreenStage;
+struct DrawnModel;
 using simulation::BoneMeshes;
 
 /// Calibrator, views, points, bones, tool and robot in 3-D. The left button rotates, the right one and the
@@ -37,6 +39,8 @@ class SceneView : public QWidget {
                    const phantom::Calibrator& calibrator);
   /// In the calibrator's frame, at the acquisition.
   void show_bones(std::optional<BoneMeshes> bones);
+  /// The case's models; a surface appears as soon as it is computed.
+  void show_models(std::vector<ModelShape> models);
   void show_live(const LiveScene& live);
   /// The slice perpendicular to an axis of the calibrator; empty removes it.
   void show_tre(std::optional<localization::TreVolume> volume, SliceAxis axis, double place_mm);
@@ -74,11 +78,14 @@ class SceneView : public QWidget {
   void redraw();
   void draw();
   void paint_overlay(QPainter& painter);
+  std::vector<DrawnModel> drawn_models() const;
   std::vector<SceneLabel> labels() const;
 
   ResultScene scene_;
   Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();  ///< of the calibrator's balls
   std::optional<BoneMeshes> bones_;
+  std::vector<ModelShape> models_;
+  ModelSurfaces surfaces_;
   LiveScene live_;
   std::optional<localization::TreVolume> tre_;
   TreScale tre_scale_{0, 1, 0.5};
@@ -91,7 +98,8 @@ class SceneView : public QWidget {
   SceneCamera camera_;
   QPointF mouse_;
   std::unique_ptr<OffscreenStage> stage_;
-  bool result_changed_ = true, bones_changed_ = true, slice_changed_ = true, live_changed_ = true;
+  bool result_changed_ = true, bones_changed_ = true, models_changed_ = true, slice_changed_ = true,
+       live_changed_ = true;
   QImage drawn_;  ///< null: to be redrawn
   double last_render_ms_ = 0;
 };

@@ -124,6 +124,44 @@ TEST_F(ShownScene, ToolRobotAndBonesMove) {
   EXPECT_LT(colours_in(acquired_view("empty")), 150u);  // the triad's letters
 }
 
+TEST_F(ShownScene, ModelsStandAtTheirPoses) {
+  view_.set_preset(SceneView::Preset::ap);
+  const QImage bare = acquired_view("models_none");
+  auto model = std::make_shared<registration::Model>();
+  model->surface.emplace();
+  model->surface->mesh = simulation::bone_meshes(6).femur;
+  ModelShape shape;
+  shape.name = "femur";
+  shape.colour = {250, 204, 21};
+  shape.model = model;
+  shape.calibrator_from_model = *simulated().truth.calibrator_from_knee;
+  view_.show_models({shape});
+  QImage registered;
+  ASSERT_TRUE(QTest::qWaitFor([&] {
+    registered = acquired_view("models");
+    return pixels_apart(registered, bare) > 5000;
+  }));
+  shape.calibrator_from_model.translation.x() += 8;
+  shape.state = ModelShape::State::by_hand;
+  view_.show_models({shape});
+  const QImage moved = acquired_view("models_by_hand");
+  EXPECT_GT(pixels_apart(moved, registered), 1000);
+  EXPECT_GT(pixels_apart(moved, bare), 5000);
+  shape.state = ModelShape::State::refused;
+  view_.show_models({shape});
+  EXPECT_GT(pixels_apart(acquired_view("models_refused"), moved), 1000);
+  LiveScene live;
+  live.calibrator_from_femur_now = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, 20}};
+  shape.moves_with = guidance::Bone::femur;
+  view_.show_models({shape});
+  const QImage still = acquired_view("models_still");
+  view_.show_live(live);
+  EXPECT_GT(pixels_apart(acquired_view("models_with_bone"), still), 1000);
+  view_.show_live({});
+  view_.show_models({});
+  EXPECT_EQ(pixels_apart(acquired_view("models_gone"), bare), 0);
+}
+
 TEST_F(ShownScene, TreSliceLiesInTheImage) {
   view_.show_bones(bones());
   view_.set_preset(SceneView::Preset::ap);

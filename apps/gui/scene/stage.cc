@@ -20,6 +20,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double bone_opacity = 0.38, model_opacity = 0.45, cone_opacity = 0.16;
+
 void give(vtkActor* actor, const ShapeBuilder& shapes) {
   vtkPolyDataMapper::SafeDownCast(actor->GetMapper())->SetInputData(shapes.build());
   actor->SetVisibility(shapes.build()->GetNumberOfCells() > 0);
@@ -67,8 +69,8 @@ Stage::Stage() {
   for (vtkActor*& marker : markers_) marker = add(true);
   for (vtkActor*& link : links_) link = add(true);
   slice_ = add(false);
-  for (vtkActor*& bone : bones_) make_glass(bone = add(true), 0.38);
-  make_glass(cone_ = add(true), 0.16);
+  for (vtkActor*& bone : bones_) make_glass(bone = add(true), bone_opacity);
+  make_glass(cone_ = add(true), cone_opacity);
 
   ShapeBuilder tool;
   tool.add_tube({{0, 0, -150}, {0, 0, -30}}, 9, 9, palette::tool_grip);
@@ -168,6 +170,36 @@ void Stage::set_slice(const std::optional<TreSlice>& slice, const TreScale& scal
   give(slice_, shapes);
 }
 
+Stage::ModelActors Stage::add_model() {
+  const ModelActors made{add(true), add(true)};
+  make_glass(made.depth, 0.001);  // rounds to nothing, but writes its depth: folds behind are not blended
+  make_glass(made.surface, model_opacity);
+  made.depth->SetMapper(made.surface->GetMapper());
+  made.surface->GetMapper()->ScalarVisibilityOff();
+  const vtkSmartPointer<vtkActor> last = cone_;  // glass hides what is drawn after it
+  renderer_->RemoveActor(last);
+  renderer_->AddActor(last);
+  return made;
+}
+
+void Stage::set_models(const std::vector<DrawnModel>& models) {
+  while (model_actors_.size() < models.size()) model_actors_.push_back(add_model());
+  for (std::size_t i = 0; i < model_actors_.size(); ++i) {
+    const auto& [depth, actor] = model_actors_[i];
+    const auto surface = i < models.size() ? models[i].surface : nullptr;
+    if (surface != (i < models_.size() ? models_[i].surface : nullptr)) {
+      ShapeBuilder shape;
+      if (surface) shape.add_mesh(*surface, {});
+      give(actor, shape);
+      depth->SetVisibility(actor->GetVisibility());
+    }
+    if (i >= models.size()) continue;
+    const auto& [red, green, blue] = models[i].colour;
+    actor->GetProperty()->SetColor(red / 255.0, green / 255.0, blue / 255.0);
+  }
+  models_ = models;
+}
+
 void Stage::set_live(const LiveScene& live) {
   const std::array motions{live.calibrator_from_femur_now, live.calibrator_from_tibia_now};
   const std::array markers{live.calibrator_from_femur_marker, live.calibrator_from_tibia_marker};
@@ -182,6 +214,15 @@ void Stage::set_live(const LiveScene& live) {
     move(markers_[i], markers[i]);
   }
   move(tool_, live.calibrator_from_tip);
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const auto& [surface, colour, calibrator_from_model, moves_with] = models_[i];
+    const geometry::RigidTransform moved =
+        moves_with
+            ? motions[*moves_with == guidance::Bone::femur ? 0 : 1].value_or(geometry::RigidTransform())
+            : geometry::RigidTransform();
+    for (vtkActor* actor : {model_actors_[i].depth, model_actors_[i].surface})
+      move(actor, surface ? std::optional(moved * calibrator_from_model) : std::nullopt);
+  }
 
   drawn_links_ = drawn_links(live);
   for (std::size_t i = 0; i < links_.size(); ++i) {

@@ -16,6 +16,14 @@ namespace helicarm::gui {
 
 using simulation::BoneMeshes;
 
+/// A model's surface in its own coordinates.
+struct DrawnModel {
+  std::shared_ptr<const phantom::TriangleMesh> surface;  ///< null: not drawn
+  Colour colour;
+  geometry::RigidTransform calibrator_from_model;
+  std::optional<guidance::Bone> moves_with;
+};
+
 /// The scene in VTK. Lives as long as one OpenGL context, which must be current in every call.
 class Stage {
  public:
@@ -26,6 +34,8 @@ class Stage {
   void set_result(const ResultScene& scene, double error_scale);
   void set_bones(const std::optional<BoneMeshes>& bones);
   void set_slice(const std::optional<TreSlice>& slice, const TreScale& scale);
+  /// They stand where `set_live` moves them.
+  void set_models(const std::vector<DrawnModel>& models);
   /// Moves existing parts; only a new path is built.
   void set_live(const LiveScene& live);
 
@@ -37,8 +47,13 @@ class Stage {
   void render_upside_down(const SceneCamera& camera, unsigned framebuffer);
 
  private:
+  struct ModelActors {
+    vtkActor *depth, *surface;  ///< invisible, and drawn where it is the nearest
+  };
+
   bool is_shown(std::size_t link) const;
   vtkActor* add(bool lit);
+  ModelActors add_model();
   void move(vtkActor* actor, const std::optional<geometry::RigidTransform>& calibrator_from_body);
 
   vtkNew<vtkGenericOpenGLRenderWindow> window_;
@@ -49,6 +64,8 @@ class Stage {
   std::array<vtkActor*, 7> links_;  ///< the last is the base's foot
   std::array<vtkActor*, 2> bones_;
   vtkActor* cone_;
+  std::vector<ModelActors> model_actors_;
+  std::vector<DrawnModel> models_;  ///< of the first actors
   std::vector<DrawnLink> drawn_links_;
   std::vector<Eigen::Vector3d> shown_path_;
 };

@@ -230,6 +230,7 @@ void MainWindow::show_state() {
   show_images();
   show_picks();
   show_outlines();
+  show_models();
   focus_->restore(pages_->currentWidget());
 }
 
@@ -265,6 +266,16 @@ void MainWindow::show_outlines() {
     xrays_[i]->set_outlines(view && panels_->panel(i).shows_own_frame() ? outlines_of(state, *view)
                                                                         : std::vector<ModelOutline>{});
   }
+}
+
+void MainWindow::show_models() {
+  const ApplicationState& state = controller_.state();
+  decltype(shown_nudge_) nudge;
+  if (state.nudged) nudge = {state.nudged->model, state.nudged->world_from_model.matrix()};
+  if (shown_registration_ == state.registration && shown_nudge_ == nudge) return;
+  shown_registration_ = state.registration;
+  shown_nudge_ = nudge;
+  scene_->show_models(models_of(state));
 }
 
 void MainWindow::display_wanted(const std::optional<WantedPick>& wanted) {

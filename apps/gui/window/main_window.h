@@ -94,6 +94,8 @@ class MainWindow : public QMainWindow {
   void show_measures();
   /// Of the registered models, over each X-ray image.
   void show_outlines();
+  /// The registered models in the scene.
+  void show_models();
   void display_wanted(const std::optional<WantedPick>& wanted);
   void show_picks_in(std::size_t panel, std::size_t view, const std::optional<WantedPick>& wanted);
   using EpipolarLine = std::vector<Eigen::Vector2d>;  ///< rectified px
@@ -167,6 +169,8 @@ class MainWindow : public QMainWindow {
   std::optional<operation::ToolOverlay> recorded_;  ///< at the replayed moment
   std::shared_ptr<const pipeline::Result> shown_;
   std::shared_ptr<const simulation::BoneMeshes> shown_bones_;
+  std::shared_ptr<const case_registration::CaseRegistration> shown_registration_;
+  std::optional<std::pair<std::size_t, Eigen::Matrix4d>> shown_nudge_;  ///< model and pose
   Source shown_source_ = Source::none;
   Phase phase_ = Phase::acquire;
   unsigned looks_ = 0;

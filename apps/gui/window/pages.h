@@ -112,7 +112,8 @@ class PlanPage : public Page {
   void tell_next();
 
   QLabel* next_;
-  QTableWidget* ends_;
+  QTableWidget *ends_, *tunnels_;
+  std::size_t clickable_ = 0;  ///< rows of `ends_`, the first ones
   QCheckBox* snap_;
   QPushButton* offered_;
   QPushButton* delete_;

@@ -9,62 +9,9 @@
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "gui/window/pages.h"
-#include "helicarm/report/tables.h"
+#include "gui/window/plan_tables.h"
 
 namespace helicarm::gui {
-
-namespace {
-
-/// A tunnel's end, landmark or target, and what it is.
-struct PlannedPoint {
-  std::string name;
-  QString kind;
-};
-
-QString words_of(const pipeline::BoneLabel& bone) {
-  if (!bone.side) return text(bone.name);
-  return (*bone.side == pipeline::Side::left ? PlanPage::tr("left %1") : PlanPage::tr("right %1"))
-      .arg(text(bone.name));
-}
-
-QString views_with(const ApplicationState& state, const std::string& point) {
-  QStringList views;
-  for (const std::string& view : state.views)
-    if (pick_of(state, point, view) != nullptr) views << text(view);
-  return views.join(", ");
-}
-
-/// The points as the report shows them, and where each is marked. One without a result has a name only.
-report::Table ends_table(const ApplicationState& state, const std::vector<PlannedPoint>& planned) {
-  std::vector<pipeline::PointResult> located;
-  for (const PlannedPoint& each : planned) {
-    pipeline::PointResult& point = located.emplace_back();
-    point.name = each.name;
-    point.source = localization::PointSource::pick;
-    if (!state.result) continue;
-    const auto& points = state.result->points;
-    const auto found = std::ranges::find(points, each.name, &pipeline::PointResult::name);
-    if (found != points.end()) point = *found;
-  }
-  const auto kind = [&](const PlannedPoint& point) {
-    const auto bone = bone_of(state, point.name);
-    return report::Cell{(bone ? point.kind + ", " + words_of(*bone) : point.kind).toStdString()};
-  };
-  return report::beside(
-      report::table_of<PlannedPoint>(
-          "",
-          {{{"Point", "Name of the tunnel end, landmark or check target"},
-            [](const PlannedPoint& point) { return report::Cell{point.name}; }},
-           {{"Is", "enters: where the drill enters; ends: where it stops; landmark; target"}, kind},
-           {{"Clicked in", "Views in which it is picked"},
-            [&](const PlannedPoint& point) {
-              return report::Cell{views_with(state, point.name).toStdString()};
-            }}},
-          planned),
-      report::positions_table(located));
-}
-
-}  // namespace
 
 PlanPage::PlanPage(Controller& controller, QWidget* parent)
     : Page(tr("Click each tunnel end in two X-ray images; the dashed line is the epipolar line of its click "
@@ -83,11 +30,13 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
     const int row = ends_->currentRow();
     chosen_.reset();
     placed_of_chosen_ = 0;
-    if (ends_->selectionModel()->hasSelection() && row >= 0)
+    if (ends_->selectionModel()->hasSelection() && row >= 0 && std::size_t(row) < clickable_)
       chosen_ = ends_->item(row, 0)->text().toStdString();
     tell_next();
     emit target_changed();
   });
+  tunnels_ = add_table(plan_tunnels_table({}), "tunnelTable");
+  tunnels_->setMinimumHeight(80);  // two rows and the header
   snap_ = new QCheckBox(tr("Snap to a &ball of 3 mm"));
   snap_->setChecked(true);
   layout()->addWidget(snap_);
@@ -223,10 +172,17 @@ void PlanPage::show_state(const ApplicationState& state) {
       points.push_back({end, enters ? tr("enters") : tr("ends")});
     }
   for (const std::string& landmark : state.landmarks) points.push_back({landmark, tr("landmark")});
+  clickable_ = points.size();
+  for (const case_registration::RegisteredModel* model : usable_models(state))
+    for (const case_registration::RegisteredPoint& point : model->points)
+      points.push_back({point.name, tr("plan of %1").arg(text(model->registration.name)), &point});
   if (state.result)
     for (const localization::TargetError& target : state.result->accuracy.targets)
       points.push_back({target.name, tr("target, error %1 mm").arg(number(target.error_mm, 3))});
   fill(ends_, ends_table(state, points));
+  const auto tunnels = plan_tunnels(state);
+  fill(tunnels_, plan_tunnels_table(tunnels));
+  tunnels_->setVisible(std::ranges::any_of(tunnels, &PlanTunnelRow::is_of_model));
   offered_->setVisible(!state.offered_picks.empty());
   landmark_row_->setVisible(state.source == Source::files);
   unsaved_->setVisible(state.has_unsaved_picks || state.picks_not_kept);

@@ -8,6 +8,7 @@
 
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
+#include "gui/xray/mark_painter.h"
 #include "helicarm/case_registration/registration_tables.h"
 
 namespace helicarm::gui {
@@ -130,6 +131,20 @@ void RegisterPage::show_state(const ApplicationState& state) {
   fill(points_, case_registration::points_table(models));
 }
 
+std::vector<ModelShape> models_of(const ApplicationState& state) {
+  std::vector<ModelShape> shapes;
+  if (!state.registration) return shapes;
+  for (std::size_t i = 0; i < state.registration->models.size(); ++i) {
+    std::optional<geometry::RigidTransform> by_hand;
+    if (state.nudged && state.nudged->model == i) by_hand = state.nudged->world_from_model;
+    const QColor& ink = ink::of_model(i);
+    if (auto shape = shape_of(state.registration->models[i], by_hand,
+                              {std::uint8_t(ink.red()), std::uint8_t(ink.green()), std::uint8_t(ink.blue())}))
+      shapes.push_back(*std::move(shape));
+  }
+  return shapes;
+}
+
 std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t view) {
   std::vector<ModelOutline> outlines;
   if (!state.registration) return outlines;
@@ -139,7 +154,7 @@ std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t
     const auto& dots = is_nudged ? state.nudged->outlines : model.outlines;
     ModelOutline& outline = outlines.emplace_back();
     if (view < dots.size()) outline.dots = dots[view];
-    if (is_nudged || view >= model.views.size()) continue;
+    if (is_nudged || model.registration.failure || view >= model.views.size()) continue;
     for (const case_registration::RegisteredPoint& point : model.points)
       if (const Eigen::Vector3d& at = point.place.in_calibrator; model.views[view].depth(at) > 1)
         outline.points.emplace_back(text(point.name), model.views[view].project(at));

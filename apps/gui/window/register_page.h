@@ -4,6 +4,7 @@
 #include <QDoubleSpinBox>
 #include <array>
 
+#include "gui/scene/scene_values.h"
 #include "gui/window/pages.h"
 #include "gui/xray/live_marks.h"
 #include "helicarm/case_registration/register_case.h"
@@ -31,6 +32,9 @@ class RegisterPage : public Page {
   std::array<QDoubleSpinBox*, 6> by_{};  ///< mm, then degrees
   std::shared_ptr<const case_registration::CaseRegistration> shown_;
 };
+
+/// The registered models in the scene, the nudged one at its pose, in the colours of their outlines.
+std::vector<ModelShape> models_of(const ApplicationState& state);
 
 /// The registered models over a view, the nudged one at its pose.
 std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t view);

@@ -109,7 +109,7 @@ void LiveMarks::paint(QPainter& painter, const ImageFrame& frame) const {
   for (const rectification::PixelPath& piece : path_.in_layer)
     paint_path(painter, piece, frame, QPen(ink::residual, 2.2));
   for (std::size_t i = 0; i < outlines_.size(); ++i)
-    paint_outline(painter, outlines_[i].in_layer, frame, ink::models[i % std::size(ink::models)]);
+    paint_outline(painter, outlines_[i].in_layer, frame, ink::of_model(i));
   painter.setBrush(ink::residual);
   painter.setPen(Qt::NoPen);
   if (path_.end) painter.drawEllipse(frame.to_widget(*path_.end), 4, 4);

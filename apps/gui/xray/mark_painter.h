@@ -16,6 +16,7 @@ inline const QColor ball(74, 222, 128), rejected(255, 122, 107), plate(147, 197,
     epipolar(94, 234, 242), measure(255, 255, 255), quiet(200, 208, 220);
 /// Of registered models, as in the registration's report.
 inline const QColor models[] = {{250, 204, 21}, {96, 165, 250}, {240, 171, 252}, {74, 222, 128}};
+inline const QColor& of_model(std::size_t number) { return models[number % std::size(models)]; }
 }  // namespace ink
 
 /// Draws the detections. Line widths do not depend on zoom; `image_width` sets the radius of the fiducials'
