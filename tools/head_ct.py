@@ -28,12 +28,17 @@ def installed_file():
         sys.exit(f"dpkg: {error}; give the path of {FILE} with --head=PATH")
     for line in done.stdout.splitlines():
         if line.endswith(f"/{FILE}"):
+            if not pathlib.Path(line).exists():
+                sys.exit(f"{line} is missing: dpkg leaves out /usr/share/doc here (path-exclude in /etc/dpkg/dpkg.cfg.d); unpack the "
+                         f"package with dpkg-deb -x and give the path of {FILE} with --head=PATH")
             return pathlib.Path(line)
     sys.exit(f"{FILE} is not installed: apt-get install {PACKAGE} (Debian), or give its path with --head=PATH")
 
 
 def read_inv3(path):
     """Hounsfield units (S, P, L), and the voxel's size along L, P, S."""
+    if not tarfile.is_tarfile(path):
+        sys.exit(f"{path}: not a project of InVesalius (a gzipped tar)")
     with tarfile.open(path, "r:gz") as archive:
         members = {pathlib.PurePath(member.name).name: member for member in archive.getmembers() if member.isfile()}
         plan = plistlib.loads(archive.extractfile(members["main.plist"]).read())
@@ -66,6 +71,8 @@ class Head:
     """`hu`: the patient, without the CT's headrest, which is not in the operating room. `scanned`: what is registered."""
 
     def __init__(self, path=None):
+        if path and not pathlib.Path(path).is_file():
+            sys.exit(f"{path}: no such file")
         self.whole, self.voxel_mm = read_inv3(path or installed_file())
         middle = tuple(n // 2 for n in self.whole.shape)
         self.inside = connected(self.whole > SKIN_HU, middle)

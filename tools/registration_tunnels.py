@@ -169,8 +169,10 @@ def table_of(rows):
     codes = sorted({code for row in models for code in row["codes"]})
     seconds = [row["seconds"] for row in models if row.get("seconds") is not None]
     times = f"; seconds: median {np.median(seconds):.1f}, 95 % {np.percentile(seconds, 95):.1f}" if seconds else ""
+    unstated = any("predicted_tool_mm" not in row for row in rows if row["decision"] != "refuse" and row["by"] == "planned")
+    note = " -: registration.json states no covariance in the tool's frame." if unstated else ""
     return "\n".join(lines + ["", f"Registrations: {len(models)}; accepted {count('accept')}, warned {count('warn')}, refused "
-                                  f"{count('refuse')}; codes: {', '.join(codes) or 'none'}{times}."])
+                                  f"{count('refuse')}; codes: {', '.join(codes) or 'none'}{times}.{note}"])
 
 
 def main():
