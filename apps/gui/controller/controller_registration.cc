@@ -1,30 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Registration of a case's models, and moving one by hand.
-#include <mutex>
-
 #include "gui/controller/controller.h"
 #include "gui/controller/equipment.h"
 
 namespace helicarm::gui {
 
 using case_registration::CaseRegistration;
-
-std::function<void(const std::string& model, std::string_view step)> on_registration_step(
-    const std::atomic<bool>& stopped, std::function<void(const std::string& step)> tell) {
-  struct Told {
-    std::mutex mutex;
-    std::string step;
-  };
-  return [&stopped, tell = std::move(tell), told = std::make_shared<Told>()](const std::string& model,
-                                                                             std::string_view step) {
-    if (stopped) throw BadInput(Reason::interrupted, "cancelled");
-    std::string words = model.empty() ? std::string(step) : model + ": " + std::string(step);
-    const std::lock_guard lock(told->mutex);
-    if (words == told->step) return;
-    told->step = std::move(words);
-    tell(told->step);
-  };
-}
 
 Expected<CaseRegistration> register_models(Equipment& equipment, const std::vector<pipeline::Pick>& picks,
                                            const std::optional<NudgedModel>& from,
@@ -35,7 +16,12 @@ Expected<CaseRegistration> register_models(Equipment& equipment, const std::vect
     if (from) given.models.at(from->model).world_from_model = from->world_from_model;
     case_registration::RegisterOptions options;
     options.threads = equipment.options.threads;
-    options.on_step = on_registration_step(equipment.stopped, tell);
+    options.on_step = [&](const std::string& model, std::string_view step) {
+      tell(model + ": " + std::string(step));
+    };
+    options.interrupt = [&] {
+      if (equipment.stopped) throw BadInput(Reason::interrupted, "cancelled");
+    };
     return value_or_throw(case_registration::register_loaded(
         given, case_registration::views_of_calibration(given, *equipment.calibration), options));
   });

@@ -2,7 +2,6 @@
 #include <QCoreApplication>
 #include <QElapsedTimer>
 #include <QThread>
-#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -102,29 +101,6 @@ TEST_F(ControllerRegistration, CancelDuringTheSearchEndsIt) {
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().reason, Reason::interrupted);
   EXPECT_EQ(told.back(), "bone: search");
-}
-
-TEST(OnRegistrationStep, TellsEachStepOnceAndEndsWhatIsStopped) {
-  std::atomic<bool> stopped = false;
-  std::vector<std::string> told;
-  const auto step = on_registration_step(stopped, [&](const std::string& words) { told.push_back(words); });
-  step("", "read");
-  {
-    std::vector<std::jthread> threads;
-    for (int i = 0; i < 4; ++i)
-      threads.emplace_back([&] {
-        for (int k = 0; k < 1000; ++k) step("femur", "search");
-      });
-  }
-  step("femur", "errors");
-  EXPECT_EQ(told, (std::vector<std::string>{"read", "femur: search", "femur: errors"}));
-  stopped = true;
-  try {
-    step("femur", "search");
-    FAIL() << "not ended";
-  } catch (const BadInput& ended) {
-    EXPECT_EQ(ended.failure().reason, Reason::interrupted);
-  }
 }
 
 TEST(Steps, RegistrationIsOfCasesWithModels) {

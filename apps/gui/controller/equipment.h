@@ -47,11 +47,6 @@ Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipel
 
 inline constexpr std::size_t most_loose_images = 20;
 
-/// What a registration calls at its steps, from any thread and as often as it likes: ends it (interrupted)
-/// once `stopped`, and tells each step once.
-std::function<void(const std::string& model, std::string_view step)> on_registration_step(
-    const std::atomic<bool>& stopped, std::function<void(const std::string& step)> tell);
-
 /// Registers the case's models to its calibrated views. `from`: a model's start in place of the case's.
 /// `tell` is called with each step. Refuses interrupted once `equipment.stopped`.
 Expected<case_registration::CaseRegistration> register_models(

@@ -39,7 +39,7 @@ void mask_disc(image::Image<std::uint8_t>& usable, const Eigen::Vector2d& at, do
 
 constexpr double mask_margin_px = 3;
 
-/// Discs around dots of the plate (raw), fiducials and every other metal dot.
+/// Discs around the plate dots, fiducials and check targets.
 image::Image<std::uint8_t> usable_of(const pipeline::LabelledView& view,
                                      const phantom::Calibrator& calibrator, const geometry::View& camera) {
   const auto& pixels = view.xray_image->pixels;

@@ -23,6 +23,7 @@ struct RegisterOptions {
   unsigned threads = 0;
   double shift_mm = 15;  ///< searched about each start
   double turn_deg = 15;
+  std::function<void()> interrupt = {};  ///< as registration::SearchOptions
   /// Called with the model's name (empty: the views) and the step.
   std::function<void(const std::string& model, std::string_view step)> on_step = {};
 };

@@ -9,25 +9,13 @@ namespace {
 using geometry::json_list;
 using geometry::json_rows;
 
-Json optional_list(const std::optional<Eigen::Vector3d>& point) { return point ? json_list(*point) : Json(); }
-
 Json json_of(const RegisteredPoint& point) {
-  const guidance::PointInFrames& place = point.place;
-  return {{"name", point.name},
-          {"xyz_mm", json_list(place.in_calibrator)},
-          {"covariance_mm2", json_rows(place.covariance_in_calibrator)},
-          {"error_95_mm", localization::length_at_95(place.covariance_in_calibrator)},
-          {"in_femur", optional_list(place.in_femur)},
-          {"in_tibia", optional_list(place.in_tibia)},
-          {"in_tool", optional_list(place.in_tool)}};
-}
-
-Json json_of(const guidance::Tunnel& tunnel) {
-  return {{"name", tunnel.name},
-          {"start_in_tool", optional_list(tunnel.start_in_tool)},
-          {"end_in_tool", optional_list(tunnel.end_in_tool)},
-          {"axis_in_tool", optional_list(tunnel.axis_in_tool)},
-          {"length_mm", tunnel.length_mm ? Json(*tunnel.length_mm) : Json()}};
+  Json json = {{"name", point.name},
+               {"xyz_mm", json_list(point.place.in_calibrator)},
+               {"covariance_mm2", json_rows(point.place.covariance_in_calibrator)},
+               {"error_95_mm", localization::length_at_95(point.place.covariance_in_calibrator)}};
+  json.update(pipeline::in_frames(&point.place));
+  return json;
 }
 
 Json json_of(const registration::RegisteredView& view) {
@@ -79,7 +67,7 @@ Json json_of(const RegisteredModel& model) {
   for (const char* list : {"views", "points", "tunnels"}) json[list] = Json::array();
   for (const auto& view : r.views) json["views"].push_back(json_of(view));
   for (const RegisteredPoint& point : model.points) json["points"].push_back(json_of(point));
-  for (const guidance::Tunnel& tunnel : model.tunnels) json["tunnels"].push_back(json_of(tunnel));
+  for (const guidance::Tunnel& tunnel : model.tunnels) json["tunnels"].push_back(pipeline::to_json(tunnel));
   json["seconds"] = r.seconds;
   return json;
 }

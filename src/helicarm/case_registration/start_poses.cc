@@ -112,7 +112,7 @@ registration::RegistrationOptions search_options(const RegisterOptions& options,
   how.max_error_mm = options.max_error_mm;
   how.threads = options.threads;
   how.camera_covariance = loaded.camera_covariance;
-  how.search = {options.shift_mm, options.turn_deg, starts > 1 ? 150 * int(starts) : 600};
+  how.search = {options.shift_mm, options.turn_deg, starts > 1 ? 150 * int(starts) : 600, options.interrupt};
   return how;
 }
 

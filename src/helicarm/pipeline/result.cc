@@ -156,12 +156,7 @@ Json json_of(const PointResult& point, const std::vector<ViewResult>& views) {
   json["message"] = point.reason ? Json(point.reason->message) : Json(nullptr);
   json["warnings"] = json_list_of(point.warnings);
   json["notes"] = json_list_of(point.notes);
-  json["in_femur"] = place ? optional_vector(place->in_femur) : Json(nullptr);
-  json["in_tibia"] = place ? optional_vector(place->in_tibia) : Json(nullptr);
-  json["in_tool"] = place ? optional_vector(place->in_tool) : Json(nullptr);
-  json["covariance_in_femur_mm2"] = place ? optional_matrix(place->covariance_in_femur) : Json(nullptr);
-  json["covariance_in_tibia_mm2"] = place ? optional_matrix(place->covariance_in_tibia) : Json(nullptr);
-  json["covariance_in_tool_mm2"] = place ? optional_matrix(place->covariance_in_tool) : Json(nullptr);
+  json.update(in_frames(place ? &*place : nullptr));
   return json;
 }
 
@@ -182,17 +177,6 @@ Json json_of(const localization::Accuracy& accuracy) {
                                {"predicted_mm", target.predicted_mm},
                                {"predicted_95_mm", target.predicted_95_mm}});
   return json;
-}
-
-Json json_of(const guidance::Tunnel& tunnel) {
-  return {{"name", tunnel.name},
-          {"start_in_tool", optional_vector(tunnel.start_in_tool)},
-          {"end_in_tool", optional_vector(tunnel.end_in_tool)},
-          {"axis_in_tool", optional_vector(tunnel.axis_in_tool)},
-          {"length_mm", optional_number(tunnel.length_mm)},
-          {"length_sigma_mm", optional_number(tunnel.length_sigma_mm)},
-          {"axis_sigma_deg", optional_number(tunnel.axis_sigma_deg())},
-          {"axis_covariance", optional_matrix(tunnel.axis_covariance)}};
 }
 
 Json json_of(const verification::Verification& verification, const std::vector<ViewResult>& views) {
@@ -239,6 +223,29 @@ Json list_of(const std::vector<T>& items, const More&... more) {
 }
 
 }  // namespace
+
+Json to_json(const guidance::Tunnel& tunnel) {
+  return {{"name", tunnel.name},
+          {"start_in_tool", optional_vector(tunnel.start_in_tool)},
+          {"end_in_tool", optional_vector(tunnel.end_in_tool)},
+          {"axis_in_tool", optional_vector(tunnel.axis_in_tool)},
+          {"length_mm", optional_number(tunnel.length_mm)},
+          {"length_sigma_mm", optional_number(tunnel.length_sigma_mm)},
+          {"axis_sigma_deg", optional_number(tunnel.axis_sigma_deg())},
+          {"axis_covariance", optional_matrix(tunnel.axis_covariance)}};
+}
+
+Json in_frames(const guidance::PointInFrames* place) {
+  const auto at = [&](auto member) { return place ? optional_vector(place->*member) : Json(); };
+  const auto spread = [&](auto member) { return place ? optional_matrix(place->*member) : Json(); };
+  using Place = guidance::PointInFrames;
+  return {{"in_femur", at(&Place::in_femur)},
+          {"in_tibia", at(&Place::in_tibia)},
+          {"in_tool", at(&Place::in_tool)},
+          {"covariance_in_femur_mm2", spread(&Place::covariance_in_femur)},
+          {"covariance_in_tibia_mm2", spread(&Place::covariance_in_tibia)},
+          {"covariance_in_tool_mm2", spread(&Place::covariance_in_tool)}};
+}
 
 Json to_json(const Failure& failure) {
   Json figures = Json::object();
@@ -295,7 +302,8 @@ Json to_json(const Result& result) {
   json["machine"] = json_of(result.history);
   json["points"] = list_of(result.points, result.views);
   json["accuracy"] = json_of(result.accuracy);
-  json["tunnels"] = list_of(result.tunnels);
+  json["tunnels"] = Json::array();
+  for (const guidance::Tunnel& tunnel : result.tunnels) json["tunnels"].push_back(to_json(tunnel));
   json["verification"] = list_of(result.verifications, result.views);
   json["timing_ms"] = json_of(result.timing_ms);
   json["version"] = HELICARM_VERSION;

@@ -114,6 +114,12 @@ Json to_json(const Result& result);
 /// As in result.json: code, message, view and figures.
 Json to_json(const Failure& failure);
 
+/// As in result.json's "tunnels".
+Json to_json(const guidance::Tunnel& tunnel);
+
+/// As in result.json's "points": coordinates and covariances in bones and tool, null where not known.
+Json in_frames(const guidance::PointInFrames* place);
+
 /// A list of them.
 Json json_list_of(std::span<const Failure> failures);
 

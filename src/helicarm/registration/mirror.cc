@@ -97,7 +97,7 @@ std::optional<double> mirrored_cost_ratio(const Scene& scene, const Estimate& so
   std::vector<SearchStage> fewer = stages;
   for (SearchStage& stage : fewer) stage.keep = std::min(stage.keep, 6);
   fewer.back().keep = 1;
-  const SearchOptions less{options.shift_mm / 3, options.turn_deg / 2, 150};
+  const SearchOptions less{options.shift_mm / 3, options.turn_deg / 2, 150, options.interrupt};
   const Estimate found =
       search(other, fewer, mirrored_starts(scene.model(), solution.pose), less, same_mm).solutions.front();
   if (const auto& surface = scene.model().surface)

@@ -161,6 +161,7 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
                             const std::vector<RigidTransform>& starts, const RegistrationOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
   const auto step = [&](std::string_view name) {
+    if (options.search.interrupt) options.search.interrupt();
     if (options.on_step) options.on_step(name);
   };
   step("prepare");

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/registration/register_model.h"
 
+#include <atomic>
+#include <stdexcept>
+
 #include <gmock/gmock.h>
 
 #include "helicarm/registration/covariance.h"
@@ -54,6 +57,23 @@ TEST(RegisterModel, AgreementOfEachPatchIsInTheResult) {
     }
     EXPECT_NEAR(nearest, 1, 1e-6);
     EXPECT_NEAR(score, view.score, 1e-9);
+  }
+}
+
+TEST(RegisterModel, IsInterruptedWithinTheSearch) {
+  const auto volume = lopsided_bone();
+  const Model model = model_of(volume);
+  for (const unsigned threads : {1U, 3U}) {
+    RegistrationOptions options = quick();
+    options.threads = threads;
+    std::atomic<int> calls = 0, steps = 0;
+    options.search.interrupt = [&] {
+      if (++calls >= 20) throw std::runtime_error("stop");
+    };
+    options.on_step = [&](std::string_view) { ++steps; };
+    EXPECT_THROW(register_model(model, two_views(volume), {start_near(model, true_pose())}, options),
+                 std::runtime_error);
+    EXPECT_EQ(steps, 2) << "in the search, the second step";
   }
 }
 

@@ -74,6 +74,7 @@ std::vector<Descent> first_poses(const Scene& scene, const SearchStage& stage,
   const auto candidates = candidates_about(scene.model(), starts, options);
   std::vector<double> scores(candidates.size());
   parallel_for(candidates.size(), scene.threads(), [&](std::size_t i) {
+    if (options.interrupt) options.interrupt();
     scores[i] = scene.observe(stage.level, candidates[i], false, 1).score();
   });
   for (const std::size_t i : best_of(scene.model(), candidates, scores, stage.keep, stage.level.spacing_mm))
@@ -82,10 +83,11 @@ std::vector<Descent> first_poses(const Scene& scene, const SearchStage& stage,
 }
 
 std::vector<Estimate> refined(const Scene& scene, const Level& level, const std::vector<Descent>& from,
-                              double converged) {
+                              double converged, const SearchOptions& options) {
   std::vector<Estimate> estimates(from.size());
   const bool few = from.size() < 2 * std::size_t{std::max(1U, scene.threads())};
   parallel_for(from.size(), few ? 1 : scene.threads(), [&](std::size_t i) {
+    if (options.interrupt) options.interrupt();
     estimates[i] = refine(scene, level, from[i].pose,
                           {.iterations = 15, .converged = converged, .threads = few ? scene.threads() : 1});
   });
@@ -106,7 +108,7 @@ SearchResult search(Scene& scene, const std::vector<SearchStage>& stages,
     // Coarse levels can lead away from a good start.
     if (&stage != &stages.front() && !last && starts.size() <= most_given && options.candidates > 0)
       for (std::size_t i = 0; i < starts.size(); ++i) descents.push_back({starts[i], {i}});
-    auto estimates = refined(scene, stage.level, descents, last ? 0.002 : 0.02);
+    auto estimates = refined(scene, stage.level, descents, last ? 0.002 : 0.02, options);
     std::vector<RigidTransform> reached;
     std::vector<double> scores;
     for (const Estimate& estimate : estimates)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -18,7 +19,8 @@ struct SearchStage {
 struct SearchOptions {
   double shift_mm = 15;  ///< per axis, about each start
   double turn_deg = 15;
-  int candidates = 600;  ///< scored at the first level; 0: the starts alone are refined
+  int candidates = 600;                  ///< scored at the first level; 0: the starts alone are refined
+  std::function<void()> interrupt = {};  ///< called often, from any thread: its exception ends the search
 };
 
 struct SearchResult {
