@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 namespace helicarm::registration {
 namespace {
 
@@ -32,22 +30,21 @@ Model mirrored(const Model& model) {
   return mirror;
 }
 
-/// Poses of the mirrored model that put it where the model is, its mirror plane across each principal axis.
+/// Poses of the mirrored model that put it where the model is, its mirror plane turned every way: normals on
+/// a spiral over half a sphere, about 10 degrees apart. Principal axes would not do: two of a condyle's are
+/// alike.
 std::vector<RigidTransform> mirrored_starts(const Model& model, const RigidTransform& pose) {
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const Vector3d& point : model.samples)
-    spread += (point - model.centre) * (point - model.centre).transpose();
-  const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+  constexpr int count = 200;
+  const double golden_angle = EIGEN_PI * (3 - std::sqrt(5.0));
+  const Eigen::Matrix3d across_x = Vector3d(-1, 1, 1).asDiagonal();
   std::vector<RigidTransform> starts;
-  for (int axis = 0; axis < 3; ++axis) {
-    // A reflection across n is the one across x followed by a rotation.
-    Eigen::Matrix3d across_x = Eigen::Matrix3d::Identity();
-    across_x(0, 0) = -1;
-    const Eigen::Matrix3d across =
-        Eigen::Matrix3d::Identity() - 2 * axes.col(axis) * axes.col(axis).transpose();
+  for (int i = 0; i < count; ++i) {
+    const double z = (i + 0.5) / count, radius = std::sqrt(1 - z * z);
+    const Vector3d normal(radius * std::cos(golden_angle * i), radius * std::sin(golden_angle * i), z);
+    // A reflection across the normal is the one across x followed by a rotation.
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - 2 * normal * normal.transpose();
     const Eigen::Matrix3d turn = across * across_x;
-    const RigidTransform turned{turn, model.centre - turn * model.centre};
-    starts.push_back(pose * turned);
+    starts.push_back(pose * RigidTransform{turn, model.centre - turn * model.centre});
   }
   return starts;
 }
@@ -95,9 +92,9 @@ std::optional<double> mirrored_cost_ratio(const Scene& scene, const Estimate& so
   const Model mirror = mirrored(scene.model());
   Scene other(scene, mirror);
   std::vector<SearchStage> fewer = stages;
-  for (SearchStage& stage : fewer) stage.keep = std::min(stage.keep, 6);
+  for (SearchStage& stage : fewer) stage.keep = std::min(stage.keep, 16);
   fewer.back().keep = 1;
-  const SearchOptions less{options.shift_mm / 3, options.turn_deg / 2, 150, options.interrupt};
+  const SearchOptions less{options.shift_mm / 3, options.turn_deg / 2, 600, options.interrupt};
   const Estimate found =
       search(other, fewer, mirrored_starts(scene.model(), solution.pose), less, same_mm).solutions.front();
   if (const auto& surface = scene.model().surface)
