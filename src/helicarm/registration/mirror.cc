@@ -10,8 +10,8 @@ namespace {
 using Eigen::Vector3d;
 using geometry::RigidTransform;
 
-constexpr double same_shape_mm =
-    0.4;  // of a surface and its mirror image: about what edges in images resolve
+// Between a surface and its mirror image: about what edges in images resolve.
+constexpr double same_shape_mm = 0.4;
 
 /// The model as its mirror image, in the plane through its centre across the world-fixed model axis x.
 Model mirrored(const Model& model) {
