@@ -23,6 +23,7 @@ Density coarser(const Density& density, double voxel_mm) {
     coarse.size[axis] = (density.size[axis] + factor[axis] - 1) / factor[axis] + 2;
   const Vector3d scale = factor.cast<double>();
   const Vector3d first = 0.5 * (scale - Vector3d::Ones()) - scale;
+  coarse.hardening = density.hardening;
   coarse.model_from_voxel = density.model_from_voxel * Eigen::Translation3d(first) * Eigen::Scaling(scale);
   coarse.values.assign(static_cast<std::size_t>(coarse.size.x()) * static_cast<std::size_t>(coarse.size.y()) *
                            static_cast<std::size_t>(coarse.size.z()),
@@ -35,6 +36,24 @@ Density coarser(const Density& density, double voxel_mm) {
   const auto share = static_cast<float>(1 / scale.prod());
   for (float& value : coarse.values) value *= share;
   return coarse;
+}
+
+void mark_blocks(Density& density) {
+  constexpr int side = Density::block;
+  const Vector3i count = density.blocks();
+  density.occupied.assign(std::size_t(count.prod()), 0);
+  const auto mark = [&](int x, int y, int z) {
+    density.occupied[std::size_t(x + count.x() * (y + count.y() * z))] = 1;
+  };
+  for (int z = 0; z < density.size.z(); ++z)
+    for (int y = 0; y < density.size.y(); ++y)
+      for (int x = 0; x < density.size.x(); ++x) {
+        if (density.values[density.index(x, y, z)] == 0) continue;
+        // A voxel counts in the cell before it, too: cells lie between voxels.
+        for (const int c : {z / side, std::max(0, z - 1) / side})
+          for (const int b : {y / side, std::max(0, y - 1) / side})
+            for (const int a : {x / side, std::max(0, x - 1) / side}) mark(a, b, c);
+      }
 }
 
 /// A ray's main axis k, the grid planes that it crosses within the grid, and its place in them.
@@ -146,28 +165,61 @@ bool PosedDensity::bundle(const std::array<Vector3d, 8>& directions, Bundle& mad
     made.first = std::min(made.first, path.first);
     made.last = std::max(made.last, path.last);
   }
+  std::size_t some = 0;  // a ray that crosses stands in for those that do not
+  while (some + 1 < Bundle::rays && made.low[some] > made.high[some]) ++some;
   for (std::size_t i = 0; i < Bundle::rays; ++i) {
-    const Path& path = made.paths[i];
-    const bool crosses = made.low[i] <= made.high[i];
-    made.per_p[i] = crosses ? float(path.per_p) : 0;
-    made.per_q[i] = crosses ? float(path.per_q) : 0;
-    made.p0[i] = crosses ? float(path.at_p + path.per_p * made.first) : 0;
-    made.q0[i] = crosses ? float(path.at_q + path.per_q * made.first) : 0;
+    const Path& path = made.paths[made.low[i] <= made.high[i] ? i : some];
+    made.per_p[i] = float(path.per_p);
+    made.per_q[i] = float(path.per_q);
+    made.p0[i] = float(path.at_p + path.per_p * made.first);
+    made.q0[i] = float(path.at_q + path.per_q * made.first);
   }
   return true;
 }
 
 namespace {
 
+/// Whether the blocks that eight rays touch between two planes of one block are empty.
+template <class Bundle>
+bool is_empty(const Density& density, const Bundle& bundle, int from, int to) {
+  constexpr int side = Density::block;
+  if (density.occupied.empty()) return false;
+  float low_p = 1e9F, high_p = -1e9F, low_q = 1e9F, high_q = -1e9F;
+  for (const auto along : {float(from - bundle.first), float(to - bundle.first)})
+    for (std::size_t i = 0; i < Bundle::rays; ++i) {
+      const float p = bundle.p0[i] + bundle.per_p[i] * along, q = bundle.q0[i] + bundle.per_q[i] * along;
+      low_p = std::min(low_p, p), high_p = std::max(high_p, p);
+      low_q = std::min(low_q, q), high_q = std::max(high_q, q);
+    }
+  const Vector3i count = density.blocks();
+  const int strides[3] = {1, count.x(), count.x() * count.y()};
+  const int p_axis = bundle.k == 0 ? 1 : 0, q_axis = 3 - bundle.k - p_axis;
+  const auto block = [](float at, int blocks) { return std::min(std::max(int(at), 0) / side, blocks - 1); };
+  const char* const slab = density.occupied.data() + from / side * strides[bundle.k];
+  const int end_p = block(high_p, count[p_axis]), end_q = block(high_q, count[q_axis]);
+  for (int q = block(low_q, count[q_axis]); q <= end_q; ++q)
+    for (int p = block(low_p, count[p_axis]); p <= end_p; ++p)
+      if (slab[p * strides[p_axis] + q * strides[q_axis]] != 0) return false;
+  return true;
+}
+
 /// Calls `take(ray, plane's number, v00, v10, v01, v11, fraction along p, along q, 1 within the grid or 0)`
-/// for eight rays at every plane.
+/// for eight rays at every plane that is not empty.
 template <class Bundle, class Take>
 void for_bundle(const Density& density, const Bundle& bundle, const Take& take) {
   const int strides[3] = {1, density.size.x(), density.size.x() * density.size.y()};
   const int p_axis = bundle.k == 0 ? 1 : 0, q_axis = 3 - bundle.k - p_axis;
   const int step_p = strides[p_axis], step_q = strides[q_axis];
   const int last_p = density.size[p_axis] - 2, last_q = density.size[q_axis] - 2;
+  int checked = bundle.first - 1;  // planes up to here are known to hold something
   for (int plane = bundle.first; plane <= bundle.last; ++plane) {
+    if (plane > checked) {
+      checked = std::min(bundle.last, plane | (Density::block - 1));
+      if (is_empty(density, bundle, plane, checked)) {
+        plane = checked;
+        continue;
+      }
+    }
     const float* slab = density.values.data() + std::ptrdiff_t{plane} * strides[bundle.k];
     const auto along = float(plane - bundle.first), at = float(plane);
 #pragma GCC ivdep

@@ -16,7 +16,13 @@ struct Density {
   Eigen::Vector3i size = Eigen::Vector3i::Zero();
   std::vector<float> values;  ///< x runs fastest
   Eigen::Affine3d model_from_voxel = Eigen::Affine3d::Identity();
+  /// Beam hardening: a line integral d attenuates by (1 - exp(-hardening d)) / hardening; 0: by d.
+  float hardening = 0;
+  /// Whether cubes of `block` voxels hold anything; empty: unknown. `mark_blocks` makes them.
+  std::vector<char> occupied = {};
+  static constexpr int block = 8;
 
+  Eigen::Vector3i blocks() const { return (size.array() + block - 1) / block; }
   std::size_t index(int x, int y, int z) const {
     return static_cast<std::size_t>(x) +
            static_cast<std::size_t>(size.x()) *
@@ -24,6 +30,9 @@ struct Density {
                 static_cast<std::size_t>(size.y()) * static_cast<std::size_t>(z));
   }
 };
+
+/// Notes which cubes are empty: rays pass over them.
+void mark_blocks(Density& density);
 
 /// Means over blocks, so that voxels are at least about `voxel_mm` along each axis.
 Density coarser(const Density& density, double voxel_mm);

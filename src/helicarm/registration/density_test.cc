@@ -10,6 +10,7 @@ namespace helicarm::registration {
 namespace {
 
 using Eigen::Vector3d;
+using Eigen::Vector3i;
 
 /// A lopsided smooth body on an anisotropic, oblique grid.
 Density smooth_body() {
@@ -88,6 +89,33 @@ TEST(EightRays, EqualSingleOnes) {
           << i;
     }
   }
+}
+
+TEST(EightRays, SeeTheSameWithEmptyBlocksMarked) {
+  Density density = smooth_body();
+  density.size = {64, 70, 60};
+  density.values.assign(64 * 70 * 60, 0);
+  for (const Vector3i& speck :
+       {Vector3i(8, 8, 8), Vector3i(7, 40, 31), Vector3i(33, 16, 55), Vector3i(20, 63, 24)})
+    density.values[density.index(speck.x(), speck.y(), speck.z())] = 1;
+  Density marked = density;
+  mark_blocks(marked);
+  const geometry::RigidTransform pose{geometry::rotation_from_vector(Vector3d(0.3, 0.1, -0.2)), {2, -1, 3}};
+  int hits = 0;
+  for (const Vector3d& source : {Vector3d(300, 20, 10), Vector3d(5, -280, 30), Vector3d(20, 30, 320)})
+    for (const Vector3i& speck :
+         {Vector3i(8, 8, 8), Vector3i(7, 40, 31), Vector3i(33, 16, 55), Vector3i(20, 63, 24)}) {
+      const Vector3d aim = pose * (density.model_from_voxel * speck.cast<double>());
+      std::array<Vector3d, 8> directions;
+      for (int i = 0; i < 8; ++i)
+        directions[std::size_t(i)] = (aim + Vector3d(i - 3.5, 3.5 - i, 0.8 * i - 3) - source).normalized();
+      std::array<float, 8> all, some;
+      PosedDensity(density, pose, source, Vector3d::Zero()).integrate_eight(directions, all);
+      PosedDensity(marked, pose, source, Vector3d::Zero()).integrate_eight(directions, some);
+      EXPECT_EQ(all, some);
+      for (const float value : all) hits += value > 0;
+    }
+  EXPECT_GT(hits, 12);
 }
 
 INSTANTIATE_TEST_SUITE_P(AlongEachAxis, RayDerivatives,

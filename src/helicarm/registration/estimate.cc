@@ -66,7 +66,10 @@ void Scene::prepare(const Level& level, const Vector3d& near) {
     const double factor = level.spacing_mm / pixel_mm_of((*views_)[i].view, near);
     made.rasters.push_back(coarser(full_[i], std::clamp(static_cast<int>(std::lround(factor)), 1, 64)));
   }
-  if (!level.contour) made.density = coarser(model_->density, level.spacing_mm);
+  if (!level.contour) {
+    made.density = coarser(model_->density, level.spacing_mm);
+    mark_blocks(made.density);
+  }
   levels_.emplace(std::pair(level.contour, level.spacing_mm), std::move(made));
 }
 

@@ -2,6 +2,7 @@
 #include "helicarm/registration/model.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/LU>
@@ -16,6 +17,9 @@ using Eigen::Vector3i;
 
 constexpr double soft_tissue_hu = 50;
 constexpr float air_hu = -800;
+// Of bone, per 1000 HU mm: its effective attenuation falls to 0.8 behind 30 mm of 1000 HU (75 kV, 2.5 mm Al
+// and 12 cm of water; mass attenuation of Hubbell and Seltzer 2004).
+constexpr float bone_hardening = 0.006F;
 constexpr std::size_t sample_count = 60;
 
 /// Density of a voxel, 1 per 1000 HU.
@@ -24,6 +28,28 @@ float density_of(float hu, bool inside, const std::optional<HuWindow>& window, b
   if (!inside || (window && static_cast<double>(hu) < window->low)) return 0;
   const double value = window ? std::min(static_cast<double>(hu), window->high) : static_cast<double>(hu);
   return static_cast<float>((value - soft_tissue_hu) / 1000);
+}
+
+/// Adds what the voxels on the body's boundary hold of it (partial volume): those outside beside a denser one
+/// inside. Without them the body would be thinner, and a single view would take it for nearer to the source.
+void add_boundary(Density& density, const std::vector<float>& hu) {
+  const std::vector<float> body = density.values;
+  const std::array<std::ptrdiff_t, 3> strides = {1, density.size.x(),
+                                                 std::ptrdiff_t{density.size.x()} * density.size.y()};
+  for (int z = 0; z < density.size.z(); ++z)
+    for (int y = 0; y < density.size.y(); ++y)
+      for (int x = 0; x < density.size.x(); ++x) {
+        const std::size_t i = density.index(x, y, z);
+        if (body[i] != 0 || hu[i] <= soft_tissue_hu) continue;
+        const Vector3i at(x, y, z);
+        for (int axis = 0; axis < 3 && density.values[i] == 0; ++axis)
+          for (const int way : {-1, 1}) {
+            if (at[axis] + way < 0 || at[axis] + way >= density.size[axis]) continue;
+            const std::size_t beside = i + std::size_t(way * strides[std::size_t(axis)]);
+            if (body[beside] != 0 && hu[beside] > hu[i])
+              density.values[i] = static_cast<float>((hu[i] - soft_tissue_hu) / 1000);
+          }
+      }
 }
 
 struct Bounds {
@@ -46,6 +72,7 @@ std::optional<Bounds> bounds_of(const Density& density) {
 /// The part within the bounds with a margin of zeros.
 Density cropped(const Density& density, const Bounds& bounds) {
   Density part;
+  part.hardening = density.hardening;
   part.size = bounds.high - bounds.low + Vector3i::Constant(3);
   part.model_from_voxel =
       density.model_from_voxel * Eigen::Translation3d((bounds.low - Vector3i::Ones()).cast<double>());
@@ -145,6 +172,10 @@ Expected<Model> model_from(const std::string& name, const volume::Volume& volume
   Density whole{volume.size, volume.voxels, volume.patient_from_voxel};
   for (std::size_t i = 0; i < whole.values.size(); ++i)
     whole.values[i] = density_of(volume.voxels[i], !mask || mask->voxels[i] != 0, window, mask || window);
+  if (mask || window) {
+    add_boundary(whole, volume.voxels);
+    whole.hardening = bone_hardening;
+  }
   const auto bounds = bounds_of(whole);
   if (!bounds)
     return fail(Reason::bad_value, fmt::format("{}: no voxel is within the mask and window", name));

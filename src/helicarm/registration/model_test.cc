@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/registration/model.h"
 
+#include <algorithm>
+
 #include <gmock/gmock.h>
 
 namespace helicarm::registration {
@@ -51,6 +53,29 @@ TEST(ModelFrom, MaskOfAnotherGridIsRefused) {
 
 TEST(ModelFrom, AnEmptyWindowIsRefused) {
   EXPECT_FALSE(model_from("block", block({1, 1, 1}), std::nullopt, HuWindow{2000, 3000}));
+}
+
+TEST(ModelFrom, VoxelsOnTheBoundaryKeepTheirShare) {
+  volume::Volume volume = block({1, 1, 1});
+  const auto at = [](int x) { return std::size_t(x + 20 * (10 + 16 * 3)); };
+  ASSERT_EQ(volume.voxels[at(9)], 900);
+  volume.voxels[at(10)] = 120;  // a seventh of the voxel is bone
+  volume.voxels[at(11)] = 120;  // beside no bone
+  double mass = 0, least = 1;
+  const auto model = model_from("block", volume, std::nullopt, HuWindow{150, 3000});
+  for (const float value : model->density.values) {
+    mass += value;
+    if (value > 0) least = std::min(least, double(value));
+  }
+  EXPECT_NEAR(least, 0.07, 1e-6);
+  const auto voxels = std::ranges::count(volume.voxels, 900.0F);
+  EXPECT_NEAR(mass, 0.85 * double(voxels) + 0.07, 1e-3);
+}
+
+TEST(ModelFrom, OnlyBoneHardensTheBeam) {
+  const volume::Volume volume = block({1, 1, 1});
+  EXPECT_GT(model_from("block", volume, std::nullopt, HuWindow{150, 3000})->density.hardening, 0);
+  EXPECT_EQ(model_from("block", volume, std::nullopt, std::nullopt)->density.hardening, 0);
 }
 
 TEST(ModelFrom, ABodyThatReachesTheEdgeHasCuts) {

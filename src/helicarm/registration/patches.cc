@@ -87,6 +87,7 @@ class Comparer {
            const geometry::RigidTransform& world_from_model, const Vector3d& centre,
            const PatchOptions& options)
       : raster_(raster),
+        hardening_(density.hardening),
         posed_(density, world_from_model, view.source_in_world(), centre),
         world_from_pixel_(view.camera_from_world.rotation.transpose() * view.intrinsics.matrix().inverse()),
         options_(options) {}
@@ -101,6 +102,7 @@ class Comparer {
       posed_.integrate_eight(directions, values);
       for (int k = 0; k < count; ++k) pixels[first + k] = values[std::size_t(k)];
     });
+    if (hardening_ > 0) pixels = (1 - (-hardening_ * pixels.array()).exp()) / hardening_;
     patch.drr = differences(pixels, {}, side);
     patch.contrast = patch.drr.norm();
     patch.shown = shown(u, v);
@@ -139,7 +141,10 @@ class Comparer {
     std::array<RayIntegral, 8> rays;
     for_eights(patch.u, patch.v, [&](const std::array<Vector3d, 8>& directions, int first, int count) {
       posed_.differentiate_eight(directions, rays);
-      for (int k = 0; k < count; ++k) pixels.row(first + k) = rays[std::size_t(k)].by_motion.transpose();
+      for (int k = 0; k < count; ++k) {
+        const RayIntegral& ray = rays[std::size_t(k)];
+        pixels.row(first + k) = slope(ray.value) * ray.by_motion.transpose();
+      }
     });
     Eigen::Matrix<float, Eigen::Dynamic, affine_parameters> jacobian(patch.drr.size(), affine_parameters);
     for (int k = 0; k < affine_parameters; ++k)
@@ -204,7 +209,11 @@ class Comparer {
     return (world_from_pixel_ * pixel.homogeneous()).normalized();
   }
 
+  /// d attenuation / d line integral.
+  float slope(float integral) const { return std::exp(-hardening_ * integral); }
+
   const Raster& raster_;
+  float hardening_;
   PosedDensity posed_;
   Eigen::Matrix3d world_from_pixel_;
   const PatchOptions& options_;
