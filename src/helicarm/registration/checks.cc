@@ -17,6 +17,8 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
 constexpr double strain_prior = 0.05;
+constexpr double no_strain = 1e-6;
+constexpr int xx = 0, xy = 3, xz = 4;  // of a strain
 constexpr double least_patch_score = 0.4;
 constexpr double least_contour_score = 0.6;
 constexpr double least_mirrored_ratio = 1.02;  // of a nearly symmetric bone 1.05 to 1.1
@@ -73,29 +75,35 @@ Disagreement disagreement_of(const std::vector<RegistrationView>& views, const V
   return result;
 }
 
-Deformation deformation_of(const Observation& observation, const std::vector<double>& correlation_px,
-                           double floor) {
-  MatrixXd map(affine_parameters, 12);
-  map << affine_from_rigid(), affine_from_strain(Eigen::Matrix3d::Identity());
-  const Linearised plain =
-      linearised(observation, {}, affine_from_rigid(), MatrixXd::Zero(6, 6), correlation_px);
+Deformation deformation_of(const Observation& observation, const ErrorModel& errors, const Vector3d& centre) {
+  const Linearised plain = linearised(observation, {}, errors.correlation_px);
   const double unit = geometry::solve_spd(plain.information, plain.meat).solution.trace() / 6;
-  MatrixXd prior = MatrixXd::Zero(12, 12);
-  prior.bottomRightCorner<6, 6>().diagonal().setConstant(unit / (strain_prior * strain_prior));
-  const Linearised both = linearised(observation, {}, map, prior, correlation_px);
+  Problem problem{{}, MatrixXd(affine_parameters, 12), MatrixXd::Zero(12, 12)};
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  problem.prior.bottomRightCorner<6, 6>().diagonal().setConstant(unit / (strain_prior * strain_prior));
+  if (errors.views.size() == 1) {
+    const Vector3d ray = centre - errors.views.front().view.source_in_world();
+    axes = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitX(), ray).toRotationMatrix();
+    for (const int along_ray : {xx, xy, xz})
+      problem.prior(6 + along_ray, 6 + along_ray) = unit / (no_strain * no_strain);
+  }
+  problem.map << affine_from_rigid(), affine_from_strain(axes);
+  const Linearised both = linearised(observation, problem, errors.correlation_px);
   const Eigen::VectorXd step = geometry::solve_spd(both.information, both.gradient).solution;
   Eigen::Matrix3d strain;
   const auto e = step.tail<6>();
   strain << e[0], e[3] / 2, e[4] / 2, e[3] / 2, e[1], e[5] / 2, e[4] / 2, e[5] / 2, e[2];
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(strain);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(strain);
   Eigen::Index largest = 0;
-  axes.eigenvalues().cwiseAbs().maxCoeff(&largest);
-  const Vector3d a = axes.eigenvectors().col(largest);
+  principal.eigenvalues().cwiseAbs().maxCoeff(&largest);
+  const Vector3d a = principal.eigenvectors().col(largest);
   Eigen::Matrix<double, 6, 1> along;
   along << a[0] * a[0], a[1] * a[1], a[2] * a[2], a[0] * a[1], a[0] * a[2], a[1] * a[2];
-  const MatrixXd covariance = both.covariance();
+  const MatrixXd covariance = errors.covariance(observation, centre, problem, both);
+  // A shift common to a view's edges is no strain; one of some of them is.
+  const double floor = errors.edge.shift_mm / errors.radius_mm;
   return {
-      axes.eigenvalues()[largest],
+      principal.eigenvalues()[largest],
       std::hypot(std::sqrt(std::max(0.0, along.dot(covariance.bottomRightCorner<6, 6>() * along))), floor)};
 }
 

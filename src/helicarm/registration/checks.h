@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "helicarm/registration/covariance.h"
 #include "helicarm/registration/register_model.h"
 
 namespace helicarm::registration {
@@ -19,9 +20,10 @@ Disagreement disagreement_of(const std::vector<RegistrationView>& views, const E
                              const std::vector<OwnSolution>& own);
 
 /// The strain that would lower the residuals most, from one Gauss-Newton step of pose and strain under a
-/// prior of 5 %. `floor`: what the model's edges alone allow.
-Deformation deformation_of(const Observation& observation, const std::vector<double>& correlation_px,
-                           double floor);
+/// prior of 5 %; of a single view only across its ray, along which it sees almost no size. Its sigma holds
+/// what the cameras and the model's edges allow.
+Deformation deformation_of(const Observation& observation, const ErrorModel& errors,
+                           const Eigen::Vector3d& centre);
 
 /// Sets decision, failure, warnings and notes from the figures.
 void decide(const Model& model, const std::vector<geometry::RigidTransform>& starts,

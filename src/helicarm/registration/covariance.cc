@@ -53,18 +53,29 @@ Eigen::Matrix<double, affine_parameters, 1> growth() {
   return affine_from_strain(Eigen::Matrix3d::Identity()).leftCols<3>().rowwise().sum();
 }
 
-/// The response of the pose to motions that only one view shows.
-MatrixXd response(const Observation& observation, std::size_t view, const MatrixXd& motions,
-                  const Part& part) {
-  const auto map = affine_from_rigid();
-  RigidCovariance information = part.prior;
-  for (std::size_t i = 0; i < observation.views.size(); ++i)
-    if (takes_part(part.views, i)) information += reduced(observation.views[i], map).information;
-  MatrixXd both(affine_parameters, 6 + motions.cols());
-  both << map, motions;
-  const MatrixXd of_view = reduced(observation.views[view], both).information;
-  return geometry::solve_spd(information, of_view.topRightCorner(6, motions.cols())).solution;
-}
+/// The response of the unknowns to motions that only one view shows.
+class Response {
+ public:
+  Response(const Observation& observation, const Problem& problem)
+      : observation_(observation), problem_(problem), information_(problem.prior) {
+    for (std::size_t i = 0; i < observation.views.size(); ++i)
+      if (takes_part(problem.views, i))
+        information_ += reduced(observation.views[i], problem.map).information;
+  }
+
+  MatrixXd to(std::size_t view, const MatrixXd& motions) const {
+    const Eigen::Index n = problem_.map.cols();
+    MatrixXd both(affine_parameters, n + motions.cols());
+    both << problem_.map, motions;
+    const MatrixXd of_view = reduced(observation_.views[view], both).information;
+    return geometry::solve_spd(information_, of_view.topRightCorner(n, motions.cols())).solution;
+  }
+
+ private:
+  const Observation& observation_;
+  const Problem& problem_;
+  MatrixXd information_;
+};
 
 }  // namespace
 
@@ -73,12 +84,13 @@ MatrixXd Linearised::covariance() const {
   return geometry::solve_spd(information, half.transpose()).solution;
 }
 
-Linearised linearised(const Observation& observation, const std::vector<bool>& views, const MatrixXd& map,
-                      const MatrixXd& prior, const std::vector<double>& correlation_px) {
+Linearised linearised(const Observation& observation, const Problem& problem,
+                      const std::vector<double>& correlation_px) {
+  const MatrixXd& map = problem.map;
   const Eigen::Index n = map.cols();
-  Linearised sum{prior, VectorXd::Zero(n), MatrixXd::Zero(n, n), 0};
+  Linearised sum{problem.prior, VectorXd::Zero(n), MatrixXd::Zero(n, n), 0};
   for (std::size_t v = 0; v < observation.views.size(); ++v) {
-    if (!takes_part(views, v)) continue;
+    if (!takes_part(problem.views, v)) continue;
     const ViewObservation& view = observation.views[v];
     const Reduced parts = reduced(view, map);
     sum.information += parts.information;
@@ -105,32 +117,42 @@ Linearised linearised(const Observation& observation, const std::vector<bool>& v
   return sum;
 }
 
-RigidCovariance camera_part(const Observation& observation, const std::vector<RegistrationView>& views,
-                            const Vector3d& centre, const MatrixXd& camera_covariance, const Part& part) {
+MatrixXd ErrorModel::of_cameras(const Observation& observation, const Vector3d& centre,
+                                const Problem& problem) const {
   constexpr Eigen::Index each = calibration::view_parameters;
-  MatrixXd by_cameras = MatrixXd::Zero(6, each * Eigen::Index(views.size()));
+  const Response response(observation, problem);
+  MatrixXd by_cameras = MatrixXd::Zero(problem.map.cols(), each * Eigen::Index(views.size()));
   for (std::size_t i = 0; i < views.size(); ++i)
-    if (takes_part(part.views, i))
+    if (takes_part(problem.views, i))
       by_cameras.middleCols(each * Eigen::Index(i), each) =
-          response(observation, i, affine_from_camera(views[i].view, centre), part);
-  return by_cameras * camera_covariance * by_cameras.transpose();
+          response.to(i, affine_from_camera(views[i].view, centre));
+  return by_cameras * cameras * by_cameras.transpose();
 }
 
-RigidCovariance edge_part(const Observation& observation, const std::vector<RegistrationView>& views,
-                          const Vector3d& centre, double radius_mm, const EdgeSigma& sigma,
-                          const Part& part) {
-  RigidCovariance sum = RigidCovariance::Zero();
+MatrixXd ErrorModel::of_edges(const Observation& observation, const Vector3d& centre,
+                              const Problem& problem) const {
+  const Response response(observation, problem);
+  MatrixXd sum = MatrixXd::Zero(problem.map.cols(), problem.map.cols());
   for (std::size_t i = 0; i < views.size(); ++i) {
-    if (!takes_part(part.views, i)) continue;
+    if (!takes_part(problem.views, i)) continue;
     const geometry::View& view = views[i].view;
-    const double sigma_px = sigma.shift_mm * std::abs(view.intrinsics.fy) / view.depth(centre);
-    const MatrixXd by_shift = response(observation, i, image_shifts(view, centre), part);
-    sum += sigma_px * sigma_px * by_shift * by_shift.transpose();
+    const double sigma_px = edge.shift_mm * std::abs(view.intrinsics.fy) / view.depth(centre);
+    const MatrixXd by_shift = sigma_px * response.to(i, image_shifts(view, centre));
     // All edges further out: the model is taken for nearer than it is.
-    const MatrixXd by_size = response(observation, i, growth(), part) / radius_mm;
-    sum += sigma.outward_mm * sigma.outward_mm * by_size * by_size.transpose();
+    const MatrixXd by_size = edge.outward_mm / radius_mm * response.to(i, growth());
+    sum += by_shift * by_shift.transpose() + by_size * by_size.transpose();
   }
   return sum;
+}
+
+MatrixXd ErrorModel::covariance(const Observation& observation, const Vector3d& centre,
+                                const Problem& problem, const Linearised& sum) const {
+  return sum.covariance() + of_cameras(observation, centre, problem) + of_edges(observation, centre, problem);
+}
+
+MatrixXd ErrorModel::covariance(const Observation& observation, const Vector3d& centre,
+                                const Problem& problem) const {
+  return covariance(observation, centre, problem, linearised(observation, problem, correlation_px));
 }
 
 double local_shift_px(const ViewObservation& view, const geometry::View& camera, const Vector3d& centre) {

@@ -17,24 +17,18 @@ struct Linearised {
   Eigen::MatrixXd covariance() const;  ///< H^-1 meat H^-1
 };
 
-/// Sums over views (empty: all). Residuals of comparisons near each other in an image are correlated, because
-/// the model errs there alike: the meat is summed over pairs with a Bartlett kernel of `correlation_px`
-/// (Conley 1999), one for each view. `prior`: information added.
-Linearised linearised(const Observation& observation, const std::vector<bool>& views,
-                      const Eigen::MatrixXd& map, const Eigen::MatrixXd& prior,
-                      const std::vector<double>& correlation_px);
-
-/// Which views take part (empty: all), and the prior's information.
-struct Part {
-  std::vector<bool> views = {};
-  RigidCovariance prior = RigidCovariance::Zero();
+/// What is solved for.
+struct Problem {
+  std::vector<bool> views = {};                         ///< that take part; empty: all
+  Eigen::MatrixXd map = affine_from_rigid();            ///< 12 x n, affine motion from the n unknowns
+  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(6, 6);  ///< information, n x n
 };
 
-/// Covariance of the pose (about `centre`) that the errors of the views' parameters cause.
-/// `camera_covariance`: 11 n x 11 n, as `calibration::Calibration::joint_covariance`.
-RigidCovariance camera_part(const Observation& observation, const std::vector<RegistrationView>& views,
-                            const Eigen::Vector3d& centre, const Eigen::MatrixXd& camera_covariance,
-                            const Part& part = {});
+/// Sums over the problem's views. Residuals of comparisons near each other in an image are correlated,
+/// because the model errs there alike: the meat is summed over pairs with a Bartlett kernel of
+/// `correlation_px` (Conley 1999), one for each view.
+Linearised linearised(const Observation& observation, const Problem& problem,
+                      const std::vector<double>& correlation_px);
 
 /// Standard deviations of an error common to the edges of a view, mm at the model.
 struct EdgeSigma {
@@ -42,10 +36,24 @@ struct EdgeSigma {
   double outward_mm;  ///< of a growth about the centre, at the model's radius
 };
 
-/// Covariance of the pose that such errors cause. `radius_mm`: of the model.
-RigidCovariance edge_part(const Observation& observation, const std::vector<RegistrationView>& views,
-                          const Eigen::Vector3d& centre, double radius_mm, const EdgeSigma& sigma,
-                          const Part& part = {});
+/// Errors of a solution: residuals, cameras, edges of the model.
+struct ErrorModel {
+  const std::vector<RegistrationView>& views;
+  double radius_mm;         ///< of the model
+  Eigen::MatrixXd cameras;  ///< 11 n x 11 n, as `calibration::Calibration::joint_covariance`
+  std::vector<double> correlation_px;
+  EdgeSigma edge;
+
+  /// Of the unknowns (a pose: about `centre`). `sum`: the problem, linearised.
+  Eigen::MatrixXd covariance(const Observation& observation, const Eigen::Vector3d& centre,
+                             const Problem& problem, const Linearised& sum) const;
+  Eigen::MatrixXd covariance(const Observation& observation, const Eigen::Vector3d& centre,
+                             const Problem& problem = {}) const;
+  Eigen::MatrixXd of_cameras(const Observation& observation, const Eigen::Vector3d& centre,
+                             const Problem& problem = {}) const;
+  Eigen::MatrixXd of_edges(const Observation& observation, const Eigen::Vector3d& centre,
+                           const Problem& problem = {}) const;
+};
 
 /// Local shifts (full-resolution pixels) that the comparisons of a view still ask for, each along its own
 /// best determined direction; root mean square by weight.

@@ -12,6 +12,8 @@ using geometry::RigidTransform;
 
 // Between a surface and its mirror image: about what edges in images resolve.
 constexpr double same_shape_mm = 0.4;
+// Cost ratio before the last level, beyond which the last one decides nothing.
+constexpr double least_mirrored_gap = 1.5;
 
 /// The model as its mirror image, in the plane through its centre across the world-fixed model axis x.
 Model mirrored(const Model& model) {
@@ -95,8 +97,18 @@ std::optional<double> mirrored_cost_ratio(const Scene& scene, const Estimate& so
   for (SearchStage& stage : fewer) stage.keep = std::min(stage.keep, 16);
   fewer.back().keep = 1;
   const SearchOptions less{options.shift_mm / 3, options.turn_deg / 2, 600, options.interrupt};
-  const Estimate found =
+  const Level last = fewer.back().level;
+  const bool can_end_early = fewer.size() > 1 && !scene.model().surface;
+  if (can_end_early) fewer.pop_back();
+  Estimate found =
       search(other, fewer, mirrored_starts(scene.model(), solution.pose), less, same_mm).solutions.front();
+  if (can_end_early) {
+    const Observation there = scene.observe(fewer.back().level, solution.pose, false, scene.threads());
+    const double ratio = (1 - found.score) / std::max(1e-6, 1 - there.score());
+    if (ratio > least_mirrored_gap) return ratio;
+    other.prepare(last, solution.pose * scene.model().centre);
+    found = refine(other, last, found.pose, {.iterations = 15, .threads = scene.threads()});
+  }
   if (const auto& surface = scene.model().surface)
     if (root_mean_square_distance(*surface, solution.pose, mirror, found.pose) < same_shape_mm)
       return std::nullopt;

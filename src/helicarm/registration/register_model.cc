@@ -39,9 +39,10 @@ std::vector<SearchStage> stages_for(const Scene& scene, const Vector3d& at) {
   }
   const double fine = std::max(model.resolution_mm, 2 * pixel);
   std::vector<SearchStage> stages = {{{false, fine}, 3, 1.3}};
+  constexpr double hopeless_ratio = 1.6;
   const double coarsest = std::max(fine, std::min(5.0, model.radius_mm / 5));
   for (double spacing = 2 * fine; spacing < 1.5 * coarsest; spacing *= 2)
-    stages.insert(stages.begin(), {{false, spacing}, stages.size() < 2 ? 8 : 32});
+    stages.insert(stages.begin(), {{false, spacing}, stages.size() < 2 ? 8 : 32, hopeless_ratio});
   return stages;
 }
 
@@ -65,55 +66,37 @@ std::vector<double> correlations_px(const std::vector<RegistrationView>& views, 
   return lengths;
 }
 
-/// Errors of a solution from the views that take part: residuals, cameras, edges of the model.
-struct ErrorModel {
-  const Scene& scene;
-  MatrixXd cameras;
-  std::vector<double> correlation_px;
-  EdgeSigma edge;
-
-  RigidCovariance covariance(const Observation& observation, const Vector3d& centre, const Part& part) const {
-    Linearised sum = linearised(observation, part.views, affine_from_rigid(), part.prior, correlation_px);
-    return sum.covariance() + camera_part(observation, scene.views(), centre, cameras, part) +
-           edge_part(observation, scene.views(), centre, scene.model().radius_mm, edge, part);
-  }
-};
-
 /// Information, in the units of the comparisons' weights, of a prior with this sigma (rms over the model).
 RigidCovariance prior_information(const Observation& observation, const ErrorModel& errors, double sigma_mm) {
-  const Linearised sum =
-      linearised(observation, {}, affine_from_rigid(), RigidCovariance::Zero(), errors.correlation_px);
+  const Linearised sum = linearised(observation, {}, errors.correlation_px);
   const double unit = geometry::solve_spd(sum.information, sum.meat).solution.trace() / 6;
   RigidCovariance information = RigidCovariance::Zero();
-  information.topLeftCorner<3, 3>().diagonal().setConstant(
-      std::pow(errors.scene.model().radius_mm / sigma_mm, 2));
+  information.topLeftCorner<3, 3>().diagonal().setConstant(std::pow(errors.radius_mm / sigma_mm, 2));
   information.bottomRightCorner<3, 3>().diagonal().setConstant(1 / (sigma_mm * sigma_mm));
   return unit * information;
 }
 
 /// Each view alone, from the joint solution, and how they differ.
-void compare_views(const ErrorModel& errors, const Level& level, const Estimate& joint,
+void compare_views(const Scene& scene, const ErrorModel& errors, const Level& level, const Estimate& joint,
                    Registration& result) {
-  const Scene& scene = errors.scene;
   const std::size_t n = scene.views().size();
   if (n < 2) return;
   std::vector<OwnSolution> own;
   for (std::size_t i = 0; i < n; ++i) {
-    Part part{std::vector<bool>(n, false), prior_information(joint.observation, errors, alone_prior_mm)};
-    part.views[i] = true;
+    const RigidCovariance prior = prior_information(joint.observation, errors, alone_prior_mm);
+    Problem problem{.views = std::vector<bool>(n, false), .prior = prior};
+    problem.views[i] = true;
     const Estimate alone =
         refine(scene, level, joint.pose,
-               {.converged = 0.02, .views = part.views, .prior = part.prior, .threads = scene.threads()});
+               {.converged = 0.02, .views = problem.views, .prior = prior, .threads = scene.threads()});
     RigidCovariance prior_covariance = RigidCovariance::Zero();
     prior_covariance.topLeftCorner<3, 3>().diagonal().setConstant(
         std::pow(alone_prior_mm / scene.model().radius_mm, 2));
     prior_covariance.bottomRightCorner<3, 3>().diagonal().setConstant(alone_prior_mm * alone_prior_mm);
-    const Eigen::MatrixXd information =
-        linearised(alone.observation, part.views, affine_from_rigid(), part.prior, errors.correlation_px)
-            .information;
-    const RigidCovariance shrink = geometry::solve_spd(information, part.prior).solution;
+    const Linearised sum = linearised(alone.observation, problem, errors.correlation_px);
+    const RigidCovariance shrink = geometry::solve_spd(sum.information, prior).solution;
     own.push_back({step_about(joint.pose, alone.pose, result.centre),
-                   errors.covariance(alone.observation, result.centre, part) +
+                   errors.covariance(alone.observation, result.centre, problem, sum) +
                        shrink * prior_covariance * shrink.transpose()});
   }
   result.disagreement = disagreement_of(scene.views(), result.centre, own);
@@ -184,14 +167,14 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
   describe(scene, stages.back().level, best, result);
   step("errors");
   const double finest_mm = std::max(result.spacing_mm, model.resolution_mm);
-  const ErrorModel errors{scene,
+  const ErrorModel errors{views,
+                          model.radius_mm,
                           camera_covariance_of(views, options),
                           correlations_px(views, model, result.centre),
                           {edge_shift_sigma * finest_mm, edge_growth_sigma * finest_mm}};
-  result.covariance = errors.covariance(best.observation, result.centre, {});
-  result.deformation =
-      deformation_of(best.observation, errors.correlation_px, errors.edge.shift_mm / model.radius_mm);
-  compare_views(errors, stages.back().level, best, result);
+  result.covariance = errors.covariance(best.observation, result.centre);
+  result.deformation = deformation_of(best.observation, errors, result.centre);
+  compare_views(scene, errors, stages.back().level, best, result);
   if (result.disagreement) result.covariance *= result.disagreement->ratio();
   if (options.search.candidates > 0) {
     step("mirror image");

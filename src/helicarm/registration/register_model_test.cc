@@ -136,12 +136,10 @@ TEST(Covariance, MatchesTheScatterOfNoise) {
     scene.prepare(level, true_pose() * model.centre);
     const Estimate estimate = refine(scene, level, true_pose(), {});
     const Vector3d centre = estimate.pose * model.centre;
-    const auto sum =
-        linearised(estimate.observation, {}, affine_from_rigid(), RigidCovariance::Zero(), {20, 20});
+    const auto sum = linearised(estimate.observation, {}, {20, 20});
     const RigidStep error = step_about(estimate.pose, true_pose(), centre);
-    const RigidCovariance covariance =
-        RigidCovariance(sum.covariance()) +
-        edge_part(estimate.observation, views, centre, scene.model().radius_mm, {0.1, 0.05});
+    const ErrorModel errors{views, scene.model().radius_mm, {}, {20, 20}, {0.1, 0.05}};
+    const RigidCovariance covariance = sum.covariance() + errors.of_edges(estimate.observation, centre);
     mean += error.dot(covariance.inverse() * error) / trials;
   }
   EXPECT_GT(mean, 1);
