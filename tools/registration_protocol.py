@@ -153,7 +153,7 @@ class Protocol:
     def __init__(self, body, arguments, folder):
         self.body, self.program, self.threads, self.folder = body, arguments.program, arguments.threads, folder
         self.keep = arguments.keep is not None
-        self.lock = threading.Lock()
+        self.lock, self.locks = threading.Lock(), {}
 
     def run(self, *words):
         done = subprocess.run([self.program, *map(str, words), "--quiet", "--threads", str(self.threads)], capture_output=True,
@@ -166,13 +166,16 @@ class Protocol:
         with self.lock:
             return made(self.folder / f"{self.body.name}{subject}", lambda folder: self.body.write(folder, subject))
 
-    def simulated(self, folder, number, shift=(0, 0, 0)):
-        """Case folder. `shift`: of the body along L, P, S."""
+    def simulated(self, number, shift=(0, 0, 0)):
+        """Case folder, the same for every kind. `shift`: of the body along L, P, S."""
         centre = ",".join(f"{-s:g}" for s in shift)
         volume = self.volumes(self.body.subject(number)) / "true.nrrd"
-        return made(folder / f"case{''.join(f'_{s:g}' for s in shift)}",
-                    lambda case: self.run("simulate", case, "--kind", "flat", "--seed", 100 + number, "--ct", volume,
-                                          f"--ct-centre={centre}"))
+        folder = self.folder / f"{self.body.name}-case-{number}{''.join(f'_{s:g}' for s in shift)}"
+        with self.lock:
+            own = self.locks.setdefault(folder, threading.Lock())
+        with own:
+            return made(folder, lambda case: self.run("simulate", case, "--kind", "flat", "--seed", 100 + number, "--ct", volume,
+                                                      f"--ct-centre={centre}"))
 
     def cameras(self, case, out):
         """Views' cameras as calibrated, with the image of each; and the failure if there are none."""
@@ -214,7 +217,7 @@ class Protocol:
     def row_of(self, folder, kind, number):
         rng = np.random.default_rng([number, KINDS.index(kind)])
         targets = self.body.targets
-        case = self.simulated(folder, number)
+        case = self.simulated(number)
         pose = np.array(json.loads((case / "truth.json").read_text())["ct"]["calibrator_from_patient"])
         model = {"name": self.body.model,
                  **self.body.files(self.volumes(self.body.subject(number, other=kind == "patient")), kind)}
@@ -222,7 +225,7 @@ class Protocol:
         if kind == "tibia":
             guess[:3, 3] += pose[:3, :3] @ [0, 0, 55.0]
         if kind in ("moved", "hidden"):
-            other = self.simulated(folder, number, {"moved": (0, 0, 3), "hidden": (3, 0, 0)}[kind])
+            other = self.simulated(number, {"moved": (0, 0, 3), "hidden": (3, 0, 0)}[kind])
             mixed = folder / "mixed"
             shutil.rmtree(mixed, ignore_errors=True)
             shutil.copytree(case, mixed)
