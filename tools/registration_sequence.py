@@ -9,6 +9,7 @@ and noise; both bones move, about 1 mm and 1 degree from frame to frame. Prints 
 each bone) and of the tibia's pose relative to the femur, the decisions, and the pairs of images per second that `helicarm register
 --frames` states (both bones, reading included). Needs NumPy."""
 import argparse
+import concurrent.futures
 import csv
 import json
 import pathlib
@@ -42,38 +43,57 @@ def camera(degrees):
     return np.array([[focus, 0, middle], [0, focus, middle], [0, 0, 1]]), pose
 
 
-def sampled(values, places):
-    """Values between the voxels (S, P, L) at places (mm, L P S), 0 outside."""
-    at = (places - bone_ct.LOW) / bone_ct.VOXEL_MM
-    whole = np.floor(at).astype(np.int32)
-    inside = np.all((whole >= 0) & (whole < np.array(bone_ct.SIZE) - 1), axis=-1)
-    whole, part = whole[inside], (at[inside] - whole[inside]).astype(np.float32)
-    flat, (nx, ny, _) = values.ravel(), bone_ct.SIZE
-    index = (whole[:, 2] * ny + whole[:, 1]) * nx + whole[:, 0]
-    total = np.zeros(len(index), np.float32)
+def cropped(values):
+    """The box of a volume (S, P, L) outside which it is 0, and its first voxel's place (mm, L P S)."""
+    ends = [np.flatnonzero(values.any(axis=tuple({0, 1, 2} - {axis})))[[0, -1]] for axis in range(3)]
+    box = tuple(slice(max(low - 1, 0), high + 2) for low, high in ends)
+    return np.ascontiguousarray(values[box]), bone_ct.LOW + bone_ct.VOXEL_MM * np.array([part.start for part in box[::-1]])
+
+
+def sampled(values, at):
+    """Values between the voxels (S, P, L) at `at` (voxels, L P S), which is clipped to the volume."""
+    size = np.array(values.shape[::-1])
+    at = np.clip(at, 0, size - 1.001)
+    whole = at.astype(np.int32)
+    part = at - whole
+    flat = values.ravel()
+    index = (whole[..., 2] * size[1] + whole[..., 1]) * size[0] + whole[..., 0]
+    total = np.zeros(index.shape)
     for corner in range(8):
         bits = [corner >> axis & 1 for axis in range(3)]
-        weight = np.prod([part[:, axis] if bit else 1 - part[:, axis] for axis, bit in enumerate(bits)], axis=0)
-        total += weight * flat[index + bits[0] + nx * (bits[1] + ny * bits[2])]
-    result = np.zeros(inside.shape, np.float32)
-    result[inside] = total
-    return result
+        weight = np.prod([part[..., axis] if bit else 1 - part[..., axis] for axis, bit in enumerate(bits)], axis=0)
+        total += weight * flat[index + bits[0] + size[0] * (bits[1] + size[1] * bits[2])]
+    return total
 
 
 def integrals(bones, poses, k, camera_from_world):
-    """Line integrals of the bones at their poses, one image."""
+    """Line integrals of the bones at their poses, one image: sums at steps of about STEP_MM between a ray's ends in the bone's box."""
     u, v = np.meshgrid(np.arange(SIZE), np.arange(SIZE))
     rays = np.stack([u, v, np.ones_like(u)], axis=-1).reshape(-1, 3) @ np.linalg.inv(k).T
     rays = rays / np.linalg.norm(rays, axis=1, keepdims=True) @ camera_from_world[:3, :3]
     source = -camera_from_world[:3, :3].T @ camera_from_world[:3, 3]
     image = np.zeros(len(rays))
-    for name, values in bones.items():
+    for name, (values, low) in bones.items():
         back = np.linalg.inv(poses[name])
-        start, along = back[:3, :3] @ source + back[:3, 3], rays @ back[:3, :3].T
-        near = (CENTRES[name] - start) @ along.T  # along each ray to the plane nearest to the bone
-        for step in np.arange(-75, 75, STEP_MM):
-            image += sampled(values, start + along * (near + step)[:, None]) * STEP_MM
+        start = (back[:3, :3] @ source + back[:3, 3] - low) / bone_ct.VOXEL_MM
+        along = rays @ back[:3, :3].T / bone_ct.VOXEL_MM
+        walls = np.stack([-start / along, (np.array(values.shape[::-1]) - 1 - start) / along])
+        enter, leave = walls.min(axis=0).max(axis=1), walls.max(axis=0).min(axis=1)
+        hit = np.flatnonzero(leave > enter)
+        steps = int((leave - enter)[hit].max() / STEP_MM) + 1
+        step = (leave - enter)[hit] / steps
+        for number in range(steps):
+            image[hit] += sampled(values, start + along[hit] * (enter[hit] + (number + 0.5) * step)[:, None]) * step
     return image.reshape(SIZE, SIZE)
+
+
+def write_image(path, bones, frame, turn, seed):
+    """The image of one frame: soft tissue of varying thickness, the bones, and noise."""
+    v, u = np.mgrid[:SIZE, :SIZE]
+    tissue = 1.2 + 0.3 * np.cos(0.012 * u + 0.02 * frame) + 0.0008 * v
+    dose = np.exp(-tissue - integrals(bones, poses_at(frame), *camera(turn)))
+    noise = np.random.default_rng([seed, turn, frame]).standard_normal(dose.shape)
+    write_png(path, np.clip(65535 * (dose + 0.003 * noise * np.sqrt(dose)), 1, 65535).astype(np.uint16))
 
 
 def write_png(path, pixels):
@@ -101,21 +121,20 @@ def make_case(folder, frames, seed):
     bones, models, views = {}, [], []
     for name, mask in (("femur", knee.femur), ("tibia", knee.tibia)):
         bone_ct.write_nrrd(folder / f"{name}.nrrd", mask.astype(np.uint8))
-        bones[name] = np.where(mask, np.maximum(knee.hu, 0) * 3.2e-5, 0).astype(np.float32)
+        bones[name] = cropped(np.where(mask, np.maximum(knee.hu, 0) * 3.2e-5, 0))
         start = moved(poses_at(0)[name], CENTRES[name], np.array([2, -2, 2.0]), np.radians([2, -2, 2]))
         models.append({"name": name, "volume": "scan.nrrd", "mask": f"{name}.nrrd",
                        "start": {"world_from_model": start.tolist()}})
-    rng = np.random.default_rng(seed)
-    v, u = np.mgrid[:SIZE, :SIZE]
-    for view, degrees in (("A", 0), ("B", 75)):
-        k, pose = camera(degrees)
-        (folder / f"{view}.json").write_text(json.dumps({"K": k.tolist(), "R": pose[:3, :3].tolist(), "t": pose[:3, 3].tolist()}))
-        views.append({"name": view, "image": f"{view}_{{frame:03d}}.png", "camera": f"{view}.json"})
-        for frame in range(frames):
-            tissue = 1.2 + 0.3 * np.cos(0.012 * u + 0.02 * frame) + 0.0008 * v
-            dose = np.exp(-tissue - integrals(bones, poses_at(frame), k, pose))
-            dose += 0.003 * rng.standard_normal(dose.shape) * np.sqrt(dose)
-            write_png(folder / f"{view}_{frame:03d}.png", np.clip(65535 * dose, 1, 65535).astype(np.uint16))
+    with concurrent.futures.ProcessPoolExecutor() as pool:
+        written = []
+        for view, turn in (("A", 0), ("B", 75)):
+            k, pose = camera(turn)
+            (folder / f"{view}.json").write_text(json.dumps({"K": k.tolist(), "R": pose[:3, :3].tolist(), "t": pose[:3, 3].tolist()}))
+            views.append({"name": view, "image": f"{view}_{{frame:03d}}.png", "camera": f"{view}.json"})
+            written += [pool.submit(write_image, folder / f"{view}_{frame:03d}.png", bones, frame, turn, seed)
+                        for frame in range(frames)]
+        for image in written:
+            image.result()
     (folder / "case.json").write_text(json.dumps({"format": "helicarm-case/1", "views": views, "models": models}))
 
 
