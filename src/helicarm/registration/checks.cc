@@ -24,6 +24,7 @@ constexpr double least_contour_score = 0.6;
 constexpr double least_mirrored_ratio = 1.02;  // of a nearly symmetric bone 1.05 to 1.1
 constexpr double least_runner_up_ratio = 1.1;
 constexpr double most_strain = 0.012;
+constexpr double most_strain_of_one_view = 0.05;  // what is not modelled passes for 3 to 4 % there
 constexpr double strain_sigmas = 2;
 constexpr double most_disagreement_mm = 0.5;
 constexpr double disagreement_sigmas = 3;
@@ -173,14 +174,15 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
             model.name, result.runner_up->distance_mm, result.runner_up->cost_ratio, least_runner_up_ratio),
         {{"distance_mm", result.runner_up->distance_mm}, {"cost_ratio", result.runner_up->cost_ratio}});
   const Deformation& shape = result.deformation;
-  if (std::abs(shape.strain) > most_strain && std::abs(shape.strain) > strain_sigmas * shape.sigma)
+  const double strain_limit = result.views.size() > 1 ? most_strain : most_strain_of_one_view;
+  if (std::abs(shape.strain) > strain_limit && std::abs(shape.strain) > strain_sigmas * shape.sigma)
     refuse(Reason::wrong_model,
            fmt::format(
-               "{}: the images ask for a model {:.1f} % {} along one direction (sigma {:.1f} %): another "
-               "patient's, or its voxel size or unit is wrong",
+               "{}: the images ask for a model {:.1f} % {} along one direction (sigma {:.1f} %, at "
+               "most {:.1f} % are allowed): another patient's, or its voxel size or unit is wrong",
                model.name, 100 * std::abs(shape.strain), shape.strain > 0 ? "larger" : "smaller",
-               100 * shape.sigma),
-           {{"strain", shape.strain}, {"sigma", shape.sigma}});
+               100 * shape.sigma, 100 * strain_limit),
+           {{"strain", shape.strain}, {"sigma", shape.sigma}, {"limit", strain_limit}});
   if (result.disagreement && result.disagreement->distance_mm > most_disagreement_mm &&
       result.disagreement->distance_mm > disagreement_sigmas * result.disagreement->sigma_mm)
     refuse(Reason::registration_disagrees,

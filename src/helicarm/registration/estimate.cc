@@ -78,11 +78,15 @@ const Scene::Prepared& Scene::prepared(const Level& level) const {
 }
 
 Observation Scene::observe(const Level& level, const geometry::RigidTransform& pose, bool derivatives,
-                           unsigned threads) const {
+                           unsigned threads, const std::vector<bool>& which) const {
   const Prepared& made = prepared(level);
   const Vector3d centre = pose * model_->centre;
   Observation observation;
   for (std::size_t i = 0; i < views_->size(); ++i) {
+    if (!which.empty() && !which[i]) {
+      observation.views.emplace_back();
+      continue;
+    }
     const geometry::View& view = (*views_)[i].view;
     observation.views.push_back(level.contour
                                     ? compare_contour(made.rasters[i], view, *model_->surface, pose, centre,
@@ -111,7 +115,7 @@ RigidEquations rigid_equations(const ViewObservation& view) {
 Estimate refine(const Scene& scene, const Level& level, const geometry::RigidTransform& start,
                 const RefineOptions& options) {
   const Model& model = scene.model();
-  Estimate best{start, scene.observe(level, start, true, options.threads), 0};
+  Estimate best{start, scene.observe(level, start, true, options.threads, options.views), 0};
   best.score = score_of(best.observation, options.views);
   double damping = 1e-3;
   const double converged_mm = options.converged * level.spacing_mm;
@@ -131,7 +135,7 @@ Estimate refine(const Scene& scene, const Level& level, const geometry::RigidTra
     const double longest = 4 * (level.contour ? level.reach * level.spacing_mm / 4 : level.spacing_mm);
     if (length > longest) step *= longest / length;
     const auto pose = moved_about(best.pose, centre, step);
-    Estimate next{pose, scene.observe(level, pose, true, options.threads), 0};
+    Estimate next{pose, scene.observe(level, pose, true, options.threads, options.views), 0};
     next.score = score_of(next.observation, options.views);
     if (next.score >= best.score - tolerance) {
       best = std::move(next);

@@ -32,8 +32,9 @@ class Scene {
 
   /// Makes what a level needs about this place (world): to be called before `observe`, which is const.
   void prepare(const Level& level, const Eigen::Vector3d& near);
+  /// `which`: the views that are compared; empty: all. The others' observations are empty.
   Observation observe(const Level& level, const geometry::RigidTransform& pose, bool derivatives,
-                      unsigned threads) const;
+                      unsigned threads, const std::vector<bool>& which = {}) const;
   /// Spacing of the views' pixels at a place of the world, mm; the finest view's.
   double pixel_mm(const Eigen::Vector3d& at) const;
   /// Side of a view's patches, or spacing of its contour points, px; after `prepare`.

@@ -181,6 +181,7 @@ Expected<Model> model_from(const std::string& name, const volume::Volume& volume
     return fail(Reason::bad_value, fmt::format("{}: no voxel is within the mask and window", name));
   Model model;
   model.name = name;
+  model.outlined = mask.has_value();
   model.cuts = cuts_of(whole);
   model.density = cropped(whole, *bounds);
   std::vector<Vector3d> points;

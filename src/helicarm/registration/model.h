@@ -18,6 +18,7 @@ struct Model {
   std::string name;
   Density density;                    ///< of a surface: 1 inside
   std::optional<Surface> surface;     ///< then the contour decides
+  bool outlined = true;               ///< by a mask or a surface; otherwise a threshold decides where it ends
   std::vector<Eigen::Vector3d> cuts;  ///< where the body goes on beyond the volume
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> samples;  ///< points spread over the body

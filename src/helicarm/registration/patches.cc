@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 
 #include <Eigen/LU>
 
@@ -16,8 +15,17 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+/// Patches u0 <= u < u1, v0 <= v < v1.
 struct Box {
-  int u0, v0, u1, v1;  ///< patches
+  int u0, v0, u1, v1;
+  int width() const { return std::max(0, u1 - u0); }
+  int height() const { return std::max(0, v1 - v0); }
+  bool contains(const Vector2d& at) const {
+    return at.x() >= u0 && at.x() < u1 && at.y() >= v0 && at.y() < v1;
+  }
+  std::size_t index(int u, int v) const {
+    return std::size_t(v - v0) * std::size_t(width()) + std::size_t(u - u0);
+  }
 };
 
 /// Patches that the density's grid may cover.
@@ -219,18 +227,20 @@ class Comparer {
   const PatchOptions& options_;
 };
 
-/// The patches that show a cut, and their neighbours.
-std::set<std::pair<int, int>> cut_patches(const Raster& raster, const geometry::View& view,
-                                          const geometry::RigidTransform& world_from_model,
-                                          const std::vector<Vector3d>& cuts, int side) {
-  std::set<std::pair<int, int>> cut;
+/// Which patches of the box, row by row, show a cut, and their neighbours.
+std::vector<char> cut_patches(const Raster& raster, const geometry::View& view,
+                              const geometry::RigidTransform& world_from_model,
+                              const std::vector<Vector3d>& cuts, int side, const Box& box) {
+  std::vector<char> cut(std::size_t(box.width()) * std::size_t(box.height()), 0);
   for (const Vector3d& point : cuts) {
     const Vector3d in_world = world_from_model * point;
     if (!(view.depth(in_world) > 1)) continue;
     const Vector2d at = raster.raster_at(view.project(in_world)) / side;
     for (const double du : {-0.25, 0.25})
-      for (const double dv : {-0.25, 0.25})
-        cut.emplace(static_cast<int>(std::floor(at.x() + du)), static_cast<int>(std::floor(at.y() + dv)));
+      for (const double dv : {-0.25, 0.25}) {
+        const Vector2d patch = Vector2d(at.x() + du, at.y() + dv).array().floor();
+        if (box.contains(patch)) cut[box.index(int(patch.x()), int(patch.y()))] = 1;
+      }
   }
   return cut;
 }
@@ -243,11 +253,11 @@ ViewObservation compare_patches(const Raster& raster, const geometry::View& view
                                 bool derivatives, unsigned threads, const PatchOptions& options) {
   const int side = options.side;
   const Box box = patches_of(raster, view, density, world_from_model, side);
-  const auto cut = cut_patches(raster, view, world_from_model, cuts, side);
+  const auto cut = cut_patches(raster, view, world_from_model, cuts, side, box);
   std::vector<Patch> patches;
   for (int v = box.v0; v < box.v1; ++v)
     for (int u = box.u0; u < box.u1; ++u)
-      if (!cut.contains({u, v})) patches.push_back({u * side, v * side});
+      if (cut[box.index(u, v)] == 0) patches.push_back({u * side, v * side});
   const Comparer comparer(raster, view, density, world_from_model, centre, options);
   parallel_for(patches.size(), threads,
                [&](std::size_t i) { patches[i] = comparer.rendered(patches[i].u, patches[i].v); });

@@ -23,6 +23,7 @@ constexpr double correlation_mm = 12;  // of residuals along a bone's edge
 // Bias of a CT's edges in a view, of the finest spacing.
 constexpr double edge_shift_sigma = 0.1;
 constexpr double edge_growth_sigma = 0.05;
+constexpr double lone_growth_sigma = 0.1;  // a single view of a body that a threshold delimits
 constexpr double alone_prior_mm = 10;  // keeps a single view from running along its rays
 
 /// Levels from coarse to fine for this model and these views.
@@ -167,11 +168,12 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
   describe(scene, stages.back().level, best, result);
   step("errors");
   const double finest_mm = std::max(result.spacing_mm, model.resolution_mm);
+  const double growth = model.outlined || views.size() > 1 ? edge_growth_sigma : lone_growth_sigma;
   const ErrorModel errors{views,
                           model.radius_mm,
                           camera_covariance_of(views, options),
                           correlations_px(views, model, result.centre),
-                          {edge_shift_sigma * finest_mm, edge_growth_sigma * finest_mm}};
+                          {edge_shift_sigma * finest_mm, growth * finest_mm}};
   result.covariance = errors.covariance(best.observation, result.centre);
   result.deformation = deformation_of(best.observation, errors, result.centre);
   compare_views(scene, errors, stages.back().level, best, result);
