@@ -10,19 +10,7 @@
 #include "register_command.h"
 
 namespace helicarm::cli {
-namespace {
-
 namespace fs = std::filesystem;
-
-Json with_tunnels(Json result, const Json& registration) {
-  for (const Json& model : registration["models"]) {
-    if (model["status"] != "ok") continue;
-    for (const Json& tunnel : model["tunnels"]) result["tunnels"].push_back(tunnel);
-  }
-  return result;
-}
-
-}  // namespace
 
 CommandResult run_with_models(const RunArguments& arguments, Console& console) {
   return guarded([&] {
@@ -44,7 +32,7 @@ CommandResult run_with_models(const RunArguments& arguments, Console& console) {
     if (!registration) return value_or_throw(done);
     value_or_throw(write_file(arguments.out / "registration.json", to_text(*registration) + "\n"));
     const fs::path result_file = arguments.out / "result.json";
-    const Json result = with_tunnels(value_or_throw(read_json(result_file)), *registration);
+    const Json result = case_registration::with_tunnels_of_models(value_or_throw(read_json(result_file)), *registration);
     value_or_throw(write_file(result_file, to_text(result) + "\n"));
     value_or_throw(done);
     if (console.json) console.out << to_text(result) << '\n';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <QCoreApplication>
+#include <QGuiApplication>
 #include <QElapsedTimer>
 #include <QThread>
 
@@ -10,9 +10,11 @@
 #include "gui/controller/equipment.h"
 #include "gui/controller/steps.h"
 #include "helicarm/case_registration/register_case.h"
+#include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
 
 namespace helicarm::gui {
+namespace fs = std::filesystem;
 namespace {
 
 constexpr int patience_ms = 600000;
@@ -53,7 +55,7 @@ class ControllerRegistration : public testing::Test {
   int argc_ = 1;
   char name_[5] = "ctrl";
   char* argv_[2] = {name_, nullptr};
-  QCoreApplication app_;
+  QGuiApplication app_;
   std::unique_ptr<Controller> controller_;
 };
 
@@ -78,6 +80,24 @@ TEST_F(ControllerRegistration, RegistersTheModelsAndStartsFromANudgedPose) {
   EXPECT_FALSE(state().nudged);
   ASSERT_NE(state().registration, first);
   EXPECT_LT((found().world_from_model.translation - truth_.translation).norm(), 1);
+}
+
+TEST_F(ControllerRegistration, ExportsTheTunnelsOfTheModels) {
+  register_models();
+  ASSERT_TRUE(state().registration) << card().why.toStdString();
+  const TemporaryFolder out;
+  controller_->export_to(out.path());
+  wait([&] { return !state().busy; });
+  const Json result = read_json(out.path() / "result.json").value();
+  ASSERT_EQ(result["tunnels"].size(), 1u);
+  EXPECT_EQ(result["tunnels"][0]["name"], "tunnel");
+  const Json models = read_json(out.path() / "registration.json").value();
+  EXPECT_EQ(models["models"][0]["tunnels"][0], result["tunnels"][0]);
+  EXPECT_TRUE(fs::exists(out.path() / "registration" / "report.html"));
+}
+
+TEST_F(ControllerRegistration, AsksForNoPicksWhereModelsBringTheTunnels) {
+  EXPECT_TRUE(state().tunnels.empty());
 }
 
 TEST_F(ControllerRegistration, CancelEndsIt) {

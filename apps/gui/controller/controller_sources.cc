@@ -16,8 +16,8 @@ namespace {
 
 constexpr double bone_step_mm = 5;
 
-/// Names and bones of a case's tunnels; the two of an ACL reconstruction if it has none.
-std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given) {
+/// Names and bones of a case's tunnels; the two of an ACL reconstruction if it has none, and no models.
+std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given, bool has_models) {
   std::vector<operation::PlannedTunnel> tunnels;
   for (const pipeline::TunnelPlan& tunnel : given.tunnels) {
     const auto pick = std::ranges::find(given.picks, tunnel.start, &pipeline::Pick::name);
@@ -25,7 +25,7 @@ std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given) {
         pick == given.picks.end() ? guidance::Bone::femur : pick->moves_with.value_or(guidance::Bone::femur);
     tunnels.push_back({tunnel.name, bone, tunnel.start, tunnel.end});
   }
-  if (given.picks.empty() && tunnels.empty())
+  if (given.picks.empty() && tunnels.empty() && !has_models)
     tunnels = {{"femur", guidance::Bone::femur, "FS", "FE"}, {"tibia", guidance::Bone::tibia, "TS", "TE"}};
   return tunnels;
 }
@@ -182,7 +182,7 @@ Controller::Change Controller::with_case(pipeline::Case given, Equipment& equipm
     for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
     state.files = files;
     state.calibrator = given.calibrator;
-    state.tunnels = tunnels_of(given);
+    state.tunnels = tunnels_of(given, has_models);
     state.picks = unsaved.value_or(given.picks);
     state.has_unsaved_picks = unsaved.has_value();
     if (unsaved) earlier_picks_.push_back(given.picks);

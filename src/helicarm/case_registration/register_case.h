@@ -77,6 +77,10 @@ Expected<CaseRegistration> register_loaded(const pipeline::RegistrationCase& giv
 /// registration.json (docs/formats.md).
 Json to_json(const CaseRegistration& result);
 
+/// result.json with the tunnels of the models that were not refused beside its own. `registration`: as
+/// `to_json`.
+Json with_tunnels_of_models(Json result, const Json& registration);
+
 /// One HTML file with the overlays inside.
 std::string report_html(const CaseRegistration& result);
 
