@@ -32,7 +32,8 @@ CommandResult run_with_models(const RunArguments& arguments, Console& console) {
     if (!registration) return value_or_throw(done);
     value_or_throw(write_file(arguments.out / "registration.json", to_text(*registration) + "\n"));
     const fs::path result_file = arguments.out / "result.json";
-    const Json result = case_registration::with_tunnels_of_models(value_or_throw(read_json(result_file)), *registration);
+    const Json result =
+        case_registration::with_tunnels_of_models(value_or_throw(read_json(result_file)), *registration);
     value_or_throw(write_file(result_file, to_text(result) + "\n"));
     value_or_throw(done);
     if (console.json) console.out << to_text(result) << '\n';

@@ -181,21 +181,22 @@ void Controller::export_to(const fs::path& folder) {
   pipeline::Result result = *state_.result;
   for (const auto& [tunnel, outcome] : state_.outcomes)
     if (outcome.verification) result.verifications.push_back(*outcome.verification);
-  begin(Phase::verify, "writing the report", [this, result = std::move(result), registration = state_.registration,
-                                                folder]() -> Change {
-    value_or_throw(report::write_report(result, folder));
-    value_or_throw(write_pdf_report(result, folder / "report.pdf"));
-    value_or_throw(report::write_exports(result, folder));
-    Json json = pipeline::to_json(result);
-    if (registration) {
-      value_or_throw(case_registration::write_registration(*registration, folder / "registration"));
-      const Json models = case_registration::to_json(*registration);
-      value_or_throw(write_file(folder / "registration.json", to_text(models) + "\n"));
-      json = case_registration::with_tunnels_of_models(std::move(json), models);
-    }
-    value_or_throw(write_file(folder / "result.json", to_text(json) + "\n"));
-    return [this, folder](ApplicationState&) { emit exported(QString::fromStdString(folder.string())); };
-  });
+  begin(Phase::verify, "writing the report",
+        [this, result = std::move(result), registration = state_.registration, folder]() -> Change {
+          value_or_throw(report::write_report(result, folder));
+          value_or_throw(write_pdf_report(result, folder / "report.pdf"));
+          value_or_throw(report::write_exports(result, folder));
+          Json json = pipeline::to_json(result);
+          if (registration) {
+            value_or_throw(case_registration::write_registration(*registration, folder / "registration"));
+            const Json models = case_registration::to_json(*registration);
+            value_or_throw(write_file(folder / "registration.json", to_text(models) + "\n"));
+            json = case_registration::with_tunnels_of_models(std::move(json), models);
+          }
+          value_or_throw(write_file(folder / "result.json", to_text(json) + "\n"));
+          return
+              [this, folder](ApplicationState&) { emit exported(QString::fromStdString(folder.string())); };
+        });
 }
 
 void Controller::set_fault(const std::string& name, bool on) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <QGuiApplication>
 #include <QElapsedTimer>
+#include <QGuiApplication>
 #include <QThread>
 
 #include <gtest/gtest.h>

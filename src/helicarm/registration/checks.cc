@@ -177,11 +177,10 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
   const double strain_limit = result.views.size() > 1 ? most_strain : most_strain_of_one_view;
   if (std::abs(shape.strain) > strain_limit && std::abs(shape.strain) > strain_sigmas * shape.sigma)
     refuse(Reason::wrong_model,
-           fmt::format(
-               "{}: the images ask for a model {:.1f} % {} along one direction (sigma {:.1f} %, at "
-               "most {:.1f} % are allowed): another patient's, or its voxel size or unit is wrong",
-               model.name, 100 * std::abs(shape.strain), shape.strain > 0 ? "larger" : "smaller",
-               100 * shape.sigma, 100 * strain_limit),
+           fmt::format("{}: the images ask for a model {:.1f} % {} along one direction (sigma {:.1f} %, at "
+                       "most {:.1f} % are allowed): another patient's, or its voxel size or unit is wrong",
+                       model.name, 100 * std::abs(shape.strain), shape.strain > 0 ? "larger" : "smaller",
+                       100 * shape.sigma, 100 * strain_limit),
            {{"strain", shape.strain}, {"sigma", shape.sigma}, {"limit", strain_limit}});
   if (result.disagreement && result.disagreement->distance_mm > most_disagreement_mm &&
       result.disagreement->distance_mm > disagreement_sigmas * result.disagreement->sigma_mm)

@@ -24,7 +24,7 @@ constexpr double correlation_mm = 12;  // of residuals along a bone's edge
 constexpr double edge_shift_sigma = 0.1;
 constexpr double edge_growth_sigma = 0.05;
 constexpr double lone_growth_sigma = 0.1;  // a single view of a body that a threshold delimits
-constexpr double alone_prior_mm = 10;  // keeps a single view from running along its rays
+constexpr double alone_prior_mm = 10;      // keeps a single view from running along its rays
 
 /// Levels from coarse to fine for this model and these views.
 std::vector<SearchStage> stages_for(const Scene& scene, const Vector3d& at) {
