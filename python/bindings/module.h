@@ -21,7 +21,7 @@ void add_calibration(py::module_& module);
 void add_measures(py::module_& module);
 /// run_case, Result, simulate_case.
 void add_cases(py::module_& module);
-/// register.
+/// register, register_sequence.
 void add_registration(py::module_& module);
 /// measure_phantom, MeasuredPhantom, verify_phantom.
 void add_phantom_calibration(py::module_& module);

@@ -1,26 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "arrays.h"
 #include "checks.h"
+#include "helicarm/case_registration/follow_case.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/pipeline/registration_case.h"
+#include "helicarm/registration/follow.h"
 #include "module.h"
 #include "signals.h"
 
 namespace helicarm::python {
 namespace {
 
-py::object register_models(const std::filesystem::path& folder,
-                           const std::optional<std::filesystem::path>& out,
-                           std::optional<double> max_error_mm, double search_mm, double search_deg,
-                           unsigned threads, const py::object& progress) {
+using case_registration::CaseSequence;
+using registration::Registration;
+
+case_registration::RegisterOptions options_from(const std::optional<double>& max_error_mm, double search_mm,
+                                                double search_deg, unsigned threads) {
   case_registration::RegisterOptions options;
   if (max_error_mm) options.max_error_mm = checked(*max_error_mm, within({1e-6, 1000}), "max_error_mm");
   options.shift_mm = checked(search_mm, within({0, 100}), "search_mm");
   options.turn_deg = checked(search_deg, within({0, 180}), "search_deg");
   options.threads = threads;
+  return options;
+}
+
+py::object register_models(const std::filesystem::path& folder,
+                           const std::optional<std::filesystem::path>& out,
+                           std::optional<double> max_error_mm, double search_mm, double search_deg,
+                           unsigned threads, const py::object& progress) {
+  auto options = options_from(max_error_mm, search_mm, search_deg, threads);
   const RunHooks hooks = run_hooks(progress);
   options.on_step = [&](const std::string& model, std::string_view step) {
     hooks.on_stage(model.empty() ? std::string(step) : model + ": " + std::string(step));
   };
+  options.interrupt = hooks.on_view;
   const auto result = value_or_raise(without_gil([&] {
     return pipeline::read_registration_case(folder)
         .and_then([&](const pipeline::RegistrationCase& given) {
@@ -35,6 +48,109 @@ py::object register_models(const std::filesystem::path& folder,
   if (result.failure) raise(*result.failure, answer);
   for (const case_registration::RegisteredModel& model : result.models)
     if (model.registration.failure) raise(*model.registration.failure, answer);
+  return answer;
+}
+
+/// "A-B[:STEP]" or a range.
+case_registration::FrameRange frames_from(const py::object& frames) {
+  if (py::isinstance<py::str>(frames))
+    return value_or_raise(case_registration::frame_range_from(frames.cast<std::string>()));
+  const auto numbers = frames.cast<std::vector<int>>();
+  const int step = numbers.size() > 1 ? numbers[1] - numbers[0] : 1;
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    if (step < 1 || numbers[i] != numbers[0] + int(i) * step)
+      raise({Reason::bad_value, "frames: the numbers do not rise in equal steps", {}, {}});
+  if (numbers.empty()) raise({Reason::bad_value, "frames: is empty", {}, {}});
+  return value_or_raise(
+      case_registration::frame_range_from(fmt::format("{}-{}:{}", numbers.front(), numbers.back(), step)));
+}
+
+/// (N, rows, columns)
+template <class Values, class MatrixOf>
+py::array stacked(const Values& values, py::ssize_t rows, py::ssize_t columns, const MatrixOf& matrix_of) {
+  py::array_t<double> array({py::ssize_t(values.size()), rows, columns});
+  double* at = array.mutable_data();
+  for (const auto& value : values) {
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(at, rows, columns) =
+        matrix_of(value);
+    at += rows * columns;
+  }
+  return array;
+}
+
+py::dict poses_of(const CaseSequence& sequence, std::size_t model) {
+  std::vector<const Registration*> found;
+  py::list decisions, codes;
+  std::vector<Eigen::Vector3d> centres;
+  for (const auto& frame : sequence.frames) {
+    const Registration& one = frame.models[model];
+    found.push_back(&one);
+    centres.push_back(one.centre);
+    decisions.append(std::string(registration::word(one.decision)));
+    codes.append(one.failure ? py::object(py::str(std::string(code(one.failure->reason)))) : py::none());
+  }
+  py::dict poses;
+  poses["name"] = found.front()->name;
+  poses["world_from_model"] =
+      stacked(found, 4, 4, [](const Registration* one) { return one->world_from_model.matrix(); });
+  poses["covariance"] = stacked(found, 6, 6, [](const Registration* one) { return one->covariance; });
+  poses["centre_mm"] = rows_array<3>(centres);
+  poses["decision"] = decisions;
+  poses["refused"] = codes;
+  return poses;
+}
+
+py::dict relative_poses_of(const CaseSequence& sequence, std::size_t model) {
+  std::vector<registration::RelativePose> found;
+  for (const auto& frame : sequence.frames)
+    found.push_back(registration::relative_pose(frame.models.front(), frame.models[model]));
+  py::dict poses;
+  poses["name"] = sequence.frames.front().models[model].name;
+  poses["reference"] = sequence.frames.front().models.front().name;
+  poses["reference_from_model"] =
+      stacked(found, 4, 4, [](const auto& one) { return one.reference_from_model.matrix(); });
+  poses["covariance"] = stacked(found, 6, 6, [](const auto& one) { return one.covariance; });
+  return poses;
+}
+
+py::object register_sequence(const std::filesystem::path& folder, const py::object& frames,
+                             const std::optional<std::filesystem::path>& out,
+                             std::optional<double> max_error_mm, double search_mm, double search_deg,
+                             unsigned threads, const py::object& progress) {
+  auto options = options_from(max_error_mm, search_mm, search_deg, threads);
+  const auto range = frames_from(frames);
+  const RunHooks hooks = run_hooks(py::none());
+  options.interrupt = hooks.on_view;
+  const auto on_frame = [&](double share) {
+    hooks.on_view();
+    const py::gil_scoped_acquire acquire;
+    if (!progress.is_none()) progress(share);
+  };
+  const auto sequence = value_or_raise(without_gil([&] {
+    return pipeline::read_registration_case(folder)
+        .and_then([&](const pipeline::RegistrationCase& given) {
+          return case_registration::follow_case(given, range, options, on_frame);
+        })
+        .and_then([&](CaseSequence made) {
+          const auto written =
+              out && !made.failure ? case_registration::write_sequence(made, *out) : Expected<void>{};
+          return written.map([&] { return std::move(made); });
+        });
+  }));
+  if (sequence.failure) raise(*sequence.failure);
+  py::dict answer;
+  py::list numbers, models, relative;
+  for (const auto& frame : sequence.frames) numbers.append(frame.frame);
+  for (std::size_t i = 0; i < sequence.frames.front().models.size(); ++i) {
+    models.append(poses_of(sequence, i));
+    if (i > 0) relative.append(relative_poses_of(sequence, i));
+  }
+  answer["frames"] = numbers;
+  answer["models"] = models;
+  answer["relative"] = relative;
+  answer["warnings"] = warning_list(sequence.warnings);
+  answer["seconds"] = sequence.seconds;
+  if (const auto refusal = sequence.refusal()) raise(*refusal, answer);
   return answer;
 }
 
@@ -58,6 +174,22 @@ void add_registration(py::module_& module) {
       "axis. threads: 0 for all cores. progress: called with the name of each step.\n\n"
       "Raises as run_case; RefusedError if the views or a model are refused, with all that was computed in\n"
       ".result.");
+  module.def(
+      "register_sequence", &register_sequence, py::arg("folder"), py::arg("frames"), py::kw_only(),
+      py::arg("out") = py::none(), py::arg("max_error_mm") = py::none(),
+      py::arg("search_mm") = defaults.shift_mm, py::arg("search_deg") = defaults.turn_deg,
+      py::arg("threads") = defaults.threads, py::arg("progress") = py::none(),
+      "Follow the models of a case through a sequence of images, as `helicarm register --frames` does.\n\n"
+      "frames: \"A-B[:STEP]\" or a range. Returns frames (N numbers), models (for each: name, "
+      "world_from_model\n"
+      "(N, 4, 4), mm, covariance (N, 6, 6) about centre_mm (N, 3), decision (N words), refused (N reasons "
+      "or\n"
+      "None)), relative (of the second and further models: name, reference, reference_from_model (N, 4, 4),\n"
+      "covariance (N, 6, 6)), warnings and seconds.\n\n"
+      "out: folder for registration.csv and relative.csv, or None. progress: called with the share done, 0 "
+      "to 1,\n"
+      "after each frame. The others as in register.\n\n"
+      "Raises as run_case; RefusedError if a model is refused in some frame, with all poses in .result.");
 }
 
 }  // namespace helicarm::python

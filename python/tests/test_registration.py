@@ -54,3 +54,78 @@ def test_register_without_models_is_an_input_error(case):
 def test_register_names_a_bad_argument(landmarks):
     with pytest.raises(helicarm.InputError, match="search_mm"):
         helicarm.register(landmarks, search_mm=-1)
+
+
+SIZE = 96
+AXES = np.indices((40, 40, 40)).transpose(1, 2, 3, 0)[..., ::-1]  # (x, y, z) of a voxel, 1 mm
+
+
+def body_hu():
+    """Three ellipsoids in air, [z, y, x]: no plane of symmetry."""
+    parts = [((20, 18, 20), (7, 9, 18)), ((28, 20, 10), (9, 7, 8)), ((14, 27, 30), (8, 6, 5))]
+    inside = [(((AXES - centre) / np.array(radii)) ** 2).sum(axis=-1) < 1 for centre, radii in parts]
+    return np.where(np.any(inside, axis=0), 1200, -1000).astype(np.int16)
+
+
+def image_of(hu, shift, k, rotation, distance):
+    """Sums of the nearest voxels along each pixel's ray, with noise."""
+    v, u = np.mgrid[:SIZE, :SIZE]
+    rays = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(k).T
+    rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True) @ rotation
+    source = -rotation.T @ np.array([0, 0, distance])
+    total = np.zeros((SIZE, SIZE))
+    for along in np.arange(distance - 40, distance + 40, 0.5):
+        at = np.rint(source + along * rays - shift + 20).astype(int)
+        inside = np.all((at >= 0) & (at < 40), axis=-1)
+        x, y, z = np.where(inside[..., None], at, 0).transpose(2, 0, 1)
+        total += np.where(inside, np.maximum(hu[z, y, x], 0), 0) * 0.5
+    dose = np.exp(-3e-5 * total) + 0.002 * np.random.default_rng(2).standard_normal(total.shape)
+    return np.clip(40000 * dose, 1, 65535).astype(np.uint16)
+
+
+@pytest.fixture(scope="module")
+def sequence(tmp_path_factory):
+    """A body of 40 mm that moves by 1 mm along x in each of three frames, and the same again as a second model."""
+    folder = tmp_path_factory.mktemp("sequence")
+    hu = body_hu()
+    header = ("NRRD0004\ntype: int16\ndimension: 3\nspace: left-posterior-superior\nsizes: 40 40 40\n"
+              "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (-20,-20,-20)\nencoding: raw\nendian: little\n\n")
+    (folder / "ct.nrrd").write_bytes(header.encode() + hu.tobytes())
+    k = np.array([[900.0, 0, 47.5], [0, 900, 47.5], [0, 0, 1]])
+    views = []
+    for name, rotation in (("A", [[1, 0, 0], [0, 0, -1], [0, 1, 0]]), ("B", [[0, -1, 0], [0, 0, -1], [1, 0, 0]])):
+        rotation = np.array(rotation, float)
+        (folder / f"{name}.json").write_text(json.dumps({"K": k.tolist(), "R": rotation.tolist(), "t": [0, 0, 600.0]}))
+        views.append({"name": name, "image": f"{name}{{frame}}.png", "camera": f"{name}.json"})
+        for frame in range(1, 4):
+            cv2.imwrite(str(folder / f"{name}{frame}.png"), image_of(hu, np.array([frame, 0, 0]), k, rotation, 600))
+    start = np.eye(4)
+    start[:3, 3] = 2, -1, 1
+    models = [{"name": name, "volume": "ct.nrrd", "window_hu": [300, 3000], "start": {"world_from_model": start.tolist()}}
+              for name in ("body", "again")]
+    (folder / "case.json").write_text(json.dumps({"format": "helicarm-case/1", "views": views, "models": models}))
+    return folder
+
+
+def test_register_sequence_follows_the_models(sequence, tmp_path):
+    shares = []
+    answer = helicarm.register_sequence(sequence, range(1, 4), out=tmp_path, progress=shares.append)
+    assert answer["frames"] == [1, 2, 3] and shares == pytest.approx([1 / 3, 2 / 3, 1])
+    body = answer["models"][0]
+    assert body["world_from_model"][:, :3, 3] == pytest.approx(np.array([[1, 0, 0], [2, 0, 0], [3, 0, 0]]), abs=0.2)
+    assert body["covariance"].shape == (3, 6, 6) and body["decision"] == ["warn"] * 3 and body["refused"] == [None] * 3
+    assert answer["relative"][0]["reference_from_model"] == pytest.approx(np.tile(np.eye(4), (3, 1, 1)), abs=0.05)
+    assert len((tmp_path / "registration.csv").read_text().splitlines()) == 1 + 3 * 2
+
+
+def test_register_sequence_ends_where_progress_raises(sequence):
+    def stop(share):
+        raise KeyboardInterrupt
+    with pytest.raises(KeyboardInterrupt):
+        helicarm.register_sequence(sequence, "1-3", progress=stop)
+
+
+@pytest.mark.parametrize("frames", [[1, 2, 4], [3, 2], [], "3-1", [-1, 0]])
+def test_register_sequence_refuses_frames_that_do_not_rise(sequence, frames):
+    with pytest.raises(helicarm.InputError, match="frames"):
+        helicarm.register_sequence(sequence, frames)
