@@ -15,14 +15,16 @@ using case_registration::RegisteredModel;
 
 void print(const RegisteredModel& model, std::ostream& out) {
   const registration::Registration& r = model.registration;
-  const Eigen::Matrix<double, 6, 1> sigma = r.covariance.diagonal().cwiseSqrt();
   out << fmt::format("  {}: {}{}\n", r.name, registration::word(r.decision),
-                     r.failure ? fmt::format(" ({})", code(r.failure->reason)) : "")
-      << fmt::format(
-             "    centre  {:9.3f} {:9.3f} {:9.3f} mm, sigma {:.3f} {:.3f} {:.3f} mm, {:.2f} {:.2f} {:.2f} "
-             "degrees\n",
-             r.centre.x(), r.centre.y(), r.centre.z(), sigma[3], sigma[4], sigma[5],
-             sigma[0] * 180 / EIGEN_PI, sigma[1] * 180 / EIGEN_PI, sigma[2] * 180 / EIGEN_PI);
+                     r.failure ? fmt::format(" ({})", code(r.failure->reason)) : "");
+  if (r.is_determined()) {
+    const Eigen::Matrix<double, 6, 1> sigma = r.covariance.diagonal().cwiseSqrt();
+    out << fmt::format(
+        "    centre  {:9.3f} {:9.3f} {:9.3f} mm, sigma {:.3f} {:.3f} {:.3f} mm, {:.2f} {:.2f} {:.2f} "
+        "degrees\n",
+        r.centre.x(), r.centre.y(), r.centre.z(), sigma[3], sigma[4], sigma[5], sigma[0] * 180 / EIGEN_PI,
+        sigma[1] * 180 / EIGEN_PI, sigma[2] * 180 / EIGEN_PI);
+  }
   for (const auto& view : r.views)
     out << fmt::format("    {:<8} agreement {:.3f}, residual {:.2f} px\n", view.name, view.score,
                        view.residual_px);

@@ -56,6 +56,20 @@ def test_register_names_a_bad_argument(landmarks):
         helicarm.register(landmarks, search_mm=-1)
 
 
+def test_landmarks_that_leave_a_larger_error_are_refused(landmarks):
+    with pytest.raises(helicarm.RefusedError, match="residual") as error:
+        helicarm.register(landmarks, max_error_mm=0.1)
+    assert error.value.code == "uncertain"
+
+
+def test_landmarks_without_picks_are_named(landmarks):
+    case = json.loads((landmarks / "case.json").read_text())
+    case["picks"] = [pick for pick in case["picks"] if pick["name"] in "ab" or (pick["name"], pick["view"]) == ("c", "A")]
+    (landmarks / "case.json").write_text(json.dumps(case))
+    with pytest.raises(helicarm.InputError, match=r'"body": points.csv: 2 of .* "c" \(in 1 views\), "d" \(in 0 views\)'):
+        helicarm.register(landmarks)
+
+
 SIZE = 96
 AXES = np.indices((40, 40, 40)).transpose(1, 2, 3, 0)[..., ::-1]  # (x, y, z) of a voxel, 1 mm
 
@@ -129,3 +143,30 @@ def test_register_sequence_ends_where_progress_raises(sequence):
 def test_register_sequence_refuses_frames_that_do_not_rise(sequence, frames):
     with pytest.raises(helicarm.InputError, match="frames"):
         helicarm.register_sequence(sequence, frames)
+
+
+def test_register_sequence_misses_images_before_it_begins(sequence):
+    shares = []
+    with pytest.raises(helicarm.InputError, match="4 of 10 images do not exist, the first: A4.png"):
+        helicarm.register_sequence(sequence, "1-5", progress=shares.append)
+    assert not shares
+
+
+def test_a_mask_drawn_on_a_tiff_stack_may_be_nrrd(sequence, tmp_path):
+    hu = body_hu()
+    cv2.imwritemulti(str(tmp_path / "ct.tif"), list((hu.astype(int) + 1000).astype(np.uint16)))
+    header = ("NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: 40 40 40\n"
+              "space directions: (-1,0,0) (0,-1,0) (0,0,1)\nspace origin: (5,5,5)\nencoding: raw\n\n")
+    (tmp_path / "mask.nrrd").write_bytes(header.encode() + (hu > 0).astype(np.uint8).tobytes())
+    case = json.loads((sequence / "case.json").read_text())
+    for view in case["views"]:
+        view["image"] = view["image"].replace("{frame}", "1")
+        for file in (view["image"], view["camera"]):
+            (tmp_path / file).write_bytes((sequence / file).read_bytes())
+    start = np.eye(4)
+    start[:3, 3] = -20, -19, -21  # the first voxel is the stack's origin
+    case["models"] = [{"name": "body", "volume": "ct.tif", "voxel_mm": [1, 1, 1], "tiff_offset_hu": -1000,
+                       "mask": "mask.nrrd", "start": {"world_from_model": start.tolist()}}]
+    (tmp_path / "case.json").write_text(json.dumps(case))
+    pose = np.array(helicarm.register(tmp_path)["models"][0]["world_from_model"])
+    assert pose[:3, 3] == pytest.approx([-19, -20, -20], abs=0.2)

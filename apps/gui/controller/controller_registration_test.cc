@@ -138,6 +138,7 @@ StepCard card_of(const case_registration::RegisteredModel& model) {
 
 TEST(Steps, RegistrationShowsTheErrorOfItsWorstModel) {
   case_registration::RegisteredModel model;
+  model.registration.covariance.setZero();
   model.registration.covariance.diagonal().setConstant(0.04);
   EXPECT_EQ(card_of(model).figure, "within 0.56 mm (95 %)");  // 0.2 sqrt(7.815)
   EXPECT_EQ(card_of(model).status, StepStatus::good);

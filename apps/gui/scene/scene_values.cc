@@ -115,7 +115,7 @@ std::optional<ModelShape> shape_of(const case_registration::RegisteredModel& mod
                                    const std::optional<geometry::RigidTransform>& by_hand,
                                    const Colour& colour) {
   const registration::Registration& found = model.registration;
-  const bool has_pose = by_hand || !found.covariance.isZero(0);
+  const bool has_pose = by_hand || found.is_determined();
   if (!has_pose || (!model.model && found.failure)) return std::nullopt;
   ModelShape shape;
   shape.name = found.name;

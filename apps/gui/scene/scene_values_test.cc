@@ -159,7 +159,7 @@ TEST(SceneValues, RefusedOrMovedModelHasNoPlan) {
   EXPECT_EQ(shape->state, ModelShape::State::refused);
   EXPECT_TRUE(shape->points.empty() && shape->tunnels.empty());
 
-  model.registration.covariance.setZero();  // refused before its pose
+  model.registration.covariance = registration::Registration{}.covariance;  // refused without a pose
   EXPECT_FALSE(shape_of(model, {}, {}));
 }
 

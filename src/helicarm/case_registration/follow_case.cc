@@ -13,12 +13,29 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/registration/follow.h"
+#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::case_registration {
 namespace {
 
 using registration::Follower;
 using registration::Registration;
+
+/// Before hours of work: images of later frames that are missing, or frames that a file does not have.
+void check_frames(const pipeline::RegistrationCase& given, const FrameRange& range) {
+  std::string first;
+  int missing = 0;
+  for (int i = 0; i < range.count(); ++i)
+    for (const pipeline::CaseView& view :
+         value_or_throw(pipeline::at_frame(given, range.first + i * range.step)).base.views)
+      if (!std::filesystem::exists(view.image) && missing++ == 0) first = view.image.filename().string();
+  if (missing > 0)
+    throw BadInput(Reason::missing_file, fmt::format("{} of {} images do not exist, the first: {}", missing,
+                                                     range.count() * int(given.base.views.size()), first));
+  const auto last = value_or_throw(pipeline::at_frame(given, range.first + (range.count() - 1) * range.step));
+  for (const pipeline::CaseView& view : last.base.views)
+    value_or_throw(xray::read_xray_image(view.image, view.name, view.frame));
+}
 
 /// A model and who follows it; the follower refers to the model.
 struct Followed {
@@ -53,7 +70,9 @@ std::string pose_fields(const geometry::RigidTransform& pose,
   for (int row = 0; row < 4; ++row)
     for (int column = 0; column < 4; ++column) fields += fmt::format(",{:.9g}", matrix(row, column));
   for (int i = 0; i < 6; ++i)
-    fields += fmt::format(",{:.6g}", (i < 3 ? degrees : 1) * std::sqrt(std::max(0.0, covariance(i, i))));
+    fields += covariance.allFinite()
+                  ? fmt::format(",{:.6g}", (i < 3 ? degrees : 1) * std::sqrt(covariance(i, i)))
+                  : ",";
   return fields;
 }
 
@@ -118,6 +137,7 @@ Expected<CaseSequence> follow_case(const pipeline::RegistrationCase& given, cons
       return sequence;
     }
     sequence.warnings.insert(sequence.warnings.end(), loaded->warnings.begin(), loaded->warnings.end());
+    check_frames(given, range);
     const auto bodies = followed_models(first, options, *loaded);
     const auto begun = std::chrono::steady_clock::now();
     for (int i = 0; i < range.count(); ++i) {

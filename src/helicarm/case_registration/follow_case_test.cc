@@ -54,6 +54,7 @@ CaseSequence two_models() {
     registration::Registration model;
     model.name = name;
     model.decision = registration::Decision::accept;
+    model.covariance.setZero();
     model.covariance.diagonal().setConstant(0.01);
     frame.models.push_back(model);
   }

@@ -94,11 +94,16 @@ volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& given,
   if (stack && !given.voxel_mm)
     throw BadInput(Reason::bad_value,
                    fmt::format("models: \"{}\": \"voxel_mm\" is missing: a TIFF stack needs it", given.name));
-  if (!stack && given.voxel_mm)
+  if (!stack && given.voxel_mm && path == given.volume)
     throw BadInput(Reason::bad_value,
                    fmt::format("models: \"{}\": \"voxel_mm\" is for TIFF stacks only; {} states its own",
                                given.name, path.filename().string()));
   return stack ? tiff_stack(path, *given.voxel_mm, offset_hu) : value_or_throw(volume::read_volume(path));
+}
+
+bool has_voxels_of(const volume::Volume& volume, const Eigen::Vector3d& voxel_mm) {
+  const Eigen::Vector3d spacing = volume.patient_from_voxel.linear().colwise().norm();
+  return spacing.isApprox(voxel_mm, 1e-3);
 }
 
 void check_size(const std::string& view, const char* expected_by, const Eigen::Vector2i& expected,
@@ -119,7 +124,9 @@ LoadedViews views_of_cameras(const pipeline::RegistrationCase& given) {
     loaded.views.push_back(view_of(image, view.name, camera.view));
     loaded.views.back().grey = image.pixels;
     loaded.maps.emplace_back();
-    loaded.warnings.insert(loaded.warnings.end(), image.warnings.begin(), image.warnings.end());
+    // The camera states what the pixels measure.
+    std::ranges::copy_if(image.warnings, std::back_inserter(loaded.warnings),
+                         [](const Warning& warning) { return warning.reason != Reason::spacing_missing; });
   }
   return loaded;
 }
@@ -186,6 +193,9 @@ Expected<std::optional<registration::Model>> load_model(const pipeline::CaseMode
     const volume::Volume volume = volume_at(*given.volume, given, given.tiff_offset_hu);
     std::optional<volume::Volume> mask;
     if (given.mask) mask = volume_at(*given.mask, given, 0);
+    // A stack has no frame of its own: a mask drawn on it in another program brings that program's.
+    if (mask && given.voxel_mm && has_voxels_of(*mask, *given.voxel_mm))
+      mask->patient_from_voxel = volume.patient_from_voxel;
     std::optional<registration::HuWindow> window;
     if (given.window_hu) window = {given.window_hu->x(), given.window_hu->y()};
     return value_or_throw(registration::model_from(given.name, volume, mask, window));

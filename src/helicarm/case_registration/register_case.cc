@@ -65,14 +65,33 @@ void carry_plan(const Plan& plan, const pipeline::Case& given, RegisteredModel& 
   }
 }
 
+/// Without a model the errors are stated at the landmarks.
 registration::Registration by_landmarks(const std::string& name,
-                                        const registration::LandmarkRegistration& landmarks) {
+                                        const registration::LandmarkRegistration& landmarks,
+                                        const std::vector<std::string>& names,
+                                        const std::optional<double>& max_error_mm) {
   registration::Registration result;
   result.name = name;
   result.decision = registration::Decision::accept;
   result.world_from_model = landmarks.world_from_model;
   result.covariance = landmarks.covariance;
   result.centre = landmarks.centre;
+  double worst = 0;
+  for (const Vector3d& place : landmarks.places)
+    worst = std::max(worst, localization::length_at_95(
+                                registration::point_covariance(result.covariance, result.centre, place)));
+  const double limit = max_error_mm.value_or(registration::usual_error_mm);
+  if (worst <= limit) return result;
+  const auto largest = std::ranges::max_element(landmarks.residuals_mm);
+  const std::string message = fmt::format(
+      "{}: a landmark may be off by {:.2f} mm (95 %), limit {:g} mm; the largest residual is {:.2f} mm, of "
+      "\"{}\"",
+      name, worst, limit, *largest, names[std::size_t(largest - landmarks.residuals_mm.begin())]);
+  if (max_error_mm)
+    result.failure = Failure{Reason::uncertain, message, {}, {{"error_mm", worst}, {"limit_mm", limit}}};
+  else
+    result.warnings.push_back({Reason::uncertain, message, {}, {{"error_mm", worst}, {"limit_mm", limit}}});
+  result.decision = max_error_mm ? registration::Decision::refuse : registration::Decision::warn;
   return result;
 }
 
@@ -118,14 +137,16 @@ class Registrar {
       made.model = std::make_shared<const registration::Model>(*std::move(model));
     } else {
       made.by_landmarks_only = true;
-      made.registration = by_landmarks(asked.name, *made.landmarks);
+      made.registration =
+          by_landmarks(asked.name, *made.landmarks, made.landmark_names, options_.max_error_mm);
       if (loaded_.camera_covariance.size() == 0) {
         made.registration.warnings.push_back(registration::cameras_without_covariance(asked.name));
-        made.registration.decision = registration::Decision::warn;
+        made.registration.decision = std::max(made.registration.decision, registration::Decision::warn);
       }
     }
     if (!follows && views.size() > 1) made.registration.notes.push_back(motion_note(asked));
-    if (asked.plan) carry_plan(value_or_throw(read_plan(*asked.plan)), given_.base, made);
+    if (asked.plan && made.registration.is_determined())
+      carry_plan(value_or_throw(read_plan(*asked.plan)), given_.base, made);
     return made;
   }
 

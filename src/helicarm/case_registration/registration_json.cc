@@ -47,7 +47,7 @@ Json json_of(const RegisteredModel& model) {
                {"warnings", pipeline::json_list_of(r.warnings)},
                {"notes", pipeline::json_list_of(r.notes)},
                {"world_from_model", json_rows(r.world_from_model.matrix())},
-               {"covariance", json_rows(r.covariance)},
+               {"covariance", r.is_determined() ? json_rows(r.covariance) : Json()},
                {"centre_mm", json_list(r.centre)},
                {"starts", {{"n", r.starts}, {"agree", r.agree}}},
                {"runner_up", nullptr},
@@ -87,7 +87,7 @@ Json to_json(const CaseRegistration& result) {
 
 Json with_tunnels_of_models(Json result, const Json& registration) {
   for (const Json& model : registration["models"])
-    if (model["status"] == "ok")
+    if (model["failure"].is_null())
       for (const Json& tunnel : model["tunnels"]) result["tunnels"].push_back(tunnel);
   return result;
 }

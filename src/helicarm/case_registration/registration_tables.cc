@@ -25,10 +25,9 @@ report::ColumnOf<NamedPoint> coordinate(const char* title, Eigen::Index i) {
 
 report::Table models_table(const std::vector<RegisteredModel>& models) {
   using Model = RegisteredModel;
-  // A model refused before its pose was estimated has no covariance.
   const auto pose = [](auto value, int digits) {
     return [value, digits](const Model& m) {
-      if (m.registration.covariance.isZero(0)) return report::Cell{};
+      if (!m.registration.is_determined()) return report::Cell{};
       return report::Cell{report::coordinates(Eigen::Vector3d(value(m.registration)), digits)};
     };
   };

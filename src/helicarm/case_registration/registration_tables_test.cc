@@ -16,6 +16,7 @@ RegisteredModel femur() {
   RegisteredModel model;
   model.registration.name = "femur";
   model.registration.centre = {1, 2, 3};
+  model.registration.covariance.setZero();
   model.registration.covariance.diagonal() << 1e-6, 1e-6, 1e-6, 0.01, 0.04, 0.09;
   model.registration.views = {{"AP", 0.9, 1, {}, 100}, {"LAT", 0.8, 1, {}, 100}};
   model.registration.starts = 16;
@@ -35,7 +36,7 @@ TEST(ModelsTable, PoseHasItsStandardDeviations) {
 TEST(ModelsTable, ModelRefusedBeforeItsPoseHasNone) {
   RegisteredModel model = femur();
   model.registration.centre.setZero();
-  model.registration.covariance.setZero();
+  model.registration.covariance = registration::Registration{}.covariance;
   model.registration.failure = Failure{Reason::out_of_capture, "no start is near", "", {}};
   const report::Table table = models_table({model});
   for (const char* title : {"Centre x, y, z, mm", "Centre σ, mm", "Rotation σ, °"})

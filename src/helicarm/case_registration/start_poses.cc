@@ -44,11 +44,13 @@ std::vector<RigidTransform> axis_starts(const registration::Model& model, const 
   return starts;
 }
 
-/// Landmarks of the file that are picked in two or more views.
-std::vector<registration::Landmark> landmarks_of(const pipeline::RegistrationCase& given,
+/// Landmarks of the file that are picked in two or more views. Refuses (bad_value) fewer than three.
+std::vector<registration::Landmark> landmarks_of(const pipeline::CaseModel& asked,
+                                                 const pipeline::RegistrationCase& given,
                                                  const LoadedViews& loaded,
-                                                 const std::vector<RegistrationView>& views,
-                                                 const std::filesystem::path& path) {
+                                                 const std::vector<RegistrationView>& views) {
+  const std::filesystem::path& path = *asked.landmarks;
+  std::string missing;
   const CsvTable table = value_or_throw(read_csv(path, {"name", "x_mm", "y_mm", "z_mm"}, {}));
   std::vector<registration::Landmark> landmarks;
   for (std::size_t row = 0; row < table.rows(); ++row) {
@@ -71,7 +73,11 @@ std::vector<registration::Landmark> landmarks_of(const pipeline::RegistrationCas
         sigmas.push_back(pick.sigma_px.value_or(0.5));
       }
     }
-    if (rays.size() < 2) continue;
+    if (rays.size() < 2) {
+      missing +=
+          fmt::format("{}\"{}\" (in {} views)", missing.empty() ? "" : ", ", landmark.name, rays.size());
+      continue;
+    }
     Eigen::MatrixXd covariance =
         Eigen::MatrixXd::Zero(2 * Eigen::Index(rays.size()), 2 * Eigen::Index(rays.size()));
     for (std::size_t i = 0; i < rays.size(); ++i)
@@ -81,6 +87,12 @@ std::vector<registration::Landmark> landmarks_of(const pipeline::RegistrationCas
     landmark.covariance_in_world = crossing.covariance;
     landmarks.push_back(std::move(landmark));
   }
+  if (landmarks.size() < registration::least_landmarks)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("models: \"{}\": {}: {} of its landmarks are picked in two views, at least {} "
+                               "are required; not picked so: {}",
+                               asked.name, path.filename().string(), landmarks.size(),
+                               registration::least_landmarks, missing.empty() ? "none" : missing));
   return landmarks;
 }
 
@@ -91,7 +103,7 @@ StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedView
                        const std::vector<RegistrationView>& views) {
   if (asked.world_from_model) return {{*asked.world_from_model}, {}, {}};
   if (asked.landmarks) {
-    const auto landmarks = landmarks_of(given, loaded, views, *asked.landmarks);
+    const auto landmarks = landmarks_of(asked, given, loaded, views);
     StartPoses start;
     start.landmarks = value_or_throw(registration::register_landmarks(landmarks));
     for (const registration::Landmark& landmark : landmarks) start.landmark_names.push_back(landmark.name);

@@ -27,7 +27,7 @@ std::optional<fs::path> model_file(JsonReader& reader, const char* key, const fs
 }
 
 void read_start(JsonReader reader, const fs::path& folder, CaseModel& model) {
-  if (reader.has("world_from_model"))
+  if (!reader.raw("world_from_model").is_null())
     model.world_from_model = value_or_throw(
         geometry::rigid_transform_from(geometry::matrix_from(reader, "world_from_model", {-1e5, 1e5}),
                                        reader.where() + ": \"world_from_model\""));

@@ -18,7 +18,8 @@ using Eigen::Vector3d;
 
 constexpr double strain_prior = 0.05;
 constexpr double no_strain = 1e-6;
-constexpr int xx = 0, xy = 3, xz = 4;  // of a strain
+constexpr int xx = 0, xy = 3, xz = 4;                        // of a strain
+constexpr int least_patches = 8, least_contour_points = 12;  // of a view
 constexpr double least_patch_score = 0.4;
 constexpr double least_contour_score = 0.6;
 constexpr double least_mirrored_ratio = 1.02;  // of a nearly symmetric bone 1.05 to 1.1
@@ -32,7 +33,6 @@ constexpr double most_disagreement_ratio =
     4;                               // chi-square per degree of freedom; by chance once in 2000 registrations
 constexpr double refused_ratio = 9;  // three standard deviations
 constexpr double refused_ratio_exact = 50;  // cameras of unknown error
-constexpr double usual_error_mm = 2;
 
 RigidCovariance inverse_of(const RigidCovariance& matrix) {
   return geometry::solve_spd(matrix, RigidCovariance::Identity()).solution;
@@ -108,6 +108,13 @@ Deformation deformation_of(const Observation& observation, const ErrorModel& err
       std::hypot(std::sqrt(std::max(0.0, along.dot(covariance.bottomRightCorner<6, 6>() * along))), floor)};
 }
 
+bool is_positive_definite(const RigidCovariance& covariance) {
+  if (!covariance.allFinite() || covariance.diagonal().minCoeff() <= 0) return false;
+  const RigidStep scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  const RigidCovariance correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
+  return Eigen::LLT<RigidCovariance>(correlation).info() == Eigen::Success;
+}
+
 /// The views' own solutions against their errors. Cameras without covariance explain more.
 template <class Refuse, class Warn>
 void check_chi_square(const Model& model, const RegistrationOptions& options, const Registration& result,
@@ -128,6 +135,24 @@ void check_chi_square(const Model& model, const RegistrationOptions& options, co
          message + fmt::format("; the covariance is inflated by {:.1f}", apart.ratio()), figures);
 }
 
+/// Too few edges in some view: agreement means nothing. A pose without a covariance means no more.
+template <class Refuse>
+void check_determined(const Model& model, Registration& result, const Refuse& refuse) {
+  const int least = model.surface ? least_contour_points : least_patches;
+  for (const RegisteredView& view : result.views)
+    if (view.comparisons < least)
+      refuse(
+          Reason::wrong_model,
+          fmt::format("{}: {} of its edges can be compared with {}, at least {} are required: its start is "
+                      "outside the image, it is hidden or smaller than its file says (unit), or the "
+                      "volume's values are no Hounsfield units",
+                      model.name, view.comparisons, view.name, least),
+          {{"comparisons", double(view.comparisons)}, {"limit", double(least)}});
+  if (is_positive_definite(result.covariance)) return;
+  result.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
+  refuse(Reason::uncertain, model.name + ": the images do not determine its pose", {});
+}
+
 void decide(const Model& model, const std::vector<geometry::RigidTransform>& starts,
             const RegistrationOptions& options, Registration& result) {
   const auto refuse = [&](Reason reason, const std::string& message, std::map<std::string, double> figures) {
@@ -136,13 +161,15 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
   const auto warn = [&](Reason reason, const std::string& message, std::map<std::string, double> figures) {
     result.warnings.push_back({reason, message, {}, std::move(figures)});
   };
+  check_determined(model, result, refuse);
   const double least = model.surface ? least_contour_score : least_patch_score;
   for (const RegisteredView& view : result.views)
     if (view.score < least)
       refuse(Reason::wrong_model,
              fmt::format(
                  "{}: the model explains {:.2f} of its edges in {}, at least {:.2f} are required: another "
-                 "bone, another patient, a start too far away, or the model is hidden",
+                 "bone, patient or unit, exchanged cameras or images, a start too far away, or the model is "
+                 "hidden",
                  model.name, view.score, view.name, least),
              {{"score", view.score}, {"limit", least}});
   double nearest = 1e9;
@@ -191,7 +218,7 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
                model.name, result.disagreement->distance_mm, result.disagreement->sigma_mm),
            {{"distance_mm", result.disagreement->distance_mm}, {"sigma_mm", result.disagreement->sigma_mm}});
   check_chi_square(model, options, result, refuse, warn);
-  const double worst = worst_error_mm(model, result);
+  const double worst = result.is_determined() ? worst_error_mm(model, result) : 0;
   if (worst > options.max_error_mm.value_or(usual_error_mm)) {
     const std::string message =
         fmt::format("{}: a point of the model may be off by {:.2f} mm (95 %), limit {:g} mm{}", model.name,

@@ -63,6 +63,7 @@ TEST(RelativePose, HasTheErrorsOfBothBodies) {
   Registration reference, model;
   reference.world_from_model = true_pose();
   reference.centre = {0, 0, 0};
+  reference.covariance = RigidCovariance::Zero();
   reference.covariance.diagonal() << 1e-4, 1e-4, 1e-4, 0.01, 0.01, 0.01;
   model.world_from_model = {Eigen::Matrix3d::Identity(), Vector3d(10, 0, 0)};
   model.centre = {10, 0, 0};

@@ -16,7 +16,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr std::size_t least_landmarks = 3;
 constexpr double least_spread_mm = 2;  // rms distance from the line that fits the landmarks best
 
 }  // namespace
@@ -52,6 +51,7 @@ Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& l
   RigidCovariance information = RigidCovariance::Zero();
   for (const Landmark& landmark : landmarks) {
     const Vector3d at = result.world_from_model * landmark.in_model;
+    result.places.push_back(at);
     result.residuals_mm.push_back((landmark.in_world - at).norm());
     result.fre_mm += std::pow(result.residuals_mm.back(), 2) / n;
     stated += landmark.covariance_in_world.trace() / n;

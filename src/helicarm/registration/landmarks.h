@@ -9,6 +9,8 @@
 
 namespace helicarm::registration {
 
+inline constexpr std::size_t least_landmarks = 3;
+
 /// A landmark in the model and in the world.
 struct Landmark {
   std::string name;
@@ -19,11 +21,12 @@ struct Landmark {
 
 struct LandmarkRegistration {
   geometry::RigidTransform world_from_model;
-  Eigen::Vector3d centre;            ///< mean of the landmarks, world
-  std::vector<double> residuals_mm;  ///< FRE of each
-  double fre_mm = 0;                 ///< rms
-  double fle_mm = 0;                 ///< rms; from the residuals or from the covariances, the larger
-  RigidCovariance covariance;        ///< about `centre`: gives the TRE of Fitzpatrick, West and Maurer (1998)
+  Eigen::Vector3d centre;               ///< mean of the landmarks, world
+  std::vector<Eigen::Vector3d> places;  ///< the model's landmarks at the pose, world
+  std::vector<double> residuals_mm;     ///< FRE of each
+  double fre_mm = 0;                    ///< rms
+  double fle_mm = 0;                    ///< rms; from the residuals or from the covariances, the larger
+  RigidCovariance covariance;  ///< about `centre`: gives the TRE of Fitzpatrick, West and Maurer (1998)
 };
 
 /// Least-squares rigid motion from model to world (Arun 1987, proper rotations only). Refuses (bad_value)

@@ -116,6 +116,15 @@ void add_samples(Model& model, const std::vector<Vector3d>& points) {
   model.resolution_mm = std::cbrt(std::abs(model.density.model_from_voxel.linear().determinant()));
 }
 
+Expected<Model> plausible(Model model) {
+  constexpr double smallest_mm = 1, largest_mm = 1000;
+  if (model.radius_mm >= smallest_mm && model.radius_mm <= largest_mm) return model;
+  return fail(Reason::bad_value,
+              fmt::format("{}: the body's points are {:.3g} mm from its centre (rms), from {:g} to {:g} are "
+                          "possible: is its file in mm?",
+                          model.name, model.radius_mm, smallest_mm, largest_mm));
+}
+
 /// 1 in voxels whose centre's column, along z, is inside the surface.
 Density filled(const phantom::TriangleMesh& mesh, double voxel_mm) {
   Vector3d low = mesh.corners.front(), high = low;
@@ -194,11 +203,11 @@ Expected<Model> model_from(const std::string& name, const volume::Volume& volume
     return fail(Reason::bad_value,
                 fmt::format("{}: nothing within the mask and window is denser than soft tissue", name));
   add_samples(model, points);
-  return model;
+  return plausible(std::move(model));
 }
 
 Expected<Model> model_from(const std::string& name, phantom::TriangleMesh mesh) {
-  return prepare_surface(std::move(mesh), name).map([&](Surface surface) {
+  return prepare_surface(std::move(mesh), name).and_then([&](Surface surface) {
     Model model;
     model.name = name;
     Vector3d low = surface.mesh.corners.front(), high = low;
@@ -207,7 +216,7 @@ Expected<Model> model_from(const std::string& name, phantom::TriangleMesh mesh) 
     model.density = filled(surface.mesh, (high - low).maxCoeff() / 96);
     add_samples(model, surface.mesh.corners);
     model.surface = std::move(surface);
-    return model;
+    return plausible(std::move(model));
   });
 }
 

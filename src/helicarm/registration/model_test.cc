@@ -55,6 +55,14 @@ TEST(ModelFrom, AnEmptyWindowIsRefused) {
   EXPECT_FALSE(model_from("block", block({1, 1, 1}), std::nullopt, HuWindow{2000, 3000}));
 }
 
+TEST(ModelFrom, ABodyInMetresIsRefused) {
+  volume::Volume volume = block({1, 1, 1});
+  volume.patient_from_voxel = Eigen::Scaling(0.001) * volume.patient_from_voxel;
+  const auto model = model_from("block", volume, std::nullopt, HuWindow{150, 3000});
+  ASSERT_FALSE(model);
+  EXPECT_THAT(model.error().message, testing::HasSubstr("is its file in mm?"));
+}
+
 TEST(ModelFrom, VoxelsOnTheBoundaryKeepTheirShare) {
   volume::Volume volume = block({1, 1, 1});
   const auto at = [](int x) { return std::size_t(x + 20 * (10 + 16 * 3)); };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -75,8 +76,9 @@ struct Registration {
   std::vector<Warning> warnings;
   std::vector<Warning> notes;
   geometry::RigidTransform world_from_model;
-  RigidCovariance covariance = RigidCovariance::Zero();  ///< about `centre`, as RigidStep
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();      ///< world
+  /// About `centre`, as RigidStep; not a number where the images do not determine the pose (refused).
+  RigidCovariance covariance = RigidCovariance::Constant(std::numeric_limits<double>::quiet_NaN());
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< world
   double score = 0;
   double spacing_mm = 0;  ///< of the finest comparison
   int starts = 0, agree = 0;
@@ -88,7 +90,12 @@ struct Registration {
   std::optional<Disagreement> disagreement;  ///< of two or more views
   std::vector<RegisteredView> views;
   double seconds = 0;
+
+  bool is_determined() const { return covariance.allFinite(); }
 };
+
+/// A larger 95 % error is warned of (uncertain) if no limit is given.
+inline constexpr double usual_error_mm = 2;
 
 /// covariance_missing, of a registration to cameras of other programs.
 Warning cameras_without_covariance(const std::string& name);

@@ -108,6 +108,17 @@ TEST(RegisterModel, RefusesAnotherSize) {
   EXPECT_THAT(result.failure->reason, testing::AnyOf(Reason::wrong_model, Reason::registration_disagrees));
 }
 
+TEST(RegisterModel, ABodyOutsideTheImagesHasNoCovariance) {
+  const Model model = model_of(lopsided_bone());
+  RigidTransform start = true_pose();
+  start.translation.z() += 400;
+  const auto result = register_model(model, two_views(lopsided_bone()), {start}, quick());
+  ASSERT_TRUE(result.failure);
+  EXPECT_EQ(result.failure->reason, Reason::wrong_model);
+  EXPECT_THAT(result.failure->message, testing::HasSubstr("0 of its edges can be compared with AP"));
+  EXPECT_FALSE(result.is_determined());
+}
+
 TEST(RegisterModel, OneViewStatesItsDepthAsUncertain) {
   const auto volume = lopsided_bone();
   const Model model = model_of(volume);

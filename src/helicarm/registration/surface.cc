@@ -65,10 +65,13 @@ void check_count(double triangles, const std::string& origin) {
 
 TriangleMesh from_binary_stl(std::string_view bytes, const std::string& origin) {
   const auto count = value_at<std::uint32_t>(bytes, 80);
-  check_count(count, origin);
   if (bytes.size() < stl_header + stl_facet * count)
-    throw BadInput(Reason::truncated, fmt::format("{}: {} bytes, {} triangles need {}", origin, bytes.size(),
-                                                  count, stl_header + stl_facet * count));
+    throw BadInput(
+        Reason::truncated,
+        fmt::format("{}: is cut off, or no surface (STL, PLY, VTP): {} bytes, {} triangles of an STL "
+                    "file need {}",
+                    origin, bytes.size(), count, stl_header + stl_facet * count));
+  check_count(count, origin);
   TriangleMesh mesh;
   Welder weld(mesh);
   for (std::size_t i = 0; i < count; ++i) {
