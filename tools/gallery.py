@@ -12,6 +12,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
+import bone_ct  # noqa: E402
 import helicarm  # noqa: E402
 
 VIEWS = [f"V{i + 1}:{20 * i - 70},{15 * (-1) ** i}" for i in range(8)]
@@ -44,6 +45,31 @@ def measured_phantom(out):
     save(helicarm.figures.phantom(measured).figure, out / "phantom-measured.png")
 
 
+def registered_knee(out):
+    """The femur of a modelled knee, registered from a start 8 mm off, over the images that are not its own renderer's."""
+    with tempfile.TemporaryDirectory() as name:
+        case = pathlib.Path(name) / "case"
+        knee = bone_ct.Knee(0)
+        bone_ct.write_nrrd(case.with_name("true.nrrd"), bone_ct.rounded(knee.hu))
+        helicarm.simulate_case(case, seed=100, kind="flat", ct=case.with_name("true.nrrd"))
+        bone_ct.write_nrrd(case / "scan.nrrd", bone_ct.rounded(knee.scanned()))
+        bone_ct.write_nrrd(case / "femur.nrrd", knee.femur.astype(np.uint8))
+        start = np.array(json.loads((case / "truth.json").read_text())["ct"]["calibrator_from_patient"])
+        start[:3, 3] += [5, -5, 4]
+        given = json.loads((case / "case.json").read_text())
+        given["models"] = [{"name": "femur", "volume": "scan.nrrd", "mask": "femur.nrrd",
+                            "start": {"world_from_model": start.tolist()}}]
+        (case / "case.json").write_text(json.dumps(given))
+        helicarm.register(case, out=case.with_name("out"))
+        figure, axes = plt.subplots(1, 2, figsize=(10, 5))
+        for ax, view in zip(axes, given["views"]):
+            ax.imshow(plt.imread(case.with_name("out") / f"{view['name']}_overlay.png"))
+            ax.axis("off")
+    figure.subplots_adjust(0, 0, 1, 1, wspace=0.01)
+    figure.savefig(out / "registration-overlay.jpg", dpi=100, pil_kwargs={"quality": 85})
+    plt.close(figure)
+
+
 def main():
     out = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).resolve().parent.parent / "docs")
     with tempfile.TemporaryDirectory() as folder:
@@ -56,6 +82,7 @@ def main():
     for name, ax in figures.items():
         save(ax.figure, out / f"python-{name}.png")
     measured_phantom(out)
+    registered_knee(out)
 
 
 if __name__ == "__main__":
