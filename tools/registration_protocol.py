@@ -347,12 +347,15 @@ def tables(rows):
         codes = sorted({row["code"] or ",".join(row["warnings"]) or "-" for row in own})
         lines.append(f"| {kind} | {len(own)} | {count('refuse')} | {count('warn')} | {count('accept')} | {', '.join(codes)} |")
     single = [row for row in rows if row["kind"] == "one_view" and "sigma_mm" in row and row.get("both_sigma_mm")]
-    if single:
-        errors, sigmas, both = (np.array([row[name] for row in single]) for name in ("error_mm", "sigma_mm", "both_sigma_mm"))
-        lines += ["", "| one view | decisions | error along its ray, rms | predicted sigma, median | both views' sigma, median | error over sigma, rms |",
-                  "| --- | --- | --- | --- | --- | --- |",
-                  f"| {len(single)} cases | {', '.join(sorted({row['decision'] for row in single}))} | {np.sqrt(np.mean(errors**2)):.2f} mm | "
-                  f"{np.median(sigmas):.2f} mm | {np.median(both):.3f} mm | {np.sqrt(np.mean((errors / sigmas) ** 2)):.1f} |"]
+    kept = [row for row in single if row["decision"] != "refuse"]
+    if kept:
+        count = lambda decision: sum(row["decision"] == decision for row in single)  # noqa: E731
+        errors, sigmas, both = (np.array([row[name] for row in kept]) for name in ("error_mm", "sigma_mm", "both_sigma_mm"))
+        lines += ["", "| one view | refused | warned | accepted | not refused: error along its ray, rms | mean | predicted sigma, median | "
+                  "both views' sigma, median | within 1.96 sigma |", "| --- |" + " --- |" * 8,
+                  f"| {len(single)} cases | {count('refuse')} | {count('warn')} | {count('accept')} | {np.sqrt(np.mean(errors**2)):.2f} mm | "
+                  f"{np.mean(errors):+.2f} mm | {np.median(sigmas):.2f} mm | {np.median(both):.3f} mm | "
+                  f"{np.sum(abs(errors) < 1.96 * sigmas)} of {len(kept)} |"]
     return "\n".join(lines)
 
 
