@@ -43,7 +43,8 @@ void mark_blocks(Density& density) {
   const Vector3i count = density.blocks();
   density.occupied.assign(std::size_t(count.prod()), 0);
   const auto mark = [&](int x, int y, int z) {
-    density.occupied[std::size_t(x + count.x() * (y + count.y() * z))] = 1;
+    const Eigen::Index block = x + Eigen::Index{count.x()} * (y + Eigen::Index{count.y()} * z);
+    density.occupied[std::size_t(block)] = 1;
   };
   for (int z = 0; z < density.size.z(); ++z)
     for (int y = 0; y < density.size.y(); ++y)
@@ -222,7 +223,9 @@ void for_bundle(const Density& density, const Bundle& bundle, const Take& take) 
     }
     const float* slab = density.values.data() + std::ptrdiff_t{plane} * strides[bundle.k];
     const auto along = float(plane - bundle.first), at = float(plane);
+#ifndef __clang__
 #pragma GCC ivdep
+#endif
     for (std::size_t i = 0; i < Bundle::rays; ++i) {
       const float p = bundle.p0[i] + bundle.per_p[i] * along, q = bundle.q0[i] + bundle.per_q[i] * along;
       const int whole_p = std::min(std::max(int(p), 0), last_p),

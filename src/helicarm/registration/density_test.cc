@@ -19,7 +19,7 @@ Density smooth_body() {
   density.model_from_voxel.linear() =
       geometry::rotation_from_vector(Vector3d(0.1, -0.2, 0.3)) * Vector3d(1.0, 0.8, 1.3).asDiagonal();
   density.model_from_voxel.translation() = Vector3d(-12, -10, -11);
-  density.values.assign(24 * 30 * 20, 0);
+  density.values.assign(std::size_t{24} * 30 * 20, 0);
   for (int z = 1; z < 19; ++z)
     for (int y = 1; y < 29; ++y)
       for (int x = 1; x < 23; ++x) {
@@ -94,7 +94,7 @@ TEST(EightRays, EqualSingleOnes) {
 TEST(EightRays, SeeTheSameWithEmptyBlocksMarked) {
   Density density = smooth_body();
   density.size = {64, 70, 60};
-  density.values.assign(64 * 70 * 60, 0);
+  density.values.assign(std::size_t{64} * 70 * 60, 0);
   for (const Vector3i& speck :
        {Vector3i(8, 8, 8), Vector3i(7, 40, 31), Vector3i(33, 16, 55), Vector3i(20, 63, 24)})
     density.values[density.index(speck.x(), speck.y(), speck.z())] = 1;

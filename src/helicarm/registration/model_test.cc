@@ -10,12 +10,16 @@ namespace {
 
 using Eigen::Vector3d;
 
+std::size_t voxel(int x, int y, int z) {
+  return std::size_t(x) + std::size_t{20} * (std::size_t(y) + std::size_t{16} * std::size_t(z));
+}
+
 /// A block of bone off the middle of a grid of soft tissue; `signs`: directions of the voxel axes in the
 /// patient frame, as files in RAS or with a left-handed grid have them.
 volume::Volume block(const Vector3d& signs) {
   volume::Volume volume;
   volume.size = {20, 16, 12};
-  volume.voxels.assign(20 * 16 * 12, 40);
+  volume.voxels.assign(std::size_t{20} * 16 * 12, 40);
   const Vector3d spacing(1, 1.5, 2);
   volume.patient_from_voxel.linear() = signs.cwiseProduct(spacing).asDiagonal();
   volume.patient_from_voxel.translation() = Vector3d(100, -50, 20);
@@ -24,7 +28,7 @@ volume::Volume block(const Vector3d& signs) {
       for (int x = 0; x < 20; ++x) {
         const Vector3d at = volume.patient_from_voxel * Vector3d(x, y, z);
         const Vector3d off = at - volume.patient_from_voxel * Vector3d(5, 10, 3);
-        if (off.cwiseAbs().maxCoeff() <= 4) volume.voxels[std::size_t(x + 20 * (y + 16 * z))] = 900;
+        if (off.cwiseAbs().maxCoeff() <= 4) volume.voxels[voxel(x, y, z)] = 900;
       }
   return volume;
 }
@@ -65,7 +69,7 @@ TEST(ModelFrom, ABodyInMetresIsRefused) {
 
 TEST(ModelFrom, VoxelsOnTheBoundaryKeepTheirShare) {
   volume::Volume volume = block({1, 1, 1});
-  const auto at = [](int x) { return std::size_t(x + 20 * (10 + 16 * 3)); };
+  const auto at = [](int x) { return voxel(x, 10, 3); };
   ASSERT_EQ(volume.voxels[at(9)], 900);
   volume.voxels[at(10)] = 120;  // a seventh of the voxel is bone
   volume.voxels[at(11)] = 120;  // beside no bone
@@ -90,7 +94,7 @@ TEST(ModelFrom, ABodyThatReachesTheEdgeHasCuts) {
   volume::Volume volume = block({1, 1, 1});
   EXPECT_TRUE(model_from("block", volume, std::nullopt, HuWindow{150, 3000})->cuts.empty());
   for (int x = 0; x < 20; ++x)
-    for (int y = 4; y < 12; ++y) volume.voxels[std::size_t(x + 20 * y)] = 900;
+    for (int y = 4; y < 12; ++y) volume.voxels[voxel(x, y, 0)] = 900;
   EXPECT_FALSE(model_from("block", volume, std::nullopt, HuWindow{150, 3000})->cuts.empty());
 }
 

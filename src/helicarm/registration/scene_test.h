@@ -17,7 +17,7 @@ inline volume::Volume lopsided_bone(double size = 1, double bump = 9) {
   volume::Volume volume;
   volume.size = {56, 48, 64};
   volume.patient_from_voxel = Eigen::Translation3d(-30, 12, 5) * Eigen::Scaling(size);
-  const auto inside = [](double x, double y, double z, Eigen::Vector3d c, Eigen::Vector3d r) {
+  const auto inside = [](double x, double y, double z, const Eigen::Vector3d& c, const Eigen::Vector3d& r) {
     return (Eigen::Vector3d(x, y, z) - c).cwiseQuotient(r).squaredNorm() < 1;
   };
   for (int z = 0; z < 64; ++z)
