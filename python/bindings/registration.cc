@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <variant>
+
 #include "arrays.h"
 #include "checks.h"
 #include "helicarm/case_registration/follow_case.h"
@@ -51,16 +53,27 @@ py::object register_models(const std::filesystem::path& folder,
   return answer;
 }
 
-/// "A-B[:STEP]" or a range.
-case_registration::FrameRange frames_from(const py::object& frames) {
-  if (py::isinstance<py::str>(frames))
-    return value_or_raise(case_registration::frame_range_from(frames.cast<std::string>()));
-  const auto numbers = frames.cast<std::vector<int>>();
-  const int step = numbers.size() > 1 ? numbers[1] - numbers[0] : 1;
-  for (std::size_t i = 0; i < numbers.size(); ++i)
-    if (step < 1 || numbers[i] != numbers[0] + int(i) * step)
+/// "A-B[:STEP]", or numbers such as a range.
+using Frames = std::variant<std::string, py::sequence>;
+
+case_registration::FrameRange frames_from(const Frames& frames) {
+  if (const auto* text = std::get_if<std::string>(&frames))
+    return value_or_raise(case_registration::frame_range_from(*text));
+  const auto& given = std::get<py::sequence>(frames);
+  constexpr std::size_t most = 1'000'000;
+  if (given.empty() || given.size() > most)
+    raise({Reason::bad_value,
+           fmt::format("frames: has {} numbers, 1 to {} are possible", given.size(), most),
+           {},
+           {}});
+  const auto numbers = given.cast<std::vector<std::int64_t>>();
+  for (const std::int64_t number : numbers)
+    if (number < 0 || number >= std::int64_t(most))
+      raise({Reason::bad_value, fmt::format("frames: {} is outside 0 to {}", number, most - 1), {}, {}});
+  const std::int64_t step = numbers.size() > 1 ? numbers[1] - numbers[0] : 1;
+  for (std::size_t i = 1; i < numbers.size(); ++i)
+    if (step < 1 || numbers[i] - numbers[i - 1] != step)
       raise({Reason::bad_value, "frames: the numbers do not rise in equal steps", {}, {}});
-  if (numbers.empty()) raise({Reason::bad_value, "frames: is empty", {}, {}});
   return value_or_raise(
       case_registration::frame_range_from(fmt::format("{}-{}:{}", numbers.front(), numbers.back(), step)));
 }
@@ -113,7 +126,7 @@ py::dict relative_poses_of(const CaseSequence& sequence, std::size_t model) {
   return poses;
 }
 
-py::object register_sequence(const std::filesystem::path& folder, const py::object& frames,
+py::object register_sequence(const std::filesystem::path& folder, const Frames& frames,
                              const std::optional<std::filesystem::path>& out,
                              std::optional<double> max_error_mm, double search_mm, double search_deg,
                              unsigned threads, const py::object& progress) {
@@ -182,7 +195,8 @@ void add_registration(py::module_& module) {
       "Follow the models of a case through a sequence of images, as `helicarm register --frames` does.\n\n"
       "frames: \"A-B[:STEP]\" or a range. Returns frames (N numbers), models (for each: name, "
       "world_from_model\n"
-      "(N, 4, 4), mm, covariance (N, 6, 6) about centre_mm (N, 3), decision (N words), refused (N reasons "
+      "(N, 4, 4), mm, covariance (N, 6, 6; not a number where the images determine no pose) about centre_mm\n"
+      "(N, 3), decision (N words), refused (N reasons "
       "or\n"
       "None)), relative (of the second and further models: name, reference, reference_from_model (N, 4, 4),\n"
       "covariance (N, 6, 6)), warnings and seconds.\n\n"

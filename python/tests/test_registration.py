@@ -139,7 +139,7 @@ def test_register_sequence_ends_where_progress_raises(sequence):
         helicarm.register_sequence(sequence, "1-3", progress=stop)
 
 
-@pytest.mark.parametrize("frames", [[1, 2, 4], [3, 2], [], "3-1", [-1, 0]])
+@pytest.mark.parametrize("frames", [[1, 2, 4], [3, 2], [], "3-1", [-1, 0], range(10**9), [-(2**62), 2**62]])
 def test_register_sequence_refuses_frames_that_do_not_rise(sequence, frames):
     with pytest.raises(helicarm.InputError, match="frames"):
         helicarm.register_sequence(sequence, frames)

@@ -187,6 +187,8 @@ void Controller::export_to(const fs::path& folder) {
           value_or_throw(write_pdf_report(result, folder / "report.pdf"));
           value_or_throw(report::write_exports(result, folder));
           Json json = pipeline::to_json(result);
+          std::error_code absent;
+          fs::remove(folder / "registration.json", absent);  // of an earlier export
           if (registration) {
             value_or_throw(case_registration::write_registration(*registration, folder / "registration"));
             const Json models = case_registration::to_json(*registration);

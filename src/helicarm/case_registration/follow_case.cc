@@ -21,7 +21,7 @@ namespace {
 using registration::Follower;
 using registration::Registration;
 
-/// Before hours of work: images of later frames that are missing, or frames that a file does not have.
+/// Refuses images of later frames that are missing, and frames that a file does not have, before the work.
 void check_frames(const pipeline::RegistrationCase& given, const FrameRange& range) {
   std::string first;
   int missing = 0;

@@ -71,6 +71,13 @@ TEST(Sequence, TablesHoldPosesAndRelativePoses) {
   EXPECT_NE(relative.find("\n4,\"tibia, left\",femur,accept,1,0,0,25,"), std::string::npos) << relative;
 }
 
+TEST(Sequence, APoseThatIsNotDeterminedHasEmptySigmas) {
+  CaseSequence sequence = two_models();
+  sequence.frames[0].models[1].covariance = registration::Registration{}.covariance;
+  EXPECT_NE(poses_csv(sequence).find(",0,0,0,1,,,,,,,\n"), std::string::npos) << poses_csv(sequence);
+  EXPECT_NE(relative_csv(sequence).find(",0,0,0,1,,,,,,,\n"), std::string::npos) << relative_csv(sequence);
+}
+
 TEST(Sequence, OneRefusalIsNamedWithItsFrame) {
   CaseSequence sequence = two_models();
   EXPECT_FALSE(sequence.refusal());

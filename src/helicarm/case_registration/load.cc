@@ -87,18 +87,18 @@ volume::Volume tiff_stack(const fs::path& path, const Eigen::Vector3d& voxel_mm,
   return stack;
 }
 
-volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& given, double offset_hu) {
+bool is_stack(const fs::path& path) {
   std::string extension = path.extension().string();
   std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  const bool stack = extension == ".tif" || extension == ".tiff";
-  if (stack && !given.voxel_mm)
+  return extension == ".tif" || extension == ".tiff";
+}
+
+volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& given, double offset_hu) {
+  if (!is_stack(path)) return value_or_throw(volume::read_volume(path));
+  if (!given.voxel_mm)
     throw BadInput(Reason::bad_value,
                    fmt::format("models: \"{}\": \"voxel_mm\" is missing: a TIFF stack needs it", given.name));
-  if (!stack && given.voxel_mm && path == given.volume)
-    throw BadInput(Reason::bad_value,
-                   fmt::format("models: \"{}\": \"voxel_mm\" is for TIFF stacks only; {} states its own",
-                               given.name, path.filename().string()));
-  return stack ? tiff_stack(path, *given.voxel_mm, offset_hu) : value_or_throw(volume::read_volume(path));
+  return tiff_stack(path, *given.voxel_mm, offset_hu);
 }
 
 bool has_voxels_of(const volume::Volume& volume, const Eigen::Vector3d& voxel_mm) {
@@ -190,6 +190,10 @@ Expected<std::optional<registration::Model>> load_model(const pipeline::CaseMode
       return value_or_throw(
           registration::model_from(given.name, value_or_throw(registration::read_surface(*given.surface))));
     if (!given.volume) return std::nullopt;
+    if (given.voxel_mm && !is_stack(*given.volume))
+      throw BadInput(Reason::bad_value,
+                     fmt::format("models: \"{}\": \"voxel_mm\" is for TIFF stacks only; {} states its own",
+                                 given.name, given.volume->filename().string()));
     const volume::Volume volume = volume_at(*given.volume, given, given.tiff_offset_hu);
     std::optional<volume::Volume> mask;
     if (given.mask) mask = volume_at(*given.mask, given, 0);

@@ -108,13 +108,6 @@ Deformation deformation_of(const Observation& observation, const ErrorModel& err
       std::hypot(std::sqrt(std::max(0.0, along.dot(covariance.bottomRightCorner<6, 6>() * along))), floor)};
 }
 
-bool is_positive_definite(const RigidCovariance& covariance) {
-  if (!covariance.allFinite() || covariance.diagonal().minCoeff() <= 0) return false;
-  const RigidStep scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
-  const RigidCovariance correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
-  return Eigen::LLT<RigidCovariance>(correlation).info() == Eigen::Success;
-}
-
 /// The views' own solutions against their errors. Cameras without covariance explain more.
 template <class Refuse, class Warn>
 void check_chi_square(const Model& model, const RegistrationOptions& options, const Registration& result,
@@ -135,7 +128,7 @@ void check_chi_square(const Model& model, const RegistrationOptions& options, co
          message + fmt::format("; the covariance is inflated by {:.1f}", apart.ratio()), figures);
 }
 
-/// Too few edges in some view: agreement means nothing. A pose without a covariance means no more.
+/// The agreement of a few edges is chance.
 template <class Refuse>
 void check_determined(const Model& model, Registration& result, const Refuse& refuse) {
   const int least = model.surface ? least_contour_points : least_patches;
@@ -148,7 +141,7 @@ void check_determined(const Model& model, Registration& result, const Refuse& re
                       "volume's values are no Hounsfield units",
                       model.name, view.comparisons, view.name, least),
           {{"comparisons", double(view.comparisons)}, {"limit", double(least)}});
-  if (is_positive_definite(result.covariance)) return;
+  if (result.is_determined() && geometry::whitening(result.covariance)) return;
   result.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
   refuse(Reason::uncertain, model.name + ": the images do not determine its pose", {});
 }
