@@ -1,168 +1,130 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/core/failure.h"
 
+#include <algorithm>
+#include <array>
+
 namespace helicarm {
+namespace {
 
-std::string_view code(Reason reason) {
-  switch (reason) {
-    case Reason::usage:
-      return "usage";
-    case Reason::not_an_image:
-      return "not_an_image";
-    case Reason::truncated:
-      return "truncated";
-    case Reason::bad_size:
-      return "bad_size";
-    case Reason::bad_value:
-      return "bad_value";
-    case Reason::unsupported:
-      return "unsupported";
-    case Reason::missing_file:
-      return "missing_file";
-    case Reason::bad_json:
-      return "bad_json";
-    case Reason::not_finite:
-      return "not_finite";
-    case Reason::unknown_key:
-      return "unknown_key";
-    case Reason::path_outside:
-      return "path_outside";
-    case Reason::name_clash:
-      return "name_clash";
-    case Reason::cannot_write:
-      return "cannot_write";
-    case Reason::port_taken:
-      return "port_taken";
-    case Reason::blank_image:
-      return "blank_image";
-    case Reason::saturated:
-      return "saturated";
-    case Reason::plate_not_found:
-      return "plate_not_found";
-    case Reason::plate_mismatch:
-      return "plate_mismatch";
-    case Reason::too_few_fiducials:
-      return "too_few_fiducials";
-    case Reason::ambiguous_labels:
-      return "ambiguous_labels";
-    case Reason::calibrator_mismatch:
-      return "calibrator_mismatch";
-    case Reason::coplanar_fiducials:
-      return "coplanar_fiducials";
-    case Reason::views_too_close:
-      return "views_too_close";
-    case Reason::residual_too_large:
-      return "residual_too_large";
-    case Reason::uncertain:
-      return "uncertain";
-    case Reason::ambiguous_handedness:
-      return "ambiguous_handedness";
-    case Reason::scale_disagrees:
-      return "scale_disagrees";
-    case Reason::patient_mismatch:
-      return "patient_mismatch";
-    case Reason::parallel_rays:
-      return "parallel_rays";
-    case Reason::point_at_infinity:
-      return "point_at_infinity";
-    case Reason::behind_source:
-      return "behind_source";
-    case Reason::not_seen:
-      return "not_seen";
-    case Reason::target_not_found:
-      return "target_not_found";
-    case Reason::bad_tunnel:
-      return "bad_tunnel";
-    case Reason::no_pose:
-      return "no_pose";
-    case Reason::stale_pose:
-      return "stale_pose";
-    case Reason::pose_spread:
-      return "pose_spread";
-    case Reason::poses_too_alike:
-      return "poses_too_alike";
-    case Reason::out_of_reach:
-      return "out_of_reach";
-    case Reason::singular_pose:
-      return "singular_pose";
-    case Reason::keep_out:
-      return "keep_out";
-    case Reason::robot_moved:
-      return "robot_moved";
-    case Reason::plan_stale:
-      return "plan_stale";
-    case Reason::robot_locked:
-      return "robot_locked";
-    case Reason::robot_stopped:
-      return "robot_stopped";
-    case Reason::order_not_confirmed:
-      return "order_not_confirmed";
-    case Reason::stale_state:
-      return "stale_state";
-    case Reason::off_target:
-      return "off_target";
-    case Reason::not_connected:
-      return "not_connected";
-    case Reason::replay_differs:
-      return "replay_differs";
-    case Reason::interrupted:
-      return "interrupted";
-    case Reason::too_few_views:
-      return "too_few_views";
-    case Reason::distances_disagree:
-      return "distances_disagree";
-    case Reason::phantom_changed:
-      return "phantom_changed";
-    case Reason::unequal_pixels:
-      return "unequal_pixels";
-    case Reason::name_differs:
-      return "name_differs";
-    case Reason::bone_taken_as_fixed:
-      return "bone_taken_as_fixed";
-    case Reason::tag_disagrees:
-      return "tag_disagrees";
-    case Reason::spacing_missing:
-      return "spacing_missing";
-    case Reason::lossy_image:
-      return "lossy_picture";
-    case Reason::uid_reused:
-      return "uid_reused";
-    case Reason::few_fiducials:
-      return "few_fiducials";
-    case Reason::calibrator_strained:
-      return "calibrator_strained";
-    case Reason::calibrator_deviates:
-      return "calibrator_deviates";
-    case Reason::ball_displaced:
-      return "ball_displaced";
-    case Reason::scale_unverified:
-      return "scale_unverified";
-    case Reason::rules_broken:
-      return "rules_broken";
-    case Reason::unobservable_motion:
-      return "unobservable_motion";
-    case Reason::pick_on_fiducial:
-      return "pick_on_fiducial";
-    case Reason::intrinsics_inconsistent:
-      return "intrinsics_inconsistent";
-    case Reason::residual_distortion:
-      return "residual_distortion";
-    case Reason::scale_weak:
-      return "scale_weak";
-    case Reason::registration_ambiguous:
-      return "registration_ambiguous";
-    case Reason::registration_disagrees:
-      return "registration_disagrees";
-    case Reason::wrong_model:
-      return "wrong_model";
-    case Reason::out_of_capture:
-      return "out_of_capture";
-    case Reason::covariance_missing:
-      return "covariance_missing";
-  }
-  return "internal";
-}
+constexpr int unusable = 2;
+constexpr int refused = 3;
 
-int exit_code(Reason reason) { return reason <= Reason::port_taken ? 2 : 3; }
+struct ReasonEntry {
+  Reason reason;
+  std::string_view code;
+  int exit_code;
+};
+
+constexpr ReasonEntry entries[] = {
+    {Reason::usage, "usage", unusable},
+    {Reason::not_an_image, "not_an_image", unusable},
+    {Reason::truncated, "truncated", unusable},
+    {Reason::bad_size, "bad_size", unusable},
+    {Reason::bad_value, "bad_value", unusable},
+    {Reason::unsupported, "unsupported", unusable},
+    {Reason::missing_file, "missing_file", unusable},
+    {Reason::bad_json, "bad_json", unusable},
+    {Reason::not_finite, "not_finite", unusable},
+    {Reason::unknown_key, "unknown_key", unusable},
+    {Reason::path_outside, "path_outside", unusable},
+    {Reason::name_clash, "name_clash", unusable},
+    {Reason::cannot_write, "cannot_write", unusable},
+    {Reason::port_taken, "port_taken", unusable},
+    {Reason::blank_image, "blank_image", refused},
+    {Reason::saturated, "saturated", refused},
+    {Reason::plate_not_found, "plate_not_found", refused},
+    {Reason::plate_mismatch, "plate_mismatch", refused},
+    {Reason::too_few_fiducials, "too_few_fiducials", refused},
+    {Reason::ambiguous_labels, "ambiguous_labels", refused},
+    {Reason::calibrator_mismatch, "calibrator_mismatch", refused},
+    {Reason::coplanar_fiducials, "coplanar_fiducials", refused},
+    {Reason::views_too_close, "views_too_close", refused},
+    {Reason::residual_too_large, "residual_too_large", refused},
+    {Reason::uncertain, "uncertain", refused},
+    {Reason::ambiguous_handedness, "ambiguous_handedness", refused},
+    {Reason::scale_disagrees, "scale_disagrees", refused},
+    {Reason::patient_mismatch, "patient_mismatch", refused},
+    {Reason::parallel_rays, "parallel_rays", refused},
+    {Reason::point_at_infinity, "point_at_infinity", refused},
+    {Reason::behind_source, "behind_source", refused},
+    {Reason::not_seen, "not_seen", refused},
+    {Reason::target_not_found, "target_not_found", refused},
+    {Reason::bad_tunnel, "bad_tunnel", refused},
+    {Reason::no_pose, "no_pose", refused},
+    {Reason::stale_pose, "stale_pose", refused},
+    {Reason::pose_spread, "pose_spread", refused},
+    {Reason::poses_too_alike, "poses_too_alike", refused},
+    {Reason::out_of_reach, "out_of_reach", refused},
+    {Reason::singular_pose, "singular_pose", refused},
+    {Reason::keep_out, "keep_out", refused},
+    {Reason::robot_moved, "robot_moved", refused},
+    {Reason::plan_stale, "plan_stale", refused},
+    {Reason::robot_locked, "robot_locked", refused},
+    {Reason::robot_stopped, "robot_stopped", refused},
+    {Reason::order_not_confirmed, "order_not_confirmed", refused},
+    {Reason::stale_state, "stale_state", refused},
+    {Reason::off_target, "off_target", refused},
+    {Reason::not_connected, "not_connected", refused},
+    {Reason::replay_differs, "replay_differs", refused},
+    {Reason::interrupted, "interrupted", refused},
+    {Reason::too_few_views, "too_few_views", refused},
+    {Reason::distances_disagree, "distances_disagree", refused},
+    {Reason::phantom_changed, "phantom_changed", refused},
+    {Reason::unequal_pixels, "unequal_pixels", refused},
+    {Reason::name_differs, "name_differs", refused},
+    {Reason::bone_taken_as_fixed, "bone_taken_as_fixed", refused},
+    {Reason::tag_disagrees, "tag_disagrees", refused},
+    {Reason::spacing_missing, "spacing_missing", refused},
+    {Reason::lossy_image, "lossy_picture", refused},
+    {Reason::uid_reused, "uid_reused", refused},
+    {Reason::few_fiducials, "few_fiducials", refused},
+    {Reason::rules_broken, "rules_broken", refused},
+    {Reason::unobservable_motion, "unobservable_motion", refused},
+    {Reason::pick_on_fiducial, "pick_on_fiducial", refused},
+    {Reason::intrinsics_inconsistent, "intrinsics_inconsistent", refused},
+    {Reason::residual_distortion, "residual_distortion", refused},
+    {Reason::calibrator_strained, "calibrator_strained", refused},
+    {Reason::calibrator_deviates, "calibrator_deviates", refused},
+    {Reason::ball_displaced, "ball_displaced", refused},
+    {Reason::scale_unverified, "scale_unverified", refused},
+    {Reason::scale_weak, "scale_weak", refused},
+    {Reason::covariance_missing, "covariance_missing", refused},
+    {Reason::registration_ambiguous, "registration_ambiguous", refused},
+    {Reason::registration_disagrees, "registration_disagrees", refused},
+    {Reason::wrong_model, "wrong_model", refused},
+    {Reason::out_of_capture, "out_of_capture", refused},
+    {Reason::surplus_data, "surplus_data", refused},
+    {Reason::irregular_file, "irregular_file", refused},
+    {Reason::outside_model, "outside_model", refused},
+    {Reason::outside_reference, "outside_reference", refused},
+    {Reason::depth_from_scale, "depth_from_scale", refused},
+    {Reason::pixels_taken_as_rectified, "pixels_taken_as_rectified", refused},
+    {Reason::record_lost, "record_lost", refused},
+    {Reason::image_changed, "image_changed", refused},
+};
+
+constexpr auto reasons = [] {
+  std::array<Reason, std::size(entries)> all{};
+  std::ranges::transform(entries, all.begin(), &ReasonEntry::reason);
+  return all;
+}();
+
+/// Every enumerator up to the last has an entry, in the enumeration's order.
+static_assert([] {
+  for (std::size_t i = 0; i < reasons.size(); ++i)
+    if (reasons[i] != Reason(i)) return false;
+  return reasons.back() == Reason::image_changed;
+}());
+
+const ReasonEntry& entry(Reason reason) { return entries[std::size_t(reason)]; }
+
+}  // namespace
+
+std::string_view code(Reason reason) { return entry(reason).code; }
+
+int exit_code(Reason reason) { return entry(reason).exit_code; }
+
+std::span<const Reason> all_reasons() { return reasons; }
 
 }  // namespace helicarm

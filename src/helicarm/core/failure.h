@@ -3,6 +3,7 @@
 
 #include <exception>
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -15,7 +16,7 @@ namespace helicarm {
 /// Why a result is missing or uncertain: the closed list of codes that a caller can receive
 /// (docs/reasons.md).
 enum class Reason {
-  // Unreadable input or wrong usage: exit code 2.
+  // Unreadable input or wrong usage.
   usage,
   not_an_image,
   truncated,
@@ -30,7 +31,7 @@ enum class Reason {
   name_clash,
   cannot_write,
   port_taken,
-  // Refused because the data do not support a reliable result: exit code 3.
+  // Refused because the data do not support a reliable result.
   blank_image,
   saturated,
   plate_not_found,
@@ -96,6 +97,16 @@ enum class Reason {
   registration_disagrees,
   wrong_model,
   out_of_capture,
+  // Files that declare one thing and hold another, or break a rule of their format.
+  surplus_data,
+  irregular_file,
+  outside_model,
+  outside_reference,
+  depth_from_scale,
+  pixels_taken_as_rectified,
+  // An operation whose record or images were changed from outside.
+  record_lost,
+  image_changed,
 };
 
 /// Machine-readable code of a reason, e.g. "too_few_fiducials".
@@ -103,6 +114,9 @@ std::string_view code(Reason reason);
 
 /// 2 for unreadable input or wrong usage, 3 for a refusal.
 int exit_code(Reason reason);
+
+/// Every reason, once.
+std::span<const Reason> all_reasons();
 
 /// A reason, a message for the user, the view concerned (may be empty) and the figures behind the decision.
 struct Failure {

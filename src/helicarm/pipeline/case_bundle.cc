@@ -231,8 +231,7 @@ Expected<CaseBundle> bundle_case(const fs::path& path, const BundleOptions& opti
       bundle.files.push_back({"result.json", to_text(result) + "\n"});
       if (options.result) collect_texts(result, known);
     }
-    for (int reason = 0; reason <= int(Reason::out_of_capture); ++reason)
-      known.emplace(code(Reason(reason)), code(Reason(reason)));
+    for (const Reason reason : all_reasons()) known.emplace(code(reason), code(reason));
     for (const char* text : always_kept) known.emplace(text, text);
     if (options.result)
       bundle.files.push_back({"given_result.json", to_text(without_texts(*options.result, known)) + "\n"});
