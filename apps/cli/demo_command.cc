@@ -6,8 +6,10 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/pipeline/run_case.h"
 #include "helicarm/simulation/write_case.h"
-#include "run_command.h"
+#include "result_files.h"
+#include "result_text.h"
 
 namespace helicarm::cli {
 namespace {
@@ -66,14 +68,20 @@ CommandResult demo_command(const DemoArguments& arguments, Console& console) {
     if (!console.quiet)
       console.progress << "helicarm: simulating two X-ray images of a knee with the calibrator\n";
     const SimulatedCase truth = value_or_throw(simulation::simulate_case(options));
-    RunArguments run{arguments.out / "case", arguments.out / "result"};
-    value_or_throw(simulation::check_case_folder(run.folder));
-    value_or_throw(simulation::write_case(run.folder, truth));
+    const std::filesystem::path folder = arguments.out / "case", out = arguments.out / "result";
+    value_or_throw(simulation::check_case_folder(folder));
+    value_or_throw(simulation::write_case(folder, truth));
     if (!console.quiet) console.progress << "helicarm: measuring\n\n";
-    const pipeline::Result result = value_or_throw(run_and_write(run, console));
+    forget_result(out);
+    pipeline::RunOptions run;
+    run.threads = console.threads;
+    const pipeline::Result result =
+        value_or_throw(pipeline::run_case(value_or_throw(pipeline::read_case(folder)), run));
+    if (!console.quiet) print_findings(result, console.progress);
+    value_or_throw(write_result(result, out, false));
     if (result.failure) throw BadInput(*result.failure);
     if (!console.json) console.out << summary_of(result);
-    print(compare(result, truth), std::filesystem::absolute(run.out / "report.html"), console);
+    print(compare(result, truth), std::filesystem::absolute(out / "report.html"), console);
   });
 }
 

@@ -25,6 +25,16 @@ void add_motion(CLI::App* command, double& motion_sigma_mm) {
       ->capture_default_str();
 }
 
+/// About the starts of the case's models.
+void add_search(CLI::App* command, case_registration::RegisterOptions& options) {
+  command->add_option("--search-mm", options.shift_mm, "Models: search about the start, mm per axis")
+      ->check(within(0, 100))
+      ->capture_default_str();
+  command->add_option("--search-deg", options.turn_deg, "Models: search about the start, degrees per axis")
+      ->check(within(0, 180))
+      ->capture_default_str();
+}
+
 void add_run(CLI::App& app, Action& action) {
   auto* command = add_command(
       app, "run", "Measure a case: points and tunnels with covariances from two or more X-ray images",
@@ -38,7 +48,8 @@ void add_run(CLI::App& app, Action& action) {
                    "Folder for result.json, report.html and the overlays; with several cases for a folder of "
                    "each and summary.csv")
       ->capture_default_str();
-  add_fields(command, a.options, pipeline::run_fields);
+  add_fields(command, a.options.run, pipeline::run_fields);
+  add_search(command, a.options);
   command->add_option("--machine", a.history,
                       "The C-arm's history (JSON): used as prior; this case's acquisitions are added");
   command->add_flag("--no-report", a.no_report, "Write result.json only");
@@ -57,19 +68,12 @@ void add_register(CLI::App& app, Action& action) {
                               "Exit code 3: a registration is refused; registration.json holds the figures. "
                               "See docs/registration.md.");
   auto& a = arguments_of(command, action, register_command);
-  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
-  command->add_option("--out", a.out, "Folder for registration.json, report.html and the overlays")
+  command->add_option("CASE", a.run.folder, "Folder that holds case.json")->required();
+  command->add_option("--out", a.run.out, "Folder for registration.json, report.html and the overlays")
       ->capture_default_str();
-  command
-      ->add_option("--max-error", a.options.max_error_mm,
-                   "Refuse when a point of the model may be off by more, mm (95 %)")
-      ->check(within(1e-6, 1000));
-  command->add_option("--search-mm", a.options.shift_mm, "Search about the start, mm per axis")
-      ->check(within(0, 100))
-      ->capture_default_str();
-  command->add_option("--search-deg", a.options.turn_deg, "Search about the start, degrees per axis")
-      ->check(within(0, 180))
-      ->capture_default_str();
+  add_fields(command, a.run.options.run, pipeline::run_fields);
+  add_search(command, a.run.options);
+  command->add_option("--machine", a.run.history, "The C-arm's history (JSON), read only");
   command->add_option("--frames", a.frames,
                       "Follow the models through the frames A-B[:STEP] of files with several frames, or of "
                       "numbered files (\"image\": \"ap_{frame:03d}.tif\"); writes registration.csv and "
@@ -89,7 +93,8 @@ void add_export(CLI::App& app, Action& action) {
                                fmt::join(report::export_words, ", ")))
       ->type_name("WORD")
       ->delimiter(',');
-  add_fields(command, a.run.options, pipeline::run_fields);
+  add_fields(command, a.run.options.run, pipeline::run_fields);
+  add_search(command, a.run.options);
   command->add_option("--machine", a.run.history, "The C-arm's history (JSON), read only");
 }
 

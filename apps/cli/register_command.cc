@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register_command.h"
 
+#include <sstream>
+
 #include <fmt/format.h>
 
 #include "helicarm/case_registration/follow_case.h"
@@ -49,12 +51,12 @@ void forget(const std::filesystem::path& out) {
 void follow(const RegisterArguments& arguments, const case_registration::RegisterOptions& options,
             Console& console) {
   const auto range = value_or_throw(case_registration::frame_range_from(arguments.frames));
-  const auto given = value_or_throw(pipeline::read_registration_case(arguments.folder));
+  const auto given = value_or_throw(pipeline::read_registration_case(arguments.run.folder));
   ProgressLine progress(console);
   const auto sequence = value_or_throw(
       case_registration::follow_case(given, range, options, [&](double share) { progress.notify(share); }));
   if (sequence.failure) throw BadInput(*sequence.failure);
-  value_or_throw(case_registration::write_sequence(sequence, arguments.out));
+  value_or_throw(case_registration::write_sequence(sequence, arguments.run.out));
   Json summary = {
       {"frames", sequence.frames.size()}, {"seconds", sequence.seconds}, {"models", Json::array()}};
   std::string text;
@@ -73,25 +75,30 @@ void follow(const RegisterArguments& arguments, const case_registration::Registe
   else if (!console.quiet)
     console.out << text
                 << fmt::format("  {} frames in {:.1f} s\n\n  written to {}\n", sequence.frames.size(),
-                               sequence.seconds, arguments.out.string());
+                               sequence.seconds, arguments.run.out.string());
   if (const auto refusal = sequence.refusal()) throw BadInput(*refusal);
 }
 
 }  // namespace
 
+std::string summary_of(const case_registration::CaseRegistration& registration) {
+  std::ostringstream text;
+  for (const RegisteredModel& model : registration.models) print(model, text);
+  return text.str();
+}
+
 CommandResult register_command(const RegisterArguments& arguments, Console& console) {
   return guarded([&] {
-    forget(arguments.out);
-    case_registration::RegisterOptions options = arguments.options;
-    options.threads = console.threads;
+    forget(arguments.run.out);
+    case_registration::RegisterOptions options = value_or_throw(options_of(arguments.run, console));
     if (!console.quiet)
       options.on_step = [&](const std::string& model, std::string_view step) {
         console.progress << fmt::format("helicarm: {}{}{}\n", model, model.empty() ? "" : ": ", step);
       };
     if (!arguments.frames.empty()) return follow(arguments, options, console);
-    const auto given = value_or_throw(pipeline::read_registration_case(arguments.folder));
+    const auto given = value_or_throw(pipeline::read_registration_case(arguments.run.folder));
     const auto result = value_or_throw(case_registration::register_case(given, options));
-    value_or_throw(case_registration::write_registration(result, arguments.out));
+    value_or_throw(case_registration::write_registration(result, arguments.run.out));
     if (!console.quiet)
       for (const RegisteredModel& model : result.models)
         for (const Warning& warning : model.registration.warnings)
@@ -100,8 +107,7 @@ CommandResult register_command(const RegisterArguments& arguments, Console& cons
     if (console.json && !result.refused())
       console.out << to_text(case_registration::to_json(result)) << '\n';
     else if (!console.quiet && !console.json) {
-      for (const RegisteredModel& model : result.models) print(model, console.out);
-      console.out << fmt::format("\n  written to {}\n", arguments.out.string());
+      console.out << summary_of(result) << fmt::format("\n  written to {}\n", arguments.run.out.string());
     }
     if (result.failure) throw BadInput(*result.failure);
     for (const RegisteredModel& model : result.models)

@@ -4,17 +4,14 @@
 #include <filesystem>
 #include <string>
 
-#include "command.h"
-#include "helicarm/case_registration/register_case.h"
+#include "run_command.h"
 
 namespace helicarm::cli {
 
 /// `helicarm register CASE --out DIR [--frames A-B[:STEP]]`.
 struct RegisterArguments {
-  std::filesystem::path folder;
-  std::filesystem::path out = "registration";
-  case_registration::RegisterOptions options;
-  std::string frames;  ///< A-B[:STEP]; empty: one image per view
+  RunArguments run = {.folder = {}, .out = "registration"};  ///< the C-arm's history is only read
+  std::string frames;                                        ///< A-B[:STEP]; empty: one image per view
 };
 
 CommandResult register_command(const RegisterArguments& arguments, Console& console);

@@ -10,9 +10,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/localization/error_bound.h"
-#include "helicarm/pipeline/registration_case.h"
 #include "helicarm/pipeline/result.h"
-#include "run_models.h"
 
 namespace helicarm::cli {
 namespace {
@@ -27,10 +25,11 @@ struct CaseSummary {
   std::optional<double> worst_error_mm, fre_mm, tre_mm;
 };
 
-CaseSummary summary_of(const std::string& name, const Expected<pipeline::Result>& result) {
+CaseSummary summary_of(const std::string& name, const Expected<case_registration::Measurement>& measured) {
   CaseSummary summary;
   summary.name = name;
-  summary.failure = result ? result->failure : result.error();
+  const pipeline::Result* result = measured ? &measured->result : nullptr;
+  summary.failure = result ? result->failure : measured.error();
   if (summary.failure && !summary.failure->view.empty())
     summary.failure->message = summary.failure->view + ": " + summary.failure->message;
   if (!result) return summary;
@@ -130,7 +129,7 @@ CommandResult run_cases_command(const RunCasesArguments& arguments, Console& con
   if (arguments.cases.size() > 1) return run_several(arguments, console);
   RunArguments run = arguments.run;
   run.folder = arguments.cases.front();
-  return pipeline::has_models(run.folder) ? run_with_models(run, console) : run_command(run, console);
+  return run_command(run, console);
 }
 
 }  // namespace helicarm::cli

@@ -4,8 +4,8 @@
 #include "arrays.h"
 #include "checks.h"
 #include "held_calibration.h"
+#include "helicarm/case_registration/measure_case.h"
 #include "helicarm/core/files.h"
-#include "helicarm/pipeline/run_case.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/report/rectified_image.h"
@@ -13,6 +13,7 @@
 #include "helicarm/simulation/truth_json.h"
 #include "helicarm/simulation/write_case.h"
 #include "helicarm/volume/read_volume.h"
+#include "measuring_options.h"
 #include "module.h"
 #include "options.h"
 #include "signals.h"
@@ -28,35 +29,28 @@ std::size_t index_of(const pipeline::Result& result, const ViewKey& key) {
   raise({Reason::bad_value, fmt::format("view: the result has only {}", fmt::join(names, ", ")), {}, {}});
 }
 
-pipeline::Result run(const std::filesystem::path& folder, const std::string& method,
-                     std::optional<double> max_error_mm, double motion_sigma_mm, unsigned threads,
-                     const std::optional<std::filesystem::path>& history, const py::object& progress) {
-  pipeline::RunOptions options;
-  options.method = method_of(method);
-  for (const auto& field : pipeline::run_fields) {
-    const auto given = field.name == "max_error_mm"      ? max_error_mm
-                       : field.name == "motion_sigma_mm" ? std::optional(motion_sigma_mm)
-                                                         : std::nullopt;
-    if (given) field.set(options, checked(*given, within(field.range), std::string(field.name)));
-  }
-  options.threads = threads;
-  value_or_raise(check_fields<pipeline::RunOptions>(pipeline::run_fields, options, "run_case"));
-  if (history) options.history = value_or_raise(calibration::history_at(*history));
+case_registration::Measurement run(const std::filesystem::path& folder, const std::string& method,
+                                   std::optional<double> max_error_mm, double motion_sigma_mm,
+                                   double search_mm, double search_deg, unsigned threads,
+                                   const std::optional<std::filesystem::path>& history,
+                                   const py::object& progress) {
+  case_registration::RegisterOptions options = measuring_options(
+      "run_case", method, max_error_mm, motion_sigma_mm, search_mm, search_deg, threads, history);
   const RunHooks hooks = run_hooks(progress);
-  options.on_stage = hooks.on_stage;
-  options.on_view = hooks.on_view;
-  pipeline::Result result = value_or_raise(without_gil([&] {
-    return pipeline::read_case(folder).and_then(
-        [&](const pipeline::Case& given) { return pipeline::run_case(given, options); });
+  listen(hooks, options);
+  case_registration::Measurement measured = value_or_raise(without_gil([&] {
+    return pipeline::read_measured_case(folder).and_then([&](const pipeline::RegistrationCase& given) {
+      return case_registration::measure_case(given, options);
+    });
   }));
-  result.options.on_stage = nullptr;
-  result.options.on_view = nullptr;
-  if (result.failure) raise(*result.failure, py::cast(result));
+  measured.result.options.on_stage = nullptr;
+  measured.result.options.on_view = nullptr;
+  if (measured.result.failure) raise(*measured.result.failure, py::cast(measured));
   if (history) {
-    calibration::add_entries(*options.history, result.entries);
-    value_or_raise(write_file(*history, to_text(calibration::to_json(*options.history)) + "\n"));
+    calibration::add_entries(*options.run.history, measured.result.entries);
+    value_or_raise(write_file(*history, to_text(calibration::to_json(*options.run.history)) + "\n"));
   }
-  return result;
+  return measured;
 }
 
 HeldCalibration calibration_of(const pipeline::Result& result) {
@@ -79,11 +73,13 @@ HeldCalibration calibration_of(const pipeline::Result& result) {
   return held;
 }
 
-void write(const pipeline::Result& result, const std::filesystem::path& folder) {
+void write(const case_registration::Measurement& measured, const std::filesystem::path& folder) {
   const auto written = without_gil([&] {
-    return report::write_report(result, folder).and_then([&] {
-      return write_file(folder / "result.json", to_text(pipeline::to_json(result)) + "\n");
-    });
+    return case_registration::write_models(measured.registration, folder)
+        .and_then([&] { return report::write_report(measured.result, folder); })
+        .and_then([&] {
+          return write_file(folder / "result.json", to_text(pipeline::to_json(measured.result)) + "\n");
+        });
   });
   value_or_raise(written);
 }
@@ -184,55 +180,70 @@ void add_result_points(py::module_& module) {
 }
 
 void add_result(py::module_& module) {
-  py::class_<pipeline::Result>(module, "Result", "The answer of run_case; to_dict() is result.json.")
-      .def_property_readonly("status", [](const pipeline::Result& r) { return r.failure ? "refused" : "ok"; })
-      .def_property_readonly("warnings", [](const pipeline::Result& r) { return warning_list(r.warnings); })
+  using case_registration::Measurement;
+  py::class_<Measurement>(module, "Result", "The answer of run_case; to_dict() is result.json.")
+      .def_property_readonly("status",
+                             [](const Measurement& m) { return m.result.failure ? "refused" : "ok"; })
+      .def_property_readonly("warnings", [](const Measurement& m) { return warning_list(m.result.warnings); })
       .def_property_readonly(
           "names",
-          [](const pipeline::Result& r) {
+          [](const Measurement& m) {
             std::vector<std::string> names;
-            for (const pipeline::ViewResult& view : r.views) names.push_back(view.name);
+            for (const pipeline::ViewResult& view : m.result.views) names.push_back(view.name);
             return names;
           },
           "Of the views.")
-      .def_readonly("points", &pipeline::Result::points, "List of ResultPoint: picks, then check targets.")
+      .def_property_readonly(
+          "points", [](const Measurement& m) { return m.result.points; },
+          "List of ResultPoint: picks, then check targets.")
+      .def_property_readonly(
+          "registration",
+          [](const Measurement& m) {
+            return m.registration ? python_from(case_registration::to_json(*m.registration)) : py::none();
+          },
+          "The content of registration.json; None where the case has no models or was refused before.")
       .def(
           "point",
-          [](const pipeline::Result& r, const std::string& name) {
-            for (const pipeline::PointResult& point : r.points)
+          [](const Measurement& m, const std::string& name) {
+            for (const pipeline::PointResult& point : m.result.points)
               if (point.name == name) return point;
             raise({Reason::bad_value, fmt::format("no point \"{}\"", name), {}, {}});
           },
           py::arg("name"))
-      .def_property_readonly("calibration", &calibration_of,
-                             "Calibration; RefusedError where it was not reached.")
+      .def_property_readonly(
+          "calibration", [](const Measurement& m) { return calibration_of(m.result); },
+          "Calibration; RefusedError where it was not reached.")
       .def(
           "image",
-          [](const pipeline::Result& r, const ViewKey& key) {
-            return std::const_pointer_cast<xray::XrayImage>(r.views[index_of(r, key)].xray_image);
+          [](const Measurement& m, const ViewKey& key) {
+            return std::const_pointer_cast<xray::XrayImage>(
+                m.result.views[index_of(m.result, key)].xray_image);
           },
           py::arg("view"), "The view's XrayImage, not copied; None where it was not read.")
       .def(
           "rectified_image",
-          [](const pipeline::Result& r, const ViewKey& key) {
-            const pipeline::ViewResult& view = r.views[index_of(r, key)];
+          [](const Measurement& m, const ViewKey& key) {
+            const pipeline::ViewResult& view = m.result.views[index_of(m.result, key)];
             if (!view.xray_image) raise({Reason::missing_file, "the image was not read", view.name, {}});
             return moved_to_array(without_gil([&] { return report::rectified_image(view); }));
           },
           py::arg("view"), "(height, width) uint8: rectified and windowed for the eye.")
       .def(
           "overlay_png",
-          [](const pipeline::Result& r, const ViewKey& key) {
-            const std::size_t view = index_of(r, key);
-            return py::bytes(without_gil([&] { return report::overlay_png(r, view); }));
+          [](const Measurement& m, const ViewKey& key) {
+            const std::size_t view = index_of(m.result, key);
+            return py::bytes(without_gil([&] { return report::overlay_png(m.result, view); }));
           },
           py::arg("view"), "PNG file content: fiducials, points, planned tunnels on the rectified image.")
       .def(
-          "to_dict", [](const pipeline::Result& r) { return python_from(pipeline::to_json(r)); },
+          "to_dict", [](const Measurement& m) { return python_from(pipeline::to_json(m.result)); },
           "The content of result.json.")
       .def("write", &write, py::arg("folder"),
-           "result.json, report.html and an overlay PNG for each view. Raises InputError: cannot_write.")
-      .def("__repr__", [](const pipeline::Result& r) {
+           "result.json, report.html and an overlay PNG for each view; of a case with models also "
+           "registration.json and\n"
+           "registration/. Raises InputError: cannot_write.")
+      .def("__repr__", [](const Measurement& m) {
+        const pipeline::Result& r = m.result;
         if (r.failure) return fmt::format("<Result: refused, {}>", code(r.failure->reason));
         const auto located = std::ranges::count_if(
             r.points, [](const pipeline::PointResult& point) { return point.place.has_value(); });
@@ -248,16 +259,20 @@ void add_result(py::module_& module) {
 void add_cases(py::module_& module) {
   add_result_points(module);
   add_result(module);
-  const pipeline::RunOptions usual;
+  const case_registration::RegisterOptions searched;
+  const pipeline::RunOptions& usual = searched.run;
   module.def(
       "run_case", &run, py::arg("folder"), py::kw_only(),
       py::arg("method") = std::string(pipeline::method_words[std::size_t(usual.method)]),
       py::arg("max_error_mm") = usual.max_error_mm, py::arg("motion_sigma_mm") = usual.motion_sigma_mm,
+      py::arg("search_mm") = searched.shift_mm, py::arg("search_deg") = searched.turn_deg,
       py::arg("threads") = usual.threads, py::arg("history") = py::none(), py::arg("progress") = py::none(),
-      R"(Measures a case: two or more X-ray images to points with confidence regions, tunnels and diagnostics.
+      R"(Measures a case: two or more X-ray images to points with confidence regions, tunnels and diagnostics, as
+`helicarm run` does; a case's models are registered too.
 
-folder: holds case.json. max_error_mm: refuse (uncertain) where a point may be off by more (95 %). motion_sigma_mm:
-standard deviation per axis of the motion of an untracked bone between the acquisitions. history: a C-arm's history
+folder: holds case.json. method: best, or paper. max_error_mm: refuse (uncertain) where a point, or a point of a model
+or of its plan, may be off by more (95 %). motion_sigma_mm: standard deviation per axis of the motion of an untracked
+bone or model between the acquisitions. search_mm, search_deg: about each model's start, per axis. history: a C-arm's history
 file, which serves as prior and to which this case is added unless it is refused; made where there is none. progress:
 called with the name of each stage (read, rectify, detect, label, calibrate, locate) before it begins; an exception
 from it ends the run, and Ctrl-C does between two views. Releases the GIL. Returns a Result.

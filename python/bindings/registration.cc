@@ -2,11 +2,12 @@
 #include <variant>
 
 #include "arrays.h"
-#include "checks.h"
 #include "helicarm/case_registration/follow_case.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/pipeline/registration_case.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/registration/follow.h"
+#include "measuring_options.h"
 #include "module.h"
 #include "signals.h"
 
@@ -16,26 +17,15 @@ namespace {
 using case_registration::CaseSequence;
 using registration::Registration;
 
-case_registration::RegisterOptions options_from(const std::optional<double>& max_error_mm, double search_mm,
-                                                double search_deg, unsigned threads) {
-  case_registration::RegisterOptions options;
-  if (max_error_mm) options.max_error_mm = checked(*max_error_mm, within({1e-6, 1000}), "max_error_mm");
-  options.shift_mm = checked(search_mm, within({0, 100}), "search_mm");
-  options.turn_deg = checked(search_deg, within({0, 180}), "search_deg");
-  options.threads = threads;
-  return options;
-}
-
 py::object register_models(const std::filesystem::path& folder,
-                           const std::optional<std::filesystem::path>& out,
-                           std::optional<double> max_error_mm, double search_mm, double search_deg,
-                           unsigned threads, const py::object& progress) {
-  auto options = options_from(max_error_mm, search_mm, search_deg, threads);
+                           const std::optional<std::filesystem::path>& out, const std::string& method,
+                           std::optional<double> max_error_mm, double motion_sigma_mm, double search_mm,
+                           double search_deg, unsigned threads,
+                           const std::optional<std::filesystem::path>& history, const py::object& progress) {
+  auto options = measuring_options("register", method, max_error_mm, motion_sigma_mm, search_mm, search_deg,
+                                   threads, history);
   const RunHooks hooks = run_hooks(progress);
-  options.on_step = [&](const std::string& model, std::string_view step) {
-    hooks.on_stage(model.empty() ? std::string(step) : model + ": " + std::string(step));
-  };
-  options.interrupt = hooks.on_view;
+  listen(hooks, options);
   const auto result = value_or_raise(without_gil([&] {
     return pipeline::read_registration_case(folder)
         .and_then([&](const pipeline::RegistrationCase& given) {
@@ -127,10 +117,13 @@ py::dict relative_poses_of(const CaseSequence& sequence, std::size_t model) {
 }
 
 py::object register_sequence(const std::filesystem::path& folder, const Frames& frames,
-                             const std::optional<std::filesystem::path>& out,
-                             std::optional<double> max_error_mm, double search_mm, double search_deg,
-                             unsigned threads, const py::object& progress) {
-  auto options = options_from(max_error_mm, search_mm, search_deg, threads);
+                             const std::optional<std::filesystem::path>& out, const std::string& method,
+                             std::optional<double> max_error_mm, double motion_sigma_mm, double search_mm,
+                             double search_deg, unsigned threads,
+                             const std::optional<std::filesystem::path>& history,
+                             const py::object& progress) {
+  auto options = measuring_options("register_sequence", method, max_error_mm, motion_sigma_mm, search_mm,
+                                   search_deg, threads, history);
   const auto range = frames_from(frames);
   const RunHooks hooks = run_hooks(py::none());
   options.interrupt = hooks.on_view;
@@ -173,8 +166,10 @@ void add_registration(py::module_& module) {
   const case_registration::RegisterOptions defaults;
   module.def(
       "register", &register_models, py::arg("folder"), py::kw_only(), py::arg("out") = py::none(),
-      py::arg("max_error_mm") = py::none(), py::arg("search_mm") = defaults.shift_mm,
-      py::arg("search_deg") = defaults.turn_deg, py::arg("threads") = defaults.threads,
+      py::arg("method") = std::string(pipeline::method_words[std::size_t(defaults.run.method)]),
+      py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
+      py::arg("search_mm") = defaults.shift_mm, py::arg("search_deg") = defaults.turn_deg,
+      py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(),
       py::arg("progress") = py::none(),
       "Register the CT volumes and surfaces of a case (\"models\" of its case.json) to its views, as\n"
       "`helicarm register` does.\n\n"
@@ -182,16 +177,22 @@ void add_registration(py::module_& module) {
       "(6 x 6: rotation vector, rad, then translation, mm, world axes, about centre_mm), decision, "
       "warnings,\n"
       "points and tunnels of its plan. World: the calibrator's frame, or that of the views' cameras.\n\n"
-      "out: folder for registration.json, report.html and overlays, or None. max_error_mm: refuse where a\n"
-      "point of the model may be off by more (95 %). search_mm, search_deg: searched about each start, per\n"
-      "axis. threads: 0 for all cores. progress: called with the name of each step.\n\n"
+      "out: folder for registration.json, report.html and overlays, or None. method, motion_sigma_mm,\n"
+      "history: as run_case, the history is only read. max_error_mm: refuse where a point of the model or "
+      "its\n"
+      "plan may be off by more (95 %). search_mm, search_deg: searched about each start, per axis. threads: "
+      "0\n"
+      "for all cores. progress: called with the name of each step.\n\n"
       "Raises as run_case; RefusedError if the views or a model are refused, with all that was computed in\n"
       ".result.");
   module.def(
       "register_sequence", &register_sequence, py::arg("folder"), py::arg("frames"), py::kw_only(),
-      py::arg("out") = py::none(), py::arg("max_error_mm") = py::none(),
+      py::arg("out") = py::none(),
+      py::arg("method") = std::string(pipeline::method_words[std::size_t(defaults.run.method)]),
+      py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
       py::arg("search_mm") = defaults.shift_mm, py::arg("search_deg") = defaults.turn_deg,
-      py::arg("threads") = defaults.threads, py::arg("progress") = py::none(),
+      py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(),
+      py::arg("progress") = py::none(),
       "Follow the models of a case through a sequence of images, as `helicarm register --frames` does.\n\n"
       "frames: \"A-B[:STEP]\" or a range. Returns frames (N numbers), models (for each: name, "
       "world_from_model\n"

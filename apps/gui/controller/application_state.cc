@@ -5,6 +5,10 @@
 
 namespace helicarm::gui {
 
+bool can_register(const ApplicationState& state) {
+  return state.has_models && state.measured && !state.result->failure;
+}
+
 std::string missing_view(const ApplicationState& state) {
   for (const pipeline::ViewResult& view : state.result->views)
     if (!view.xray_image) return view.name;

@@ -85,6 +85,9 @@ struct ApplicationState {
   std::map<Phase, Failure> refusals;
 };
 
+/// Whether there are models and a measurement that was not refused, to which they can be registered.
+bool can_register(const ApplicationState& state);
+
 /// The first view without an image, else the first one.
 std::string missing_view(const ApplicationState& state);
 

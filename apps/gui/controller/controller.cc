@@ -8,9 +8,10 @@
 #include "gui/controller/equipment.h"
 #include "gui/controller/steps.h"
 #include "gui/replay/pdf_report.h"
-#include "helicarm/case_registration/register_case.h"
+#include "helicarm/case_registration/measure_case.h"
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/exports.h"
 #include "helicarm/report/report.h"
 
@@ -125,13 +126,16 @@ Controller::Change Controller::came(Images images) {
 
 Controller::Change Controller::measured(Equipment& equipment, const std::vector<pipeline::Pick>& picks) {
   const bool calibrates = !equipment.calibration || equipment.calibrated_by != equipment.options.method;
+  const bool other_models =
+      calibrates ||
+      (equipment.registered_by && !pipeline::give_the_same(*equipment.registered_by, equipment.options));
   auto result = std::make_shared<const pipeline::Result>(value_or_throw(gui::measure(equipment, picks)));
   std::optional<operation::LiveTool> live;
   if (equipment.operation && !result->failure)
     if (auto follows = equipment.operation->live_tool()) live = *std::move(follows);
-  return [this, result, live, calibrates](ApplicationState& state) {
+  return [this, result, live, other_models](ApplicationState& state) {
     forget_measurement(state);
-    if (calibrates) {
+    if (other_models || result->failure) {
       state.registration.reset();
       state.nudged.reset();
     }
@@ -183,19 +187,14 @@ void Controller::export_to(const fs::path& folder) {
     if (outcome.verification) result.verifications.push_back(*outcome.verification);
   begin(Phase::verify, "writing the report",
         [this, result = std::move(result), registration = state_.registration, folder]() -> Change {
-          value_or_throw(report::write_report(result, folder));
-          value_or_throw(write_pdf_report(result, folder / "report.pdf"));
-          value_or_throw(report::write_exports(result, folder));
-          Json json = pipeline::to_json(result);
-          std::error_code absent;
-          fs::remove(folder / "registration.json", absent);  // of an earlier export
-          if (registration) {
-            value_or_throw(case_registration::write_registration(*registration, folder / "registration"));
-            const Json models = case_registration::to_json(*registration);
-            value_or_throw(write_file(folder / "registration.json", to_text(models) + "\n"));
-            json = case_registration::with_tunnels_of_models(std::move(json), models);
-          }
-          value_or_throw(write_file(folder / "result.json", to_text(json) + "\n"));
+          const pipeline::Result whole =
+              registration ? case_registration::with_models(result, *registration) : result;
+          value_or_throw(report::write_report(whole, folder));
+          value_or_throw(write_pdf_report(whole, folder / "report.pdf"));
+          if (!whole.failure) value_or_throw(report::write_exports(whole, folder));
+          value_or_throw(case_registration::write_models(
+              registration ? std::optional(*registration) : std::nullopt, folder));
+          value_or_throw(write_file(folder / "result.json", to_text(pipeline::to_json(whole)) + "\n"));
           return
               [this, folder](ApplicationState&) { emit exported(QString::fromStdString(folder.string())); };
         });

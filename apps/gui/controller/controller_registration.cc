@@ -15,7 +15,8 @@ Expected<CaseRegistration> register_models(Equipment& equipment, const std::vect
     given.base.picks = picks;
     if (from) given.models.at(from->model).world_from_model = from->world_from_model;
     case_registration::RegisterOptions options;
-    options.threads = equipment.options.threads;
+    options.run = equipment.options;
+    equipment.registered_by = equipment.options;
     options.on_step = [&](const std::string& model, std::string_view step) {
       tell(model + ": " + std::string(step));
     };
@@ -39,7 +40,7 @@ bool same_place(const NudgedModel& a, const NudgedModel& b) {
 }  // namespace
 
 void Controller::register_models() {
-  if (!equipment_ || !state_.has_models || !state_.measured) return;
+  if (!equipment_ || !can_register(state_)) return;
   begin(Phase::registration, "reading the models",
         [this, equipment = equipment_, picks = state_.picks, from = state_.nudged]() -> Change {
           const auto tell = [this](const std::string& step) {

@@ -24,6 +24,7 @@ struct Equipment {
   std::optional<Expected<pipeline::RegistrationCase>> with_models;  ///< `given`, if it names models
   rectification::Method calibrated_by = rectification::Method::best;
   pipeline::RunOptions options;
+  std::optional<pipeline::RunOptions> registered_by;  ///< of the registered models
   std::optional<robot::RobotOrder> last_order;
   robot::RobotState rest;             ///< the robot's state before the order
   std::atomic<bool> stopped = false;  ///< no further move of a tour, no wait for an image

@@ -104,7 +104,7 @@ void RegisterPage::nudge() {
 }
 
 void RegisterPage::show_state(const ApplicationState& state) {
-  const bool can = state.has_models && state.measured && !state.busy;
+  const bool can = can_register(state) && !state.busy;
   register_->setEnabled(can);
   hand_->setEnabled(can && state.registration);
   from_here_->setEnabled(can && state.nudged);
@@ -115,6 +115,9 @@ void RegisterPage::show_state(const ApplicationState& state) {
         tr("This case has no models: name a CT volume or a surface under \"models\" in case.json."));
   else if (state.busy == Phase::registration)
     says_->setText(text(state.doing));
+  else if (state.measured && state.result->failure)
+    says_->setText(tr("The measurement is refused (%1): no model is registered to it.")
+                       .arg(text(std::string(code(state.result->failure->reason)))));
   else
     says_->setText(state.registration ? reasons_of(*state.registration) : QString());
   if (shown_ == state.registration) return;

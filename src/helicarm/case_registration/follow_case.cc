@@ -52,7 +52,8 @@ std::vector<std::unique_ptr<Followed>> followed_models(const pipeline::Registrat
     if (!model)
       throw BadInput(Reason::bad_value,
                      fmt::format("models: \"{}\": a sequence needs a volume or a surface", asked.name));
-    const StartPoses start = start_poses(given, loaded, asked, model, loaded.views);
+    const StartPoses start =
+        start_poses(given, loaded, asked, model, loaded.views, options.run.motion_sigma_mm);
     auto body = std::make_unique<Followed>(Followed{std::move(*model), {}});
     body->follower.emplace(body->model, start.poses, search_options(options, loaded, start.poses.size()));
     bodies.push_back(std::move(body));
@@ -128,9 +129,7 @@ Expected<CaseSequence> follow_case(const pipeline::RegistrationCase& given, cons
     CaseSequence sequence;
     sequence.warnings = given.base.warnings;
     const auto first = value_or_throw(pipeline::at_frame(given, range.first));
-    const auto loaded = load_views(first, options.threads, [&](std::string_view stage) {
-      if (options.on_step) options.on_step("", stage);
-    });
+    const auto loaded = load_views(first, with_steps(options));
     if (!loaded) {
       if (exit_code(loaded.error().reason) == 2) throw BadInput(loaded.error());
       sequence.failure = loaded.error();

@@ -6,7 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/calibration/centred_view.h"
 #include "helicarm/core/files.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/import_matrix.h"
 #include "helicarm/image/tiff.h"
 #include "helicarm/rectification/rectify.h"
@@ -131,6 +133,31 @@ LoadedViews views_of_cameras(const pipeline::RegistrationCase& given) {
   return loaded;
 }
 
+/// Of views that were calibrated each alone and without weights: s^2 (J^T J)^-1, where s^2 is the variance of
+/// the view's residuals per axis and J the derivative of its fiducials' pixels.
+Eigen::MatrixXd covariance_by_residuals(const pipeline::CaseCalibration& calibration) {
+  constexpr Eigen::Index each = calibration::view_parameters;
+  const auto n = Eigen::Index(calibration.views.size());
+  Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(each * n, each * n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(each, each);
+    double squares = 0;
+    int used = 0;
+    for (const fiducials::Fiducial& ball : calibration.fiducials[std::size_t(i)]) {
+      if (ball.status != fiducials::FiducialStatus::used) continue;
+      const geometry::View& view = calibration.views[std::size_t(i)].view;
+      const auto slope = calibration::pixel_by_parameters(view, ball.centre_in_calibrator);
+      information += slope.transpose() * slope;
+      squares += ball.residual_px * ball.residual_px;
+      ++used;
+    }
+    const double variance = squares / std::max(1, 2 * used - int(each));
+    joint.block(each * i, each * i, each, each) =
+        variance * geometry::solve_spd(information, Eigen::MatrixXd::Identity(each, each)).solution;
+  }
+  return joint;
+}
+
 }  // namespace
 
 LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
@@ -144,21 +171,18 @@ LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
     loaded.views.back().usable = usable_of(image, given.base.calibrator, view.view);
     loaded.maps.emplace_back(image.rectification.map);
   }
-  loaded.camera_covariance = calibration.joint_covariance;
+  loaded.camera_covariance = calibration.joint_covariance.size() > 0 ? calibration.joint_covariance
+                                                                     : covariance_by_residuals(calibration);
   loaded.warnings = calibration.warnings;
   return loaded;
 }
 
-Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, unsigned threads,
-                                 const std::function<void(std::string_view stage)>& on_stage) {
+Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const pipeline::RunOptions& run) {
   return guarded([&] {
     if (!given.cameras.empty()) {
-      if (on_stage) on_stage("read");
+      if (run.on_stage) run.on_stage("read");
       return views_of_cameras(given);
     }
-    pipeline::RunOptions run;
-    run.threads = threads;
-    run.on_stage = on_stage;
     const double least_angle_deg = given.base.views.size() > 1 ? calibration::least_view_angle_deg : 0;
     const auto calibration = pipeline::calibrate_case(given.base, run, least_angle_deg);
     if (!calibration) throw BadInput(calibration.error().failure);

@@ -25,10 +25,10 @@ struct LoadedViews {
 /// or with cameras of other programs, then the images are taken as free of distortion. Fails as
 /// `read_xray_image`, `import_matrix` and `calibrate_case`, and with bad_size for a camera of another image
 /// size.
-Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, unsigned threads,
-                                 const std::function<void(std::string_view stage)>& on_stage);
+Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const pipeline::RunOptions& run);
 
-/// The views of a case that is calibrated already.
+/// The views of a case that is calibrated already. Of the paper's method, which has no covariance, each
+/// view's follows from its residuals.
 LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
                                  const pipeline::CaseCalibration& calibration);
 

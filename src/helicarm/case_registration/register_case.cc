@@ -96,16 +96,18 @@ registration::Registration by_landmarks(const std::string& name,
 }
 
 /// What no image shows of a body whose poses at the acquisitions are not known.
-Warning motion_note(const pipeline::CaseModel& asked) {
+Warning motion_note(const pipeline::CaseModel& asked, double motion_sigma_mm) {
   return {
       asked.moves_with ? Reason::bone_taken_as_fixed : Reason::unobservable_motion,
       fmt::format("{}: motion between the acquisitions within the plane of the central rays is taken for a "
                   "position; {}",
                   asked.name,
-                  asked.moves_with ? "poses of the bone at every acquisition are missing"
-                                   : "put a marker on the bone, give its poses and \"moves_with\""),
+                  motion_sigma_mm > 0 ? fmt::format("{:g} mm per axis is in the covariance", motion_sigma_mm)
+                  : asked.moves_with
+                      ? "poses of the bone at every acquisition are missing"
+                      : "put a marker on the bone, give its poses and \"moves_with\", or --motion-sigma"),
       {},
-      {}};
+      {{"motion_sigma_mm", motion_sigma_mm}}};
 }
 
 class Registrar {
@@ -121,30 +123,32 @@ class Registrar {
     const auto views = follows ? following(loaded_.views, given_.base, *asked.moves_with) : loaded_.views;
     for (const RegistrationView& view : views) made.views.push_back(view.view);
     auto model = value_or_throw(load_model(asked));
-    StartPoses start = start_poses(given_, loaded_, asked, model, views);
+    const double motion_sigma_mm = follows ? 0 : options_.run.motion_sigma_mm;
+    StartPoses start = start_poses(given_, loaded_, asked, model, views, motion_sigma_mm);
     made.landmarks = std::move(start.landmarks);
     made.landmark_names = std::move(start.landmark_names);
     const std::vector<RigidTransform>& starts = start.poses;
     if (model) {
       registration::RegistrationOptions how = search_options(options_, loaded_, starts.size());
+      how.motion_sigma_mm = motion_sigma_mm;
       if (options_.on_step) how.on_step = [&](std::string_view step) { options_.on_step(asked.name, step); };
       made.registration = registration::register_model(*model, views, starts, how);
       made.outlines = outlines(*model, made.views, made.registration.world_from_model);
       made.is_surface = model->surface.has_value();
       for (const RegistrationView& view : views)
         made.drrs.push_back(drr_image(*model, view.view, made.registration.world_from_model,
-                                      {view.grey.width(), view.grey.height()}, options_.threads));
+                                      {view.grey.width(), view.grey.height()}, options_.run.threads));
       made.model = std::make_shared<const registration::Model>(*std::move(model));
     } else {
       made.by_landmarks_only = true;
       made.registration =
-          by_landmarks(asked.name, *made.landmarks, made.landmark_names, options_.max_error_mm);
+          by_landmarks(asked.name, *made.landmarks, made.landmark_names, options_.run.max_error_mm);
       if (loaded_.camera_covariance.size() == 0) {
         made.registration.warnings.push_back(registration::cameras_without_covariance(asked.name));
         made.registration.decision = std::max(made.registration.decision, registration::Decision::warn);
       }
     }
-    if (!follows && views.size() > 1) made.registration.notes.push_back(motion_note(asked));
+    if (!follows && views.size() > 1) made.registration.notes.push_back(motion_note(asked, motion_sigma_mm));
     if (asked.plan && made.registration.is_determined())
       carry_plan(value_or_throw(read_plan(*asked.plan)), given_.base, made);
     return made;
@@ -167,6 +171,12 @@ std::vector<std::vector<Eigen::Vector2d>> outlines(const registration::Model& mo
   return made;
 }
 
+pipeline::RunOptions with_steps(const RegisterOptions& options) {
+  pipeline::RunOptions run = options.run;
+  if (options.on_step) run.on_stage = [&](std::string_view stage) { options.on_step("", stage); };
+  return run;
+}
+
 bool CaseRegistration::refused() const {
   return failure || std::ranges::any_of(models, [](const RegisteredModel& model) {
            return model.registration.failure.has_value();
@@ -178,13 +188,10 @@ Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given
   return guarded([&] {
     CaseRegistration result;
     result.warnings = given.base.warnings;
-    const auto step = [&](std::string_view name) {
-      if (options.on_step) options.on_step("", name);
-    };
     if (pipeline::is_sequence(given))
       throw BadInput(Reason::bad_value,
                      "views: \"image\" holds {frame}: name the frames with --frames, such as --frames 1-100");
-    auto loaded = load_views(given, options.threads, step);
+    auto loaded = load_views(given, with_steps(options));
     if (!loaded) {
       if (exit_code(loaded.error().reason) == 2) throw BadInput(loaded.error());
       result.failure = loaded.error();

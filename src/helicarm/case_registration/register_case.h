@@ -19,8 +19,9 @@
 namespace helicarm::case_registration {
 
 struct RegisterOptions {
-  std::optional<double> max_error_mm;  ///< refuse (uncertain) beyond it
-  unsigned threads = 0;
+  /// Of the calibration and the limits, as for a run. `max_error_mm` also holds for the models and their
+  /// plans, `motion_sigma_mm` for models that are not tracked.
+  pipeline::RunOptions run = {};
   double shift_mm = 15;  ///< searched about each start
   double turn_deg = 15;
   std::function<void()> interrupt = {};  ///< as registration::SearchOptions
@@ -66,6 +67,9 @@ std::vector<std::vector<Eigen::Vector2d>> outlines(const registration::Model& mo
                                                    const std::vector<geometry::View>& views,
                                                    const geometry::RigidTransform& world_from_model);
 
+/// The options of the views' calibration, which tells its stages to `on_step`. Refers to `options`.
+pipeline::RunOptions with_steps(const RegisterOptions& options);
+
 /// Registers every model of a case. Unreadable input is a failure; refusals are in the result.
 Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given,
                                          const RegisterOptions& options);
@@ -76,10 +80,6 @@ Expected<CaseRegistration> register_loaded(const pipeline::RegistrationCase& giv
 
 /// registration.json (docs/formats.md).
 Json to_json(const CaseRegistration& result);
-
-/// result.json with the tunnels of the models that were not refused beside its own. `registration`: as
-/// `to_json`.
-Json with_tunnels_of_models(Json result, const Json& registration);
 
 /// One HTML file with the overlays inside.
 std::string report_html(const CaseRegistration& result);

@@ -85,11 +85,4 @@ Json to_json(const CaseRegistration& result) {
   return json;
 }
 
-Json with_tunnels_of_models(Json result, const Json& registration) {
-  for (const Json& model : registration["models"])
-    if (model["failure"].is_null())
-      for (const Json& tunnel : model["tunnels"]) result["tunnels"].push_back(tunnel);
-  return result;
-}
-
 }  // namespace helicarm::case_registration

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "helicarm/calibration/centred_view.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/geometry/ray.h"
 #include "helicarm/geometry/triangulation.h"
@@ -44,6 +45,31 @@ std::vector<RigidTransform> axis_starts(const registration::Model& model, const 
   return starts;
 }
 
+/// Stands for "exact" (0) where rays are weighted.
+constexpr double exact_px = 1e-3;
+
+/// d a located point (mm) / d the parameters of all views, 3 x 11 n.
+Eigen::MatrixXd by_cameras(const geometry::Intersection& crossing,
+                           const std::vector<geometry::RayObservation>& rays,
+                           const std::vector<std::size_t>& seen_in, std::size_t views) {
+  constexpr Eigen::Index each = calibration::view_parameters;
+  Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(3, each * Eigen::Index(views));
+  for (std::size_t i = 0; i < rays.size(); ++i)
+    slope.middleCols<each>(each * Eigen::Index(seen_in[i])) -=
+        crossing.by_pixels.middleCols<2>(2 * Eigen::Index(i)) *
+        calibration::pixel_by_parameters(rays[i].view, crossing.point);
+  return slope;
+}
+
+/// What the located landmarks share: the cameras' errors and the model's motion.
+Eigen::MatrixXd shared_covariance(const LoadedViews& loaded, double motion_sigma_mm) {
+  const auto n = calibration::view_parameters * Eigen::Index(loaded.views.size());
+  return registration::cameras_with_motion(loaded.camera_covariance.size() > 0
+                                               ? loaded.camera_covariance
+                                               : Eigen::MatrixXd(Eigen::MatrixXd::Zero(n, n)),
+                                           motion_sigma_mm);
+}
+
 /// Landmarks of the file that are picked in two or more views. Refuses (bad_value) fewer than three.
 std::vector<registration::Landmark> landmarks_of(const pipeline::CaseModel& asked,
                                                  const pipeline::RegistrationCase& given,
@@ -60,6 +86,7 @@ std::vector<registration::Landmark> landmarks_of(const pipeline::CaseModel& aske
         Vector3d::Zero()};
     std::vector<geometry::RayObservation> rays;
     std::vector<double> sigmas;
+    std::vector<std::size_t> seen_in;
     for (const pipeline::Pick& pick : given.base.picks) {
       if (pick.name != landmark.name) continue;
       for (std::size_t i = 0; i < views.size(); ++i) {
@@ -70,7 +97,8 @@ std::vector<registration::Landmark> landmarks_of(const pipeline::CaseModel& aske
           throw BadInput(Reason::bad_value,
                          fmt::format("picks: \"{}\" lies outside {}", pick.name, pick.view));
         rays.push_back({views[i].view, *at});
-        sigmas.push_back(pick.sigma_px.value_or(0.5));
+        sigmas.push_back(std::max(pick.sigma_px.value_or(0.5), exact_px));
+        seen_in.push_back(i);
       }
     }
     if (rays.size() < 2) {
@@ -83,6 +111,7 @@ std::vector<registration::Landmark> landmarks_of(const pipeline::CaseModel& aske
     for (std::size_t i = 0; i < rays.size(); ++i)
       covariance.diagonal().segment<2>(2 * Eigen::Index(i)).setConstant(sigmas[i] * sigmas[i]);
     const auto crossing = value_or_throw(geometry::intersect(rays, covariance));
+    landmark.by_cameras = by_cameras(crossing, rays, seen_in, views.size());
     landmark.in_world = crossing.point;
     landmark.covariance_in_world = crossing.covariance;
     landmarks.push_back(std::move(landmark));
@@ -100,12 +129,13 @@ std::vector<registration::Landmark> landmarks_of(const pipeline::CaseModel& aske
 
 StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedViews& loaded,
                        const pipeline::CaseModel& asked, const std::optional<registration::Model>& model,
-                       const std::vector<RegistrationView>& views) {
+                       const std::vector<RegistrationView>& views, double motion_sigma_mm) {
   if (asked.world_from_model) return {{*asked.world_from_model}, {}, {}};
   if (asked.landmarks) {
     const auto landmarks = landmarks_of(asked, given, loaded, views);
     StartPoses start;
-    start.landmarks = value_or_throw(registration::register_landmarks(landmarks));
+    start.landmarks = value_or_throw(
+        registration::register_landmarks(landmarks, shared_covariance(loaded, motion_sigma_mm)));
     for (const registration::Landmark& landmark : landmarks) start.landmark_names.push_back(landmark.name);
     start.poses = {start.landmarks->world_from_model};
     return start;
@@ -121,8 +151,9 @@ StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedView
 registration::RegistrationOptions search_options(const RegisterOptions& options, const LoadedViews& loaded,
                                                  std::size_t starts) {
   registration::RegistrationOptions how;
-  how.max_error_mm = options.max_error_mm;
-  how.threads = options.threads;
+  how.max_error_mm = options.run.max_error_mm;
+  how.motion_sigma_mm = options.run.motion_sigma_mm;
+  how.threads = options.run.threads;
   how.camera_covariance = loaded.camera_covariance;
   how.search = {options.shift_mm, options.turn_deg, starts > 1 ? 150 * int(starts) : 600, options.interrupt};
   return how;

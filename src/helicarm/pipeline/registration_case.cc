@@ -113,7 +113,9 @@ bool has_models(const fs::path& path) {
   return json && json->is_object() && json->contains("models") && !(*json)["models"].empty();
 }
 
-Expected<RegistrationCase> read_registration_case(const fs::path& path) {
+namespace {
+
+Expected<RegistrationCase> read_with_models(const fs::path& path, Purpose purpose) {
   return guarded([&] {
     const fs::path file = fs::absolute(case_file(path));
     Json json = value_or_throw(read_json(file));
@@ -122,8 +124,14 @@ Expected<RegistrationCase> read_registration_case(const fs::path& path) {
     Json models = Json::object();
     if (json.is_object() && json.contains("models")) models["models"] = json["models"];
     if (json.is_object()) json.erase("models");
+    if (purpose == Purpose::run && !read.cameras.empty())
+      throw BadInput(
+          Reason::bad_value,
+          fmt::format("{}: \"camera\": the views bring cameras of their own; register the models to "
+                      "them by `helicarm register`",
+                      file.filename().string()));
     read.base = case_of(json, file.filename().string(), file.parent_path(),
-                        read.cameras.empty() ? Purpose::registration : Purpose::cameras);
+                        read.cameras.empty() ? purpose : Purpose::cameras);
     JsonReader reader(models, file.filename().string());
     std::set<std::string> names;
     for (JsonReader& entry : reader.objects("models", true, most_models)) {
@@ -136,6 +144,17 @@ Expected<RegistrationCase> read_registration_case(const fs::path& path) {
       reader.refuse(Reason::bad_value, "models", "is empty: name a volume or a surface");
     return read;
   });
+}
+
+}  // namespace
+
+Expected<RegistrationCase> read_registration_case(const fs::path& path) {
+  return read_with_models(path, Purpose::registration);
+}
+
+Expected<RegistrationCase> read_measured_case(const fs::path& path) {
+  if (has_models(path)) return read_with_models(path, Purpose::run);
+  return read_case(path).map([](Case base) { return RegistrationCase{std::move(base), {}, {}}; });
 }
 
 bool is_sequence(const RegistrationCase& given) {

@@ -42,6 +42,9 @@ bool has_models(const std::filesystem::path& path);
 /// Reads a case with "models". Fails as `read_case`.
 Expected<RegistrationCase> read_registration_case(const std::filesystem::path& path);
 
+/// Reads a case that is measured by its calibrator, and its models if it names any. Fails as `read_case`.
+Expected<RegistrationCase> read_measured_case(const std::filesystem::path& path);
+
 /// Whether an image's name holds {frame}.
 bool is_sequence(const RegistrationCase& given);
 

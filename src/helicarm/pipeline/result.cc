@@ -304,6 +304,10 @@ Json to_json(const Result& result) {
   json["accuracy"] = json_of(result.accuracy);
   json["tunnels"] = Json::array();
   for (const guidance::Tunnel& tunnel : result.tunnels) json["tunnels"].push_back(to_json(tunnel));
+  for (const ModelTunnel& planned : result.model_tunnels) {
+    json["tunnels"].push_back(to_json(planned.tunnel));
+    json["tunnels"].back()["model"] = planned.model;
+  }
   json["verification"] = list_of(result.verifications, result.views);
   json["timing_ms"] = json_of(result.timing_ms);
   json["version"] = HELICARM_VERSION;

@@ -71,6 +71,20 @@ struct TunnelEnds {
   std::size_t end;
 };
 
+/// A point of a registered model's plan.
+struct ModelPoint {
+  std::string model;
+  std::string name;
+  guidance::PointInFrames place;
+};
+
+/// A tunnel of a registered model's plan.
+struct ModelTunnel {
+  std::string model;
+  guidance::Tunnel tunnel;
+  TunnelEnds ends;  ///< among the model points
+};
+
 /// Wall-clock time of each stage, ms; nothing if not reached.
 struct Timing {
   std::optional<double> read, rectify, detect, label, calibrate, locate, total;
@@ -103,6 +117,8 @@ struct Result {
   localization::Accuracy accuracy;
   std::vector<TunnelEnds> tunnel_ends;
   std::vector<guidance::Tunnel> tunnels;
+  std::vector<ModelPoint> model_points;  ///< of the models that were registered and not refused
+  std::vector<ModelTunnel> model_tunnels;
   std::vector<verification::ToolLine> tool_lines;
   std::vector<verification::Verification> verifications;
   Timing timing_ms;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "helicarm/core/field.h"
@@ -34,5 +35,12 @@ inline constexpr std::array<Field<RunOptions>, 4> run_fields{
                                              "poses between the acquisitions, mm"}),
     bound<&RunOptions::threads>(
         {.name = "threads", .range = {0, 1024}, .step = 1, .help = "Threads to use; 0: all cores"})};
+
+/// Whether two measurements may differ by their options alone; threads change no result.
+inline bool give_the_same(const RunOptions& a, const RunOptions& b) {
+  return std::ranges::all_of(run_fields, [&](const Field<RunOptions>& field) {
+    return field.name == "threads" || field.get(a) == field.get(b);
+  });
+}
 
 }  // namespace helicarm::pipeline

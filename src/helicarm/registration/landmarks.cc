@@ -20,7 +20,8 @@ constexpr double least_spread_mm = 2;  // rms distance from the line that fits t
 
 }  // namespace
 
-Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& landmarks) {
+Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& landmarks,
+                                                  const Eigen::MatrixXd& camera_covariance) {
   const double n = double(landmarks.size());
   if (landmarks.size() < least_landmarks)
     return fail(Reason::bad_value,
@@ -49,6 +50,7 @@ Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& l
   result.centre = world_mean;
   double stated = 0;
   RigidCovariance information = RigidCovariance::Zero();
+  Eigen::MatrixXd by_cameras = Eigen::MatrixXd::Zero(6, camera_covariance.cols());
   for (const Landmark& landmark : landmarks) {
     const Vector3d at = result.world_from_model * landmark.in_model;
     result.places.push_back(at);
@@ -58,11 +60,15 @@ Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& l
     Eigen::Matrix<double, 3, 6> by_step;
     by_step << -geometry::cross_matrix(at - world_mean), Matrix3d::Identity();
     information += by_step.transpose() * by_step;
+    if (landmark.by_cameras.size() > 0) by_cameras += by_step.transpose() * landmark.by_cameras;
   }
   result.fre_mm = std::sqrt(result.fre_mm);
   // <FRE^2> = (1 - 2/n) <FLE^2>.
   result.fle_mm = std::sqrt(std::max(stated, result.fre_mm * result.fre_mm / (1 - 2 / n)));
-  result.covariance = result.fle_mm * result.fle_mm / 3 * RigidCovariance(information.inverse());
+  const RigidCovariance inverse = information.inverse();
+  const Eigen::MatrixXd gain = inverse * by_cameras;
+  result.covariance =
+      result.fle_mm * result.fle_mm / 3 * inverse + gain * camera_covariance * gain.transpose();
   return result;
 }
 

@@ -16,7 +16,8 @@ struct Landmark {
   std::string name;
   Eigen::Vector3d in_model;
   Eigen::Vector3d in_world;
-  Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();  ///< mm^2; zero: not known
+  Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();  ///< mm^2, of its own; zero: not known
+  Eigen::MatrixXd by_cameras = {};  ///< d in_world / d the parameters of all views, 3 x 11 n; empty: none
 };
 
 struct LandmarkRegistration {
@@ -26,12 +27,16 @@ struct LandmarkRegistration {
   std::vector<double> residuals_mm;     ///< FRE of each
   double fre_mm = 0;                    ///< rms
   double fle_mm = 0;                    ///< rms; from the residuals or from the covariances, the larger
-  RigidCovariance covariance;  ///< about `centre`: gives the TRE of Fitzpatrick, West and Maurer (1998)
+  /// About `centre`: gives the TRE of Fitzpatrick, West and Maurer (1998); with the errors of the cameras
+  /// that the landmarks share.
+  RigidCovariance covariance;
 };
 
 /// Least-squares rigid motion from model to world (Arun 1987, proper rotations only). Refuses (bad_value)
-/// fewer than three landmarks, and landmarks near one line.
-Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& landmarks);
+/// fewer than three landmarks, and landmarks near one line. `camera_covariance`: of all views' parameters,
+/// 11 n x 11 n; empty: taken as exact.
+Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& landmarks,
+                                                  const Eigen::MatrixXd& camera_covariance = {});
 
 /// Predicted TRE (rms, mm) at a point of the world.
 double predicted_tre_mm(const LandmarkRegistration& registration, const Eigen::Vector3d& point_in_world);

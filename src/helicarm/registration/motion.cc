@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/registration/motion.h"
 
+#include "helicarm/calibration/calibrated_view.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::registration {
@@ -70,6 +71,14 @@ Eigen::Matrix<double, affine_parameters, 11> affine_from_camera(const geometry::
   }
   map.col(10) = in_world(none, entry(0, 1, 1 / k.fx));
   return map;
+}
+
+Eigen::MatrixXd cameras_with_motion(Eigen::MatrixXd camera_covariance, double motion_sigma_mm) {
+  constexpr Eigen::Index translation = 7;
+  for (Eigen::Index i = calibration::view_parameters; i < camera_covariance.rows();
+       i += calibration::view_parameters)
+    camera_covariance.diagonal().segment<3>(i + translation).array() += motion_sigma_mm * motion_sigma_mm;
+  return camera_covariance;
 }
 
 geometry::RigidTransform moved_about(const geometry::RigidTransform& pose, const Vector3d& centre,

@@ -35,6 +35,11 @@ Eigen::Matrix<double, affine_parameters, 6> affine_from_strain(const Eigen::Matr
 Eigen::Matrix<double, affine_parameters, 11> affine_from_camera(const geometry::View& view,
                                                                 const Eigen::Vector3d& centre);
 
+/// The covariance of all views' parameters (11 n x 11 n) with a motion of the model between the first view's
+/// acquisition and each later one, per axis: by d it is one of the camera by R d, and isotropic noise stays
+/// itself when turned.
+Eigen::MatrixXd cameras_with_motion(Eigen::MatrixXd camera_covariance, double motion_sigma_mm);
+
 /// The pose after a rigid step about `centre` (world).
 geometry::RigidTransform moved_about(const geometry::RigidTransform& pose, const Eigen::Vector3d& centre,
                                      const RigidStep& step);

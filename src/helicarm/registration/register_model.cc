@@ -169,9 +169,10 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
   step("errors");
   const double finest_mm = std::max(result.spacing_mm, model.resolution_mm);
   const double growth = model.outlined || views.size() > 1 ? edge_growth_sigma : lone_growth_sigma;
+  const MatrixXd cameras = camera_covariance_of(views, options);
   const ErrorModel errors{views,
                           model.radius_mm,
-                          camera_covariance_of(views, options),
+                          cameras_with_motion(cameras, options.motion_sigma_mm),
                           correlations_px(views, model, result.centre),
                           {edge_shift_sigma * finest_mm, growth * finest_mm}};
   result.covariance = errors.covariance(best.observation, result.centre);
@@ -182,7 +183,7 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
     step("mirror image");
     result.mirrored_ratio = mirrored_cost_ratio(scene, best, stages, options.search, same_mm);
   }
-  if (errors.cameras.isZero(0)) result.warnings.push_back(cameras_without_covariance(model.name));
+  if (cameras.isZero(0)) result.warnings.push_back(cameras_without_covariance(model.name));
   decide(model, starts, options, result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return result;

@@ -23,6 +23,8 @@ struct RegistrationOptions {
   unsigned threads = 0;                ///< 0: all cores
   /// Of all views' parameters, 11 n x 11 n; empty: the views' own covariances, taken as independent.
   Eigen::MatrixXd camera_covariance = {};
+  /// Motion of the model between the first view's acquisition and each later one, per axis, mm.
+  double motion_sigma_mm = 0;
   /// Called with the name of each step. An exception ends the registration.
   std::function<void(std::string_view step)> on_step = {};
 };

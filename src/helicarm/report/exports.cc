@@ -19,19 +19,36 @@ namespace {
 
 using Files = std::map<std::string, std::string>;
 
-std::string csv_row(const pipeline::PointResult& point, std::string_view frame, const Eigen::Vector3d& place,
+/// A located point under the name and source that the table states.
+struct ExportedPoint {
+  std::string name;
+  std::string_view source;  ///< pick, target or plan
+  const guidance::PointInFrames* place;
+};
+
+/// Picks and targets, then the points of registered models' plans.
+std::vector<ExportedPoint> exported_points(const pipeline::Result& result) {
+  std::vector<ExportedPoint> points;
+  for (const pipeline::PointResult& point : result.points)
+    if (point.place)
+      points.push_back(
+          {point.name, point.source == localization::PointSource::pick ? "pick" : "target", &*point.place});
+  for (const pipeline::ModelPoint& point : result.model_points)
+    points.push_back({point.name, "plan", &point.place});
+  return points;
+}
+
+std::string csv_row(const ExportedPoint& point, std::string_view frame, const Eigen::Vector3d& place,
                     const Eigen::Matrix3d& covariance) {
   const Eigen::Vector3d sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  return fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(point.name),
-                     point.source == localization::PointSource::pick ? "pick" : "target", frame, place.x(),
+  return fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(point.name), point.source, frame, place.x(),
                      place.y(), place.z(), sigma.x(), sigma.y(), sigma.z(),
                      localization::length_at_95(covariance));
 }
 
 std::string points_csv(const pipeline::Result& result) {
   std::string rows;
-  for (const pipeline::PointResult& point : result.points) {
-    if (!point.place) continue;
+  for (const ExportedPoint& point : exported_points(result)) {
     const guidance::PointInFrames& at = *point.place;
     rows += csv_row(point, "calibrator", at.in_calibrator, at.covariance_in_calibrator);
     if (at.in_femur && at.covariance_in_femur)
@@ -45,12 +62,12 @@ std::string points_csv(const pipeline::Result& result) {
   return "name,source,frame,x_mm,y_mm,z_mm,sigma_x_mm,sigma_y_mm,sigma_z_mm,error_95_mm\n" + rows;
 }
 
-Json control_point(const pipeline::PointResult& point) {
-  const Eigen::Vector3d& at = point.place->in_calibrator;
-  return {{"id", point.name},
-          {"label", point.name},
+Json control_point(const std::string& name, const guidance::PointInFrames& place) {
+  const Eigen::Vector3d& at = place.in_calibrator;
+  return {{"id", name},
+          {"label", name},
           {"description", fmt::format("within {:.3f} mm (95 %), calibrator frame",
-                                      localization::length_at_95(point.place->covariance_in_calibrator))},
+                                      localization::length_at_95(place.covariance_in_calibrator))},
           {"position", {at.x(), at.y(), at.z()}},
           {"positionStatus", "defined"}};
 }
@@ -69,17 +86,25 @@ Json markup(const char* type, const std::string& name, Json points) {
 
 std::string slicer_markups(const pipeline::Result& result) {
   Json points = Json::array(), markups = Json::array();
-  for (const pipeline::PointResult& point : result.points)
-    if (point.place) points.push_back(control_point(point));
+  for (const ExportedPoint& point : exported_points(result))
+    points.push_back(control_point(point.name, *point.place));
   if (points.empty()) return {};
   markups.push_back(markup("Fiducial", "helicarm points, calibrator frame", std::move(points)));
+  const auto add_line = [&](const std::string& name, const Json& start, const Json& end) {
+    markups.push_back(markup("Line", "tunnel " + name, Json::array({start, end})));
+  };
   for (std::size_t i = 0; i < result.tunnel_ends.size(); ++i) {
     const pipeline::PointResult& start = result.points[result.tunnel_ends[i].start];
     const pipeline::PointResult& end = result.points[result.tunnel_ends[i].end];
     if (start.place && end.place && i < result.tunnels.size())
-      markups.push_back(markup("Line", "tunnel " + result.tunnels[i].name,
-                               Json::array({control_point(start), control_point(end)})));
+      add_line(result.tunnels[i].name, control_point(start.name, *start.place),
+               control_point(end.name, *end.place));
   }
+  const auto end = [&](std::size_t i) {
+    return control_point(result.model_points[i].name, result.model_points[i].place);
+  };
+  for (const pipeline::ModelTunnel& planned : result.model_tunnels)
+    add_line(planned.tunnel.name, end(planned.ends.start), end(planned.ends.end));
   return to_text({{"@schema",
                    "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/"
                    "Resources/Schema/markups-schema-v1.0.0.json#"},

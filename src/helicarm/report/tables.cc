@@ -203,30 +203,54 @@ Table points_table(const std::vector<pipeline::PointResult>& points) {
       positions_table(points));
 }
 
-Table tunnels_table(const pipeline::Result& result) {
-  using guidance::Tunnel;
-  const auto error = [&result](bool start) {
-    return [&result, start](const Tunnel& t) {
-      return Cell{fixed(pipeline::tunnel_end_error_in_tool(result, t.name, start), 3)};
-    };
+namespace {
+
+/// A tunnel of picks or of a model's plan.
+struct TunnelRow {
+  const guidance::Tunnel* tunnel;
+  std::string model;  ///< empty: of picks
+  std::optional<double> start_error_mm, end_error_mm;
+};
+
+std::vector<TunnelRow> tunnel_rows(const pipeline::Result& result) {
+  std::vector<TunnelRow> rows;
+  for (const guidance::Tunnel& tunnel : result.tunnels)
+    rows.push_back({&tunnel,
+                    {},
+                    pipeline::tunnel_end_error_in_tool(result, tunnel.name, true),
+                    pipeline::tunnel_end_error_in_tool(result, tunnel.name, false)});
+  const auto error = [&](std::size_t end) {
+    const auto& in_tool = result.model_points[end].place.covariance_in_tool;
+    return in_tool ? std::optional(localization::length_at_95(*in_tool)) : std::nullopt;
   };
+  for (const pipeline::ModelTunnel& planned : result.model_tunnels)
+    rows.push_back({&planned.tunnel, planned.model, error(planned.ends.start), error(planned.ends.end)});
+  return rows;
+}
+
+}  // namespace
+
+Table tunnels_table(const pipeline::Result& result) {
+  using Row = TunnelRow;
   constexpr const char* bound = "Length that 95 % of the errors of that end do not exceed, mm";
-  return table_of<Tunnel>(
+  return table_of<Row>(
       "Tunnels in the tool's frame",
-      {{words("Tunnel", "Name of the tunnel"), [](const Tunnel& t) { return Cell{t.name}; }},
+      {{words("Tunnel", "Name of the tunnel"), [](const Row& r) { return Cell{r.tunnel->name}; }},
+       {words("Model", "Registered model whose plan names the tunnel; empty: its ends are picked"),
+        [](const Row& r) { return Cell{r.model}; }},
        {words("Start x, y, z, mm", "Start of the tunnel in the tool's frame, mm"),
-        [](const Tunnel& t) { return Cell{coordinates(t.start_in_tool, 2)}; }},
-       {number("±95 %, mm", bound), error(true)},
+        [](const Row& r) { return Cell{coordinates(r.tunnel->start_in_tool, 2)}; }},
+       {number("±95 %, mm", bound), [](const Row& r) { return Cell{fixed(r.start_error_mm, 3)}; }},
        {words("End x, y, z, mm", "End of the tunnel in the tool's frame, mm"),
-        [](const Tunnel& t) { return Cell{coordinates(t.end_in_tool, 2)}; }},
-       {number("±95 %, mm", bound), error(false)},
+        [](const Row& r) { return Cell{coordinates(r.tunnel->end_in_tool, 2)}; }},
+       {number("±95 %, mm", bound), [](const Row& r) { return Cell{fixed(r.end_error_mm, 3)}; }},
        {words("Axis", "Unit vector from start to end in the tool's frame"),
-        [](const Tunnel& t) { return Cell{coordinates(t.axis_in_tool, 4)}; }},
+        [](const Row& r) { return Cell{coordinates(r.tunnel->axis_in_tool, 4)}; }},
        {number("Axis σ, °", "Standard deviation of the axis' direction, degrees"),
-        [](const Tunnel& t) { return Cell{fixed(t.axis_sigma_deg(), 3)}; }},
+        [](const Row& r) { return Cell{fixed(r.tunnel->axis_sigma_deg(), 3)}; }},
        {number("Length, mm", "Distance from start to end, mm"),
-        [](const Tunnel& t) { return Cell{fixed(t.length_mm, 2)}; }}},
-      result.tunnels);
+        [](const Row& r) { return Cell{fixed(r.tunnel->length_mm, 2)}; }}},
+      tunnel_rows(result));
 }
 
 Table verification_table(const std::vector<ToolAtEnd>& tools) {

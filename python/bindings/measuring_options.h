@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "helicarm/case_registration/register_case.h"
+#include "signals.h"
+
+namespace helicarm::python {
+
+/// The options of run_case, register and register_sequence, checked as by the program; `function` begins the
+/// messages. `history`: a C-arm's history file.
+case_registration::RegisterOptions measuring_options(const char* function, const std::string& method,
+                                                     std::optional<double> max_error_mm,
+                                                     double motion_sigma_mm, double search_mm,
+                                                     double search_deg, unsigned threads,
+                                                     const std::optional<std::filesystem::path>& history);
+
+/// Hears of every stage and step, and may end the work between them. The options refer to `hooks`.
+void listen(const RunHooks& hooks, case_registration::RegisterOptions& options);
+
+}  // namespace helicarm::python

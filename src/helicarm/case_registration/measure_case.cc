@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/measure_case.h"
+
+#include "helicarm/core/files.h"
+#include "helicarm/pipeline/run_case.h"
+
+namespace helicarm::case_registration {
+namespace {
+
+void append(std::vector<Warning>& findings, const std::vector<Warning>& more) {
+  findings.insert(findings.end(), more.begin(), more.end());
+}
+
+/// The plan of a model, its tunnels' ends counted among all models' points.
+void add_plan(const RegisteredModel& model, pipeline::Result& result) {
+  const std::size_t first = result.model_points.size();
+  const std::string& name = model.registration.name;
+  for (const RegisteredPoint& point : model.points)
+    result.model_points.push_back({name, point.name, point.place});
+  for (std::size_t i = 0; i < model.tunnels.size(); ++i) {
+    const pipeline::TunnelEnds& ends = model.tunnel_ends[i];
+    result.model_tunnels.push_back({name, model.tunnels[i], {first + ends.start, first + ends.end}});
+  }
+}
+
+/// The folder is ours alone; what lies there belongs to an earlier measurement.
+void forget(const std::filesystem::path& details) {
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(details, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name == "registration.json" || name == "report.html" || name.ends_with("_overlay.png"))
+      std::filesystem::remove(entry.path(), ignored);
+  }
+}
+
+}  // namespace
+
+pipeline::Result with_models(pipeline::Result result, const CaseRegistration& registration) {
+  for (const RegisteredModel& model : registration.models) {
+    const registration::Registration& found = model.registration;
+    append(result.warnings, found.warnings);
+    append(result.notes, found.notes);
+    if (!found.failure)
+      add_plan(model, result);
+    else if (!result.failure)
+      result.failure = found.failure;
+  }
+  return result;
+}
+
+Expected<Measurement> measure_case(const pipeline::RegistrationCase& given, const RegisterOptions& options) {
+  return guarded([&] {
+    auto done = value_or_throw(pipeline::run_and_keep(given.base, with_steps(options)));
+    done.result.options = options.run;
+    if (done.result.failure || given.models.empty()) return Measurement{std::move(done.result), {}};
+    auto registration =
+        value_or_throw(register_loaded(given, views_of_calibration(given, *done.calibration), options));
+    pipeline::Result result = with_models(std::move(done.result), registration);
+    return Measurement{std::move(result), std::move(registration)};
+  });
+}
+
+Expected<void> write_models(const std::optional<CaseRegistration>& registration,
+                            const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "registration.json", details = folder / "registration";
+  std::error_code ignored;
+  std::filesystem::remove(file, ignored);
+  forget(details);
+  if (!registration) return {};
+  return write_registration(*registration, details).and_then([&] {
+    return write_file(file, to_text(to_json(*registration)) + "\n");
+  });
+}
+
+}  // namespace helicarm::case_registration
