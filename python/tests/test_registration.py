@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
+import shutil
 
 import cv2
 import numpy as np
@@ -170,3 +171,45 @@ def test_a_mask_drawn_on_a_tiff_stack_may_be_nrrd(sequence, tmp_path):
     (tmp_path / "case.json").write_text(json.dumps(case))
     pose = np.array(helicarm.register(tmp_path)["models"][0]["world_from_model"])
     assert pose[:3, 3] == pytest.approx([-19, -20, -20], abs=0.2)
+
+
+@pytest.fixture(scope="module")
+def planned(case, tmp_path_factory):
+    """The simulated case with its check targets as landmarks of a body, and a planned tunnel."""
+    folder = tmp_path_factory.mktemp("planned") / "case"
+    shutil.copytree(case[0], folder)
+    truth, content = case[1], json.loads((folder / "case.json").read_text())
+    rows = ["name,x_mm,y_mm,z_mm"]
+    content["picks"] = []
+    for name, (x, y, z) in truth["targets_in_calibrator"].items():
+        rows.append(f"p{name},{x},{y},{z}")
+        for view in truth["views"]:
+            raw = next(target["raw"] for target in view["targets"] if target["name"] == name)
+            content["picks"].append({"name": f"p{name}", "view": view["name"], "uv": raw})
+    (folder / "points.csv").write_text("\n".join(rows) + "\n")
+    ends = [{"label": "s", "position": [0, 0, 40]}, {"label": "e", "position": [0, 20, 60]}]
+    line = {"type": "Line", "name": "planned", "coordinateSystem": "LPS", "coordinateUnits": "mm", "controlPoints": ends}
+    (folder / "plan.mrk.json").write_text(json.dumps({"markups": [line]}))
+    content["models"] = [{"name": "body", "start": {"landmarks": "points.csv"}, "plan": "plan.mrk.json"}]
+    (folder / "case.json").write_text(json.dumps(content))
+    return folder
+
+
+@pytest.mark.parametrize("options", [{}, {"method": "paper"}, {"motion_sigma_mm": 1.0}])
+def test_run_case_registers_models_by_the_options_of_register(planned, options):
+    result = helicarm.run_case(planned, **options)
+    model, alone = result.registration["models"][0], helicarm.register(planned, **options)["models"][0]
+    assert (model["world_from_model"], model["covariance"]) == (alone["world_from_model"], alone["covariance"])
+    assert [tunnel["model"] for tunnel in result.to_dict()["tunnels"]] == ["body"]
+
+
+def test_the_limit_of_run_case_holds_for_models(planned):
+    with pytest.raises(helicarm.RefusedError) as error:
+        helicarm.run_case(planned, max_error_mm=0.02)
+    assert error.value.code == "uncertain"
+
+
+def test_a_result_with_models_writes_their_files(planned, tmp_path):
+    helicarm.run_case(planned).write(tmp_path)
+    assert json.loads((tmp_path / "registration.json").read_text())["status"] == "ok"
+    assert (tmp_path / "registration/report.html").exists()
