@@ -27,7 +27,10 @@ Layout layout_of(const std::vector<ViewProblem>& problems, const Refinement& fit
   return at;
 }
 
-/// Variance of the offsets over the stated one, relative to the noise's, from 0 to 1. With r = M e and M the
+/// Above it the estimate is noise: symmetric about the stated variance, so that the mean is right there.
+constexpr double most_share = 2;
+
+/// Variance of the offsets over the stated one, relative to the noise's. With r = M e and M the
 /// residual projection, E|r_g|^2 = sum over the groups h of variance_h |M_gh|^2: solved for the noise
 /// (observations and maps) and the offsets, the views' priors being as stated.
 double share_of_offsets(const Layout& at, const Refinement& fit) {
@@ -54,7 +57,7 @@ double share_of_offsets(const Layout& at, const Refinement& fit) {
   if (!(shares.determinant() > least_determinant)) return 1;
   const Eigen::Vector2d variances =
       shares.inverse() * Eigen::Vector2d(of_noise_rows - noise_priors, of_offset_rows - offsets_priors);
-  return variances[0] > 0 ? std::clamp(variances[1] / variances[0], 0.0, 1.0) : 1;
+  return variances[0] > 0 ? std::clamp(variances[1] / variances[0], 0.0, most_share) : most_share;
 }
 
 }  // namespace
@@ -63,7 +66,7 @@ std::vector<std::vector<ImageResidual>> image_residuals(const std::vector<ViewPr
                                                         const Refinement& fit) {
   const Layout at = layout_of(problems, fit);
   const Eigen::Index parameters = at.steps + at.offsets;
-  const double unstated = 1 - share_of_offsets(at, fit);
+  const double beyond_stated = share_of_offsets(at, fit) - 1;
   const auto covariance = fit.covariance.topLeftCorner(parameters, parameters);
   std::vector<std::vector<ImageResidual>> residuals(problems.size());
   Eigen::Index row = 0, map = at.offsets;
@@ -78,8 +81,8 @@ std::vector<std::vector<ImageResidual>> image_residuals(const std::vector<ViewPr
       const Eigen::MatrixXd fitted = slope * covariance;
       const auto by_offsets = fitted.rightCols(at.offsets);
       residuals[i].push_back({residual.norm(), std::sqrt(variance),
-                              variance * Eigen::Matrix2d::Identity() - fitted * slope.transpose() -
-                                  unstated * by_offsets * by_offsets.transpose()});
+                              variance * Eigen::Matrix2d::Identity() - fitted * slope.transpose() +
+                                  beyond_stated * by_offsets * by_offsets.transpose()});
       row += 2;
     }
     map += 2 * modes;

@@ -13,7 +13,7 @@ namespace helicarm::calibration {
 /// fiducials' offsets among them. `problems` are those of the fit.
 ///
 /// A stated tolerance is a limit that the true offsets may be far below. Their size is therefore estimated
-/// with the noise's (Helmert's variance components, one step), between none and the stated one.
+/// with the noise's (Helmert's variance components, one step), from none to twice the stated variance.
 std::vector<std::vector<ImageResidual>> image_residuals(const std::vector<ViewProblem>& problems,
                                                         const Refinement& fit);
 
