@@ -9,6 +9,7 @@
 
 #include "helicarm/calibration/ball_offsets.h"
 #include "helicarm/calibration/calibrator_warnings.h"
+#include "helicarm/calibration/image_residuals.h"
 #include "helicarm/calibration/outliers.h"
 #include "helicarm/calibration/view_problem.h"
 #include "helicarm/geometry/ray.h"
@@ -189,7 +190,7 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
       by_step * fit.covariance.topLeftCorner(parameters, parameters) * by_step.transpose();
   for (const auto& [view, observation] : clean->removed) mark_rejected(result.fiducials[view], observation);
 
-  Eigen::Index row = 0;
+  result.image_residuals = image_residuals(clean->problems, fit);
   for (std::size_t i = 0; i < views.size(); ++i) {
     auto view = described(views[i].name, uncentred(fit.views[i]), result.fiducials[i], options);
     if (!view) return after_rejection(view.error(), result.fiducials[i]);
@@ -204,16 +205,10 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
            {},
            {{"per_mm", rho}}},
           views[i].name);
-    double fitted = 0;
-    for (const Observation& observation : clean->problems[i].observations) {
-      const auto j = fit.jacobian.block(row, 0, 2, parameters);
-      const double own_share =
-          1 / (1 + observation.by_map.squaredNorm() / (observation.sigma_px * observation.sigma_px));
-      fitted +=
-          own_share * (j * fit.covariance.topLeftCorner(parameters, parameters) * j.transpose()).trace();
-      row += 2;
-    }
-    view->dof = int(std::lround(2 * double(clean->problems[i].observations.size()) - fitted));
+    view->chi2 = 0;
+    for (const ImageResidual& r : result.image_residuals[i])
+      view->chi2 += r.length_px * r.length_px / (r.sigma_px * r.sigma_px);
+    view->dof = int(std::lround(degrees_of_freedom(result.image_residuals[i])));
     view->covariance = block_of(result.joint_covariance, i);
     result.views.push_back(*std::move(view));
   }
@@ -238,6 +233,11 @@ Expected<CalibrationResult> calibrate_paper(const std::vector<ViewFiducials>& vi
     calibrated->dlt = dlt->factors;
     calibrated->by_paper = true;
     calibrated->dof = 2 * int(pairs.size()) - 11;
+    const double freedom = calibrated->dof / (2.0 * double(pairs.size()));
+    std::vector<ImageResidual>& residuals = result.image_residuals.emplace_back();
+    for (const fiducials::Fiducial& f : result.fiducials.back())
+      if (f.status == fiducials::FiducialStatus::used)  // one weight for all
+        residuals.push_back({f.residual_px, 1, freedom * Eigen::Matrix2d::Identity()});
     result.chi2 += calibrated->chi2;
     result.dof += calibrated->dof;
     result.views.push_back(*std::move(calibrated));

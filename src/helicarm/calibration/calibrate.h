@@ -36,9 +36,18 @@ struct CalibrationOptions {
   double largest_rms_px = 5;            ///< refused above it and 3 sigma
 };
 
+/// Residual of a used fiducial's image point, and what the fit leaves of the assumed noise there.
+struct ImageResidual {
+  double length_px;  ///< from the image of its estimated position
+  double sigma_px;   ///< assumed of the image point, per axis, the map's error included
+  /// Of the residual, if the noise is as assumed: below sigma^2 I by what the fitted parameters absorb.
+  Eigen::Matrix2d covariance_px2;
+};
+
 struct CalibrationResult : Calibration {
   std::vector<std::vector<fiducials::Fiducial>>
       fiducials;  ///< per view, with residuals; outliers are `rejected`
+  std::vector<std::vector<ImageResidual>> image_residuals;  ///< per view, of the used fiducials
   double chi2 = 0;
   int dof = 0;
   double variance_scale = 1;  ///< covariance inflation where chi2 is inconsistent with the fiducials' sigmas

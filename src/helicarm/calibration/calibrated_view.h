@@ -24,8 +24,8 @@ struct CalibratedView {
   /// Of the view's parameters; the true pose is (exp(w) R, t + dt). Zero: not computed.
   ViewCovariance covariance = ViewCovariance::Zero();
   double reprojection_rms_px = 0;
-  double chi2 = 0;
-  int dof = 0;
+  double chi2 = 0;        ///< of the residuals from the fiducials' estimated positions
+  int dof = 0;            ///< expected chi2: observations less the share of the joint fit that they determine
   double condition = 0;   ///< of the normalised DLT's design matrix
   bool by_paper = false;  ///< by Eq. 7 alone (`--method paper`); points of such views are those of Eq. 8
 };

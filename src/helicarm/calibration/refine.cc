@@ -24,10 +24,6 @@ Eigen::Index offset_count(const std::vector<ViewProblem>& problems) {
   return count;
 }
 
-Eigen::Index map_modes(const ViewProblem& problem) {
-  return problem.observations.empty() ? 0 : problem.observations.front().by_map.size();
-}
-
 /// Rows at given views and offsets; false if a point is not in front of its source. Without priors on the
 /// intrinsics rho may pass through zero during the iteration.
 bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& common, Refinement& at) {
@@ -111,6 +107,10 @@ Expected<Eigen::MatrixXd> covariance_of(const Refinement& at) {
 }
 
 }  // namespace
+
+Eigen::Index map_modes(const ViewProblem& problem) {
+  return problem.observations.empty() ? 0 : problem.observations.front().by_map.size();
+}
 
 Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const CommonPrior& common) {
   Refinement at;

@@ -29,6 +29,9 @@ struct ViewProblem {
   geometry::IntrinsicsPrior prior;
 };
 
+/// Number of the map's independent unit errors per axis.
+Eigen::Index map_modes(const ViewProblem& problem);
+
 /// The joint fit of all views. Rows, each over its standard deviation: u and v of the observations, view by
 /// view, then the priors. Columns: the steps of all views, then, in standard deviations, the fiducials'
 /// offsets from the file if there is a tolerance, and each view's map errors in u and in v.

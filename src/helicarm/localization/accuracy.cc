@@ -3,8 +3,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::localization {
+namespace {
+
+const double mean_unit_length = std::sqrt(std::numbers::pi / 2);  // of a plane error, sigma 1 per axis
+
+/// Of a normally distributed plane vector. A residual along one direction alone is shorter in the mean than
+/// one of equal rms in both.
+double mean_length(const Eigen::Matrix2d& covariance) {
+  const Eigen::Vector2d variances = geometry::symmetric_eigen(covariance).values.cwiseMax(0);
+  if (!(variances[1] > 0)) return 0;
+  return std::sqrt(2 * variances[1] / std::numbers::pi) *
+         std::comp_ellint_2(std::sqrt(1 - variances[0] / variances[1]));
+}
+
+}  // namespace
 
 Statistics statistics_of(std::span<const double> errors) {
   if (errors.empty()) return {};
@@ -20,20 +37,24 @@ Statistics statistics_of(std::span<const double> errors) {
 }
 
 Statistics fiducial_localization_error(const calibration::CalibrationResult& calibration) {
+  constexpr double least_dof = 1;
   std::vector<double> residuals;
-  for (std::size_t i = 0; i < calibration.views.size(); ++i) {
-    const auto first = residuals.size();
-    for (const fiducials::Fiducial& f : calibration.fiducials[i])
-      if (f.status == fiducials::FiducialStatus::used) residuals.push_back(f.residual_px);
-    const double rows = 2 * double(residuals.size() - first);
-    if (calibration.views[i].dof < 1) {
-      residuals.resize(first);
-      continue;
+  double expected = 0, expected2 = 0, noise = 0, noise2 = 0, dof = 0;
+  for (const auto& of_view : calibration.image_residuals)
+    for (const calibration::ImageResidual& r : of_view) {
+      residuals.push_back(r.length_px);
+      expected += mean_length(r.covariance_px2);
+      expected2 += r.covariance_px2.trace();
+      noise += r.sigma_px * mean_unit_length;
+      noise2 += 2 * r.sigma_px * r.sigma_px;
+      dof += r.covariance_px2.trace() / (r.sigma_px * r.sigma_px);
     }
-    for (auto r = first; r < residuals.size(); ++r)
-      residuals[r] *= std::sqrt(rows / calibration.views[i].dof);
-  }
-  return statistics_of(residuals);
+  if (dof < least_dof) return {};
+  const double mean = statistics_of(residuals).mean;
+  for (double& residual : residuals) residual *= std::sqrt(noise2 / expected2);
+  Statistics error = statistics_of(residuals);
+  error.mean = mean * noise / expected;
+  return error;
 }
 
 Statistics fiducial_registration_error(const calibration::CalibrationResult& calibration) {

@@ -20,8 +20,8 @@ struct Statistics {
 
 Statistics statistics_of(std::span<const double> errors);
 
-/// Eq. 10 without the true pixels: the residuals (px), scaled by the square root of observations over degrees
-/// of freedom.
+/// Eq. 10 without the true pixels: the residuals of all views together, each divided by what the joint fit
+/// leaves of a unit error there (`ImageResidual`). n = 0 with less than one degree of freedom.
 Statistics fiducial_localization_error(const calibration::CalibrationResult& calibration);
 
 /// Eq. 11: distances (mm) of the fiducials used in two or more views, triangulated, from their coordinates.

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/centred_view.h"
+#include "helicarm/geometry/ray.h"
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/localization/error_bound.h"
 
@@ -89,10 +90,17 @@ Expected<Eigen::Vector3d> published_point(std::span<const geometry::RayObservati
   return geometry::intersect_linear(projections, pixels);
 }
 
+/// Chi-square over its degrees of freedom that errors as assumed exceed with the probability of three
+/// standard deviations, 0.0027: 9 for two views (Wilson and Hilferty 1931).
+double largest_excess(std::size_t views) {
+  constexpr double of_two_views = 9, normal_deviate = 2.782;
+  const double spread = 2.0 / (9.0 * double(2 * views - 3));
+  return views == 2 ? of_two_views : std::pow(1 - spread + normal_deviate * std::sqrt(spread), 3);
+}
+
 void inflate_if_rays_miss(LocatedPoint& located) {
-  constexpr double largest_excess = 9;  // three standard deviations
   const double excess = located.chi2 / double(2 * located.views.size() - 3);
-  if (!(excess > largest_excess)) return;
+  if (!(excess > largest_excess(located.views.size()))) return;
   located.covariance_in_anchor *= excess;
   located.by_calibration *= std::sqrt(excess);
   located.missing_rays = Warning{
@@ -105,11 +113,23 @@ void inflate_if_rays_miss(LocatedPoint& located) {
       {{"ray_gap_mm", located.ray_gap_mm}, {"chi2", located.chi2}}};
 }
 
-/// The point lies between the rays: its error is at least half the ray gap for one of them.
-void bound_by_ray_gap(LocatedPoint& located) {
-  const double length = length_at_95(located.covariance_in_anchor), half = 0.5 * located.ray_gap_mm;
-  if (length >= half) return;
-  const double sigma = half / length_at_95(Eigen::Matrix3d::Identity());
+/// Error of the point that the rays' distances from each other or from it show, mm. Of two rays, between
+/// which the point lies, half the gap; the mean of n rays is more accurate by the square root of n / 2.
+double shown_error_mm(const LocatedPoint& located, std::span<const geometry::RayObservation> rays) {
+  if (rays.size() == 2) return 0.5 * located.ray_gap_mm;
+  double squared = 0;
+  for (const geometry::RayObservation& observation : rays) {
+    const geometry::Ray ray = geometry::ray_through(observation.view, observation.pixel);
+    squared += (located.point_in_anchor - ray.origin).cross(ray.direction).squaredNorm();
+  }
+  const double n = double(rays.size());
+  return std::sqrt(squared / n * 2 / n);
+}
+
+void bound_by_ray_gap(LocatedPoint& located, std::span<const geometry::RayObservation> rays) {
+  const double length = length_at_95(located.covariance_in_anchor), shown = shown_error_mm(located, rays);
+  if (length >= shown) return;
+  const double sigma = shown / length_at_95(Eigen::Matrix3d::Identity());
   located.covariance_in_anchor += sigma * sigma * Eigen::Matrix3d::Identity();
 }
 
@@ -162,7 +182,7 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
   if (!by_anchors.isZero(0))
     if (const auto met = geometry::intersect(ray_observations, noise + by_anchors)) located.chi2 = met->chi2;
   inflate_if_rays_miss(located);
-  bound_by_ray_gap(located);
+  bound_by_ray_gap(located, ray_observations);
   return located;
 }
 
@@ -197,9 +217,12 @@ std::optional<Warning> covariance_missing(const LocatedPoint& point,
       views.push_back(view.name);
   if (views.empty()) return std::nullopt;
   return Warning{Reason::covariance_missing,
-                 fmt::format("\"{}\": the calibration of {} has no covariance, so the point has none; its "
-                             "error is at least half the ray gap, {:.3g} mm",
-                             point.name, fmt::join(views, ", "), 0.5 * point.ray_gap_mm),
+                 fmt::format("\"{}\": the calibration of {} has no covariance, so the point has none; {}",
+                             point.name, fmt::join(views, ", "),
+                             observations.size() == 2
+                                 ? fmt::format("its error is at least half the ray gap, {:.3g} mm",
+                                               0.5 * point.ray_gap_mm)
+                                 : fmt::format("the largest ray gap is {:.3g} mm", point.ray_gap_mm)),
                  {},
                  {{"ray_gap_mm", point.ray_gap_mm}}};
 }

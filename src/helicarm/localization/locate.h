@@ -48,14 +48,15 @@ struct LocatedPoint {
 /// and the calibration's covariance, or the views' reprojection errors if it has none. Views `by_paper` give
 /// the point of Eq. 8, with the covariance of the weighted one.
 /// `motion_sigma_mm` (per axis): motion of the point between the first view's acquisition and each later one.
-/// If chi2 per degree of freedom exceeds 9 (three standard deviations), the covariance is inflated by it and
-/// `missing_rays` is set. The 95 % length is at least half the ray gap. Refuses as `intersect`.
+/// If chi2 exceeds three standard deviations (9 per degree of freedom for two views), the covariance is
+/// inflated by it and `missing_rays` is set. The 95 % length is at least half the gap of two rays; of n rays
+/// at least their rms distance from the point times the square root of 2 / n. Refuses as `intersect`.
 Expected<LocatedPoint> locate(const std::string& name, PointSource source,
                               std::span<const PointObservation> observations,
                               const calibration::Calibration& calibration, double motion_sigma_mm = 0);
 
 /// covariance_missing: the calibration of one of the point's views has no covariance, so that the point has
-/// none; `ray_gap_mm` bounds its error from below.
+/// none; half of `ray_gap_mm` bounds its error from below where it has two views.
 std::optional<Warning> covariance_missing(const LocatedPoint& point,
                                           std::span<const PointObservation> observations,
                                           const calibration::Calibration& calibration);

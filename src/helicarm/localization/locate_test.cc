@@ -133,6 +133,58 @@ TEST(Locate, LengthAt95IsNeverBelowHalfTheRayGap) {
       }
 }
 
+/// Views over 150 degrees, taken as exact, and a point observed in them with the noise.
+struct ManyViews {
+  calibration::Calibration calibration;
+  std::vector<PointObservation> observations;
+};
+
+ManyViews many_views(std::size_t count, double sigma, double actual_sigma, RandomStream& random) {
+  ManyViews views;
+  for (std::size_t i = 0; i < count; ++i) {
+    const geometry::View view = paper_view(2.6 * double(i) / double(count - 1));
+    views.calibration.views.push_back({fmt::format("V{}", i), view, {}});
+    views.observations.push_back(
+        {i, view.project(target) + actual_sigma * Eigen::Vector2d(random.normal(), random.normal()),
+         sigma * sigma * Eigen::Matrix2d::Identity()});
+  }
+  return views;
+}
+
+TEST(Locate, LengthAt95FallsWithTheNumberOfViewsAndCovers) {
+  for (const std::size_t count : {3U, 10U, 50U}) {
+    const int trials = 400;
+    int covered = 0, missing = 0;
+    double length = 0;
+    for (int trial = 0; trial < trials; ++trial) {
+      RandomStream random(29, count, std::uint64_t(trial));
+      const ManyViews views = many_views(count, 0.5, 0.5, random);
+      const auto point = locate("T", PointSource::pick, views.observations, views.calibration);
+      ASSERT_TRUE(point);
+      const double at_95 = length_at_95(point->covariance_in_anchor);
+      covered += (point->point_in_anchor - target).norm() < at_95;
+      missing += point->missing_rays.has_value();
+      length += at_95 / trials;
+    }
+    EXPECT_NEAR(double(covered) / trials, 0.95, 0.035) << count;
+    EXPECT_LT(missing, 6) << count;
+    EXPECT_NEAR(length * std::sqrt(double(count)), 0.27, 0.05) << count;
+  }
+}
+
+TEST(Locate, FarMoreNoiseThanStatedInManyViewsIsInTheCovariance) {
+  const int trials = 200;
+  int covered = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    RandomStream random(30, 0, std::uint64_t(trial));
+    const ManyViews views = many_views(50, 0.5, 1.0, random);  // chi2 is 4 per degree of freedom
+    const auto point = locate("T", PointSource::pick, views.observations, views.calibration);
+    ASSERT_TRUE(point && point->missing_rays);
+    covered += (point->point_in_anchor - target).norm() < length_at_95(point->covariance_in_anchor);
+  }
+  EXPECT_GT(covered, 0.9 * trials);
+}
+
 TEST(Locate, RaysThatMissAreWarnedOfWithAndWithoutCovariance) {
   RandomStream random(25, 0);
   const auto calibrated = noisy_calibration(0.05, random);

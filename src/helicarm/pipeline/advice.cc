@@ -143,6 +143,10 @@ Advice advice_for(const Result& result) {
     case Reason::patient_mismatch:
       return {{"images of two patients or studies are in the case"}, "choose images that belong together"};
     case Reason::uncertain:
+      if (has_figure(*result.failure, "by_scale_sigma_mm"))
+        return {{"the calibrator's size is known to its \"scale_sigma\" only", "a strict --max-error"},
+                "measure a distance between two of its fiducials with a caliper, and the calibrator with "
+                "`helicarm phantom measure --distance`"};
       return {{"few or badly placed fiducials", "views too close to each other", "a strict --max-error"},
               "`helicarm predict` shows where points are accurate; add a view or turn the second one"};
     default:

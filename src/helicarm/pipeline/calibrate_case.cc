@@ -119,6 +119,8 @@ Expected<CaseCalibration> with_explanations(CaseCalibration calibration, const L
     }
     calibration.warnings.push_back(std::move(warning));
   }
+  for (Warning& warning : doubtful_intrinsics(views, calibration, common_prior(given.calibrator)))
+    calibration.warnings.push_back(std::move(warning));
   return calibration;
 }
 

@@ -106,7 +106,7 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
           })
           .and_then([&](std::vector<verification::Verification> verifications) {
             result.verifications = std::move(verifications);
-            return check_certain(result.points, options.max_error_mm);
+            return check_certain(result.points, options.max_error_mm, given.calibrator);
           })
           .map([&](const std::vector<Warning>& warnings) { append(result.warnings, warnings); });
   if (!done) result.failure = done.error();

@@ -24,6 +24,14 @@ std::optional<verification::LineError> error_at(const PointResult& point,
   return value_or_throw(verification::distance_to_line(views, planned, line));
 }
 
+/// 95 % error of a point by that of the calibrator's scale, along the line from its middle.
+double scale_error_95_mm(const phantom::Calibrator& calibrator, const Eigen::Vector3d& point_in_calibrator) {
+  constexpr double normal_at_95 = 1.96;  // two-sided
+  if (calibrator.scale_sigma == 0) return 0;
+  return normal_at_95 * calibrator.scale_sigma *
+         (point_in_calibrator - phantom::middle_of(calibrator)).norm();
+}
+
 }  // namespace
 
 localization::Accuracy measure_accuracy(const phantom::Calibrator& calibrator,
@@ -187,7 +195,8 @@ std::vector<Warning> diagnose(const Case& given, const Result& result) {
 }
 
 Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& points,
-                                             std::optional<double> max_error_mm) {
+                                             std::optional<double> max_error_mm,
+                                             const phantom::Calibrator& calibrator) {
   constexpr double default_limit_mm = 2;
   const double limit = max_error_mm.value_or(default_limit_mm);
   std::vector<Warning> warnings;
@@ -198,10 +207,18 @@ Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& poi
     const bool worse_in_tool = in_tool && localization::length_at_95(*in_tool) > error;
     if (worse_in_tool) error = localization::length_at_95(*in_tool);
     if (error <= limit) continue;
-    const std::string message =
-        fmt::format("the 95 % error of \"{}\"{} is {:.3g} mm, over the limit of {:g} mm", point.name,
-                    worse_in_tool ? " in the tool's frame" : "", error, limit);
-    const std::map<std::string, double> figures{{"error_95_mm", error}, {"limit_mm", limit}};
+    std::string message = fmt::format("the 95 % error of \"{}\"{} is {:.3g} mm, over the limit of {:g} mm",
+                                      point.name, worse_in_tool ? " in the tool's frame" : "", error, limit);
+    std::map<std::string, double> figures{{"error_95_mm", error}, {"limit_mm", limit}};
+    const double by_scale_mm = scale_error_95_mm(calibrator, point.place->in_calibrator);
+    if (constexpr double most = 0.7; by_scale_mm > most * error) {
+      figures["by_scale_sigma_mm"] = by_scale_mm;
+      message += fmt::format(
+          "; {:.3g} mm of it are the calibrator's scale_sigma of {:.2g} %: measure a distance between two of "
+          "its "
+          "fiducials, and the calibrator with `helicarm phantom measure --distance`",
+          std::min(by_scale_mm, error), 100 * calibrator.scale_sigma);
+    }
     if (max_error_mm) return fail(Reason::uncertain, message, figures);
     warnings.push_back({Reason::uncertain, message, {}, figures});
   }

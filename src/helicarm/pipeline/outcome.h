@@ -43,8 +43,9 @@ std::vector<Warning> exchanged_views(const std::vector<ViewResult>& views);
 std::vector<Warning> diagnose(const Case& given, const Result& result);
 
 /// `uncertain` if a located point's 95 % error exceeds the limit: a failure for a given limit, a warning for
-/// the default of 2 mm.
+/// the default of 2 mm. The message names the calibrator's `scale_sigma` where it causes most of the error.
 Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& points,
-                                             std::optional<double> max_error_mm);
+                                             std::optional<double> max_error_mm,
+                                             const phantom::Calibrator& calibrator);
 
 }  // namespace helicarm::pipeline

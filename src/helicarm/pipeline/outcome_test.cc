@@ -45,12 +45,29 @@ TEST(CheckPicksAgree, ContradictingPicksAloneMayBeMotion) {
 
 TEST(CheckCertain, LimitHoldsInTheToolsFrameToo) {
   std::vector<PointResult> points = {point("a", 0, false)};
-  EXPECT_TRUE(check_certain(points, 0.5));
+  EXPECT_TRUE(check_certain(points, 0.5, {}));
   points[0].place->covariance_in_tool = Eigen::Matrix3d::Identity();
-  const auto refused = check_certain(points, 0.5);
+  const auto refused = check_certain(points, 0.5, {});
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::uncertain);
   EXPECT_NE(refused.error().message.find("in the tool's frame"), std::string::npos);
+}
+
+TEST(CheckCertain, ScaleSigmaIsNamedWhereItCausesMostOfTheError) {
+  std::vector<PointResult> points = {point("a", 0, false)};
+  points[0].place->in_calibrator = {0, 0, 100};
+  phantom::Calibrator calibrator{"c", {{"P1", {-10, 0, 0}, 4}, {"P2", {10, 0, 0}, 4}}, {}};
+  calibrator.scale_sigma = 0.03;  // 3 mm at the point
+  points[0].place->covariance_in_calibrator(2, 2) += 9;
+  const auto refused = check_certain(points, 2, calibrator);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("scale_sigma of 3 %"), std::string::npos);
+  EXPECT_NEAR(refused.error().figures.at("by_scale_sigma_mm"), 5.88, 0.01);
+  calibrator.scale_sigma = 0.003;
+  const auto otherwise = check_certain(points, {}, calibrator);
+  ASSERT_TRUE(otherwise);
+  ASSERT_EQ(otherwise->size(), 1U);
+  EXPECT_EQ((*otherwise)[0].message.find("scale_sigma"), std::string::npos);
 }
 
 }  // namespace

@@ -6,6 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/calibration/intrinsics_check.h"
+#include "helicarm/rectification/round_field.h"
+
 namespace helicarm::pipeline {
 namespace {
 
@@ -138,6 +141,40 @@ Warning warning_of(const ImageChange& change, const std::vector<LabelledView>& v
       view, figures};
 }
 
+/// The view's fiducials without those that the calibration rejected.
+calibration::ViewFiducials accepted_of(const LabelledView& view,
+                                       const std::vector<fiducials::Fiducial>& fiducials) {
+  calibration::ViewFiducials accepted = fiducials_of(view);
+  accepted.fiducials = fiducials;
+  std::vector<Eigen::Vector2d> used;
+  for (const fiducials::Fiducial& ball : fiducials)
+    if (ball.status == fiducials::FiducialStatus::used) used.push_back(ball.uv);
+  accepted.map_covariance_px2 = view.rectification.map.covariance_px2(used);
+  return accepted;
+}
+
+Eigen::Vector2d size_of(const LabelledView& view) {
+  return {view.xray_image->pixels.width(), view.xray_image->pixels.height()};
+}
+
+Warning unrectified(const LabelledView& view, const std::optional<ImageChange>& radial) {
+  const std::string estimate =
+      radial ? fmt::format(
+                   "the fiducials give a radial distortion of {:.2g} % (sigma {:.1g}) at half the image's "
+                   "width",
+                   -100 * radial->amount, 100 * radial->sigma)
+             : std::string("the fiducials do not determine its distortion");
+  std::map<std::string, double> figures;
+  if (radial) figures = {{"amount", radial->amount}, {"sigma", radial->sigma}};
+  return {
+      Reason::residual_distortion,
+      fmt::format("the field is round as an image intensifier's, and neither a plate nor a map rectifies it; "
+                  "{}. The intrinsics may be several per cent off while the residuals are small: name the "
+                  "plate, plate_image or map",
+                  estimate),
+      view.name, std::move(figures)};
+}
+
 }  // namespace
 
 std::optional<ImageChange> best_image_change(const std::vector<calibration::ViewFiducials>& views,
@@ -172,10 +209,35 @@ std::vector<Warning> explain_residuals(const std::vector<LabelledView>& views,
   std::vector<Eigen::Vector2d> size_px;
   for (const LabelledView& view : views) {
     fiducials.push_back(fiducials_of(view));
-    size_px.emplace_back(view.xray_image->pixels.width(), view.xray_image->pixels.height());
+    size_px.push_back(size_of(view));
   }
   const auto change = best_image_change(fiducials, size_px, common);
   return change ? std::vector<Warning>{warning_of(*change, views)} : std::vector<Warning>{};
+}
+
+std::vector<Warning> doubtful_intrinsics(const std::vector<LabelledView>& views,
+                                         const calibration::CalibrationResult& calibration,
+                                         const calibration::CommonPrior& common) {
+  constexpr double least_distortion = 0.01;  // intensifiers: 3 to 10 % at half the image's width
+  std::vector<calibration::ViewFiducials> fiducials;
+  std::vector<Eigen::Vector2d> size_px;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    fiducials.push_back(accepted_of(views[i], calibration.fiducials[i]));
+    size_px.push_back(size_of(views[i]));
+  }
+  std::vector<Warning> warnings;
+  if (std::ranges::none_of(calibration.warnings, [](const Warning& warning) {
+        return warning.reason == Reason::intrinsics_inconsistent;
+      }))
+    warnings = calibration::check_intrinsics(fiducials, common);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (!views[i].rectification.map.is_identity() || !rectification::round_field(*views[i].xray_image))
+      continue;
+    const auto radial = fitted({Kind::radial, i}, fiducials, size_px, common);
+    if (radial && std::abs(radial->amount) + 2 * radial->sigma < least_distortion) continue;
+    warnings.push_back(unrectified(views[i], radial));
+  }
+  return warnings;
 }
 
 }  // namespace helicarm::pipeline

@@ -9,9 +9,9 @@
 
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/image/opencv.h"
-#include "helicarm/rectification/lattice.h"
 #include "helicarm/rectification/paper_dots.h"
 #include "helicarm/rectification/plate_match.h"
+#include "helicarm/rectification/seen_lattice.h"
 #include "helicarm/rectification/usable.h"
 
 namespace helicarm::rectification {
@@ -20,58 +20,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double pitch_tolerance = 0.04;  // measured relative to expected pitch
-constexpr std::size_t least_dots = 10;
-/// Without a plate description a plate may still be present: more dots than a calibrator's balls and some
-/// outliers can form.
-constexpr std::size_t least_dots_of_any_plate = 20;
-const phantom::Plate any_plate{"", phantom::DotKind::balls, phantom::Lattice::square, {}, 2.5, {}, {}};
-constexpr double largest_radius_searched_from_px = 4.5;  // leaves out the search's first octave
 constexpr double max_ball_radius = 0.04;  // relative to the image width: no larger ball is accepted
-
-/// Pixels per plate millimetre at the image centre, if file and plate provide it.
-std::optional<double> expected_scale(const xray::XrayImage& xray_image, const phantom::Plate& plate) {
-  const auto& pixel = xray_image.acquisition.pixel_mm;
-  if (!pixel) return std::nullopt;
-  const double height = plate.height_above_receiver_mm.value_or(0);
-  const double distance = xray_image.acquisition.source_detector_mm.value_or(1000);
-  return distance / (distance - height) / std::sqrt(pixel->x() * pixel->y());
-}
-
-std::vector<detection::Dot> with_radius_near(const std::vector<detection::Dot>& dots, double radius) {
-  std::vector<detection::Dot> near;
-  for (const detection::Dot& dot : dots)
-    if (dot.radius_px > 0.7 * radius && dot.radius_px < 1.35 * radius) near.push_back(dot);
-  return near;
-}
-
-/// The dots as a lattice: of the expected pitch if known, else of the pitch that gives the largest lattice.
-struct SeenLattice {
-  std::vector<detection::Dot> dots;
-  IndexedLattice lattice;
-};
-
-SeenLattice seen_lattice(const std::vector<detection::Dot>& dots, const phantom::Plate& plate,
-                         std::optional<double> scale) {
-  SeenLattice best;
-  const auto consider = [&](std::vector<detection::Dot> some, std::optional<double> pitch_px) {
-    LatticeOptions options;
-    options.pitch_px = pitch_px;
-    IndexedLattice lattice = index_lattice(some, plate.lattice, options);
-    if (lattice.dots.size() > best.lattice.dots.size()) best = {std::move(some), std::move(lattice)};
-  };
-  if (scale && plate.pitch_mm) {
-    consider(with_radius_near(dots, 0.5 * plate.diameter_mm * *scale), *plate.pitch_mm * *scale);
-    if (best.lattice.dots.size() >= least_dots) return best;
-  }
-  std::vector<double> radii;
-  for (const detection::Dot& dot : dots) radii.push_back(dot.radius_px);
-  std::sort(radii.begin(), radii.end());
-  for (const double q : {0.2, 0.5, 0.8})
-    if (!radii.empty())
-      consider(with_radius_near(dots, radii[static_cast<std::size_t>(q * double(radii.size() - 1))]),
-               std::nullopt);
-  return best;
-}
 
 /// Refits the lattice's dots with their own profile and their neighbours masked.
 detection::DotAppearance refit_lattice_dots(const xray::XrayImage& xray_image,
@@ -173,7 +122,7 @@ Attempt find_lattice(const xray::XrayImage& xray_image, const phantom::Plate& pl
   const detection::Polarity expected =
       plate.kind == phantom::DotKind::balls ? detection::Polarity::dark : detection::Polarity::bright;
   Attempt first = attempt(expected);
-  if (first.size() >= least_dots) return first;
+  if (first.size() >= least_plate_dots) return first;
   Attempt second = attempt(detection::opposite(expected));
   return second.size() > first.size() ? second : first;
 }
@@ -184,7 +133,7 @@ Failure without_lattice(const xray::XrayImage& xray_image, phantom::Plate plate,
   const bool square = plate.lattice == phantom::Lattice::square;
   plate.lattice = square ? phantom::Lattice::hexagonal : phantom::Lattice::square;
   const std::size_t of_other_kind = find_lattice(xray_image, plate, method, scale).size();
-  if (of_other_kind >= least_dots)
+  if (of_other_kind >= least_plate_dots)
     return {Reason::plate_mismatch,
             fmt::format("{} dots form a {} lattice, that of \"{}\" is {}", of_other_kind,
                         square ? "hexagonal" : "square", plate.name, square ? "square" : "hexagonal"),
@@ -192,7 +141,7 @@ Failure without_lattice(const xray::XrayImage& xray_image, phantom::Plate plate,
             {{"dots_found", double(of_other_kind)}}};
   return {Reason::plate_not_found,
           fmt::format("only {} dots form a lattice like that of \"{}\", at least {} are needed", found,
-                      plate.name, least_dots),
+                      plate.name, least_plate_dots),
           {},
           {{"dots_found", double(found)}}};
 }
@@ -206,7 +155,7 @@ Expected<Rectification> rectify(const xray::XrayImage& xray_image, const phantom
   const int width = xray_image.pixels.width();
   const int height = xray_image.pixels.height();
   Attempt attempt = find_lattice(xray_image, plate, options.method, scale);
-  if (attempt.size() < least_dots)
+  if (attempt.size() < least_plate_dots)
     return tl::unexpected<Failure>(without_lattice(xray_image, plate, options.method, scale, attempt.size()));
 
   const detection::NoiseCorrelation noise = detection::noise_correlation(xray_image);
@@ -273,52 +222,6 @@ detection::DotOptions metal_search(const xray::XrayImage& xray_image, detection:
   options.polarity = metal;
   options.max_radius_px = std::max(16.0, max_ball_radius * xray_image.pixels.width());
   return options;
-}
-
-Expected<Rectification> with_map(const xray::XrayImage& xray_image, const DistortionMap& map,
-                                 const std::optional<phantom::Plate>& plate) {
-  if (map.width != xray_image.pixels.width() || map.height != xray_image.pixels.height())
-    return fail(Reason::plate_mismatch,
-                fmt::format("the map is for {} x {} pixels, the image has {} x {}", map.width, map.height,
-                            xray_image.pixels.width(), xray_image.pixels.height()));
-  if (auto usable = check_usable(xray_image); !usable) return tl::unexpected<Failure>(usable.error());
-  Rectification result;
-  result.map = map;
-  result.noise = detection::noise_correlation(xray_image);
-  const phantom::Plate sought = plate.value_or(any_plate);
-  const auto scale = expected_scale(xray_image, sought);
-  detection::DotOptions search = metal_search(xray_image, result.metal);
-  search.min_radius_px = std::clamp(scale ? 0.4 * sought.diameter_mm * *scale : 2, search.min_radius_px,
-                                    largest_radius_searched_from_px);
-  result.other_dots = detection::find_dots(xray_image, search);
-  result.other_dots_from_px = search.min_radius_px;
-  if (sought.kind == phantom::DotKind::holes) return result;
-  // A plate in the image verifies the map: rectified, its dots must form a lattice.
-  const SeenLattice seen = seen_lattice(*result.other_dots, sought, scale);
-  if (seen.lattice.dots.size() < (plate ? least_dots : least_dots_of_any_plate)) return result;
-  std::vector<Correspondence> dots;
-  std::vector<detection::Dot> members;
-  for (const IndexedDot& d : seen.lattice.dots) {
-    const detection::Dot& dot = seen.dots[d.dot];
-    members.push_back(dot);
-    if (const auto uv = map.rectified_from_raw(dot.centre_px))
-      dots.push_back({lattice_point(d.index, sought.lattice), *uv, dot.error_px()});
-  }
-  MapOptions straight;
-  straight.order = 1;
-  const auto fit = fit_map(dots, map.width, map.height, straight);
-  const double limit = std::max(0.5, 3 * map.held_out_rms_px);
-  if (fit && fit->map.residual_rms_px > limit)
-    return fail(
-        Reason::plate_mismatch,
-        fmt::format(
-            "{} the plate in the image: its rectified dots are {:.2f} px rms off a lattice, limit {:.2f}",
-            map.is_identity() ? "there is no map, but distortion bends" : "the map does not fit",
-            fit->map.residual_rms_px, limit),
-        {{"residual_rms_px", fit->map.residual_rms_px}});
-  result.map_confirmed = fit.has_value();
-  result.other_dots = detection::dots_except(*result.other_dots, members);
-  return result;
 }
 
 image::Image<float> resample(const xray::XrayImage& xray_image, const DistortionMap& map) {

@@ -260,7 +260,7 @@ Expected<TestGrid> measure_test_grid(const std::vector<detection::Dot>& crosses,
 
 Expected<void> check_pitch(const TestGrid& grid, double pitch_mm, const DistortionMap& map,
                            std::optional<double> source_detector_mm) {
-  constexpr double highest_mm = 150;
+  constexpr double highest_mm = 300;
   constexpr double nearest_source_mm = 700;  // of C-arms, where the image does not state it
   constexpr double pixel_tolerance = 0.05;   // of the nominal pixel size, and from plate to receiver
   if (!map.rectified_pixel_mm) return {};

@@ -45,7 +45,7 @@ enum class GridFit { nine, all };
 Expected<TestGrid> measure_test_grid(const std::vector<detection::Dot>& crosses, const DistortionMap& map,
                                      GridFit fit = GridFit::nine);
 
-/// bad_value if a grid of this pitch, 0 to 150 mm in front of the receiver, cannot have the measured one. Not
+/// bad_value if a grid of this pitch, 0 to 300 mm in front of the receiver, cannot have the measured one. Not
 /// checked where the map has no pixel size.
 Expected<void> check_pitch(const TestGrid& grid, double pitch_mm, const DistortionMap& map,
                            std::optional<double> source_detector_mm);

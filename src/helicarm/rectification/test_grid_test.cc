@@ -183,7 +183,8 @@ TEST(TestGridPitch, ContradictionToThePixelSizeIsNamed) {
   EXPECT_NEAR(measured->rectified_pitch_px, 30, 1e-9);
   EXPECT_TRUE(check_pitch(*measured, 21, map, 1000));  // at the receiver
   EXPECT_TRUE(check_pitch(*measured, 18, map, 1000));  // 143 mm in front of it
-  for (const double wrong : {7.0, 16.0, 23.0}) {
+  EXPECT_TRUE(check_pitch(*measured, 15, map, 1000));  // 286 mm
+  for (const double wrong : {7.0, 13.5, 23.0}) {
     const auto checked = check_pitch(*measured, wrong, map, 1000);
     ASSERT_FALSE(checked) << wrong;
     EXPECT_EQ(checked.error().reason, Reason::bad_value);

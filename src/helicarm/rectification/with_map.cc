@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/detection/find_dots.h"
+#include "helicarm/rectification/rectify.h"
+#include "helicarm/rectification/seen_lattice.h"
+#include "helicarm/rectification/usable.h"
+
+namespace helicarm::rectification {
+namespace {
+
+using phantom::DotKind;
+using phantom::Lattice;
+
+/// Without a plate description a plate may still be present: more dots than a calibrator's balls and some
+/// outliers can form.
+constexpr std::size_t least_dots_of_any_plate = 20;
+constexpr double any_diameter_mm = 2.5;
+constexpr double largest_radius_searched_from_px = 4.5;  // leaves out the search's first octave
+
+/// The lattices that may be in the image, by the dots' kind: the plate's, or any of a plate that is not
+/// described.
+std::vector<phantom::Plate> plates_of(const std::optional<phantom::Plate>& plate, DotKind kind) {
+  if (plate) return plate->kind == kind ? std::vector{*plate} : std::vector<phantom::Plate>{};
+  return {{"", kind, Lattice::square, {}, any_diameter_mm, {}, {}},
+          {"", kind, Lattice::hexagonal, {}, any_diameter_mm, {}, {}}};
+}
+
+/// Options to search for dots of the plate's size, or of a plate's that is not described.
+detection::DotOptions dot_search(const xray::XrayImage& xray_image, detection::Polarity polarity,
+                                 const std::optional<phantom::Plate>& plate) {
+  detection::DotOptions search = metal_search(xray_image, polarity);
+  const phantom::Plate sought = plate.value_or(plates_of({}, DotKind::balls).front());
+  const auto scale = expected_scale(xray_image, sought);
+  search.min_radius_px = std::clamp(scale ? 0.4 * sought.diameter_mm * *scale : 2, search.min_radius_px,
+                                    largest_radius_searched_from_px);
+  return search;
+}
+
+/// A plate in the image.
+struct SeenPlate {
+  SeenLattice seen;
+  Lattice kind;
+};
+
+/// The largest lattice of the dots; nothing if it is too small to be a plate.
+std::optional<SeenPlate> plate_among(const std::vector<detection::Dot>& dots,
+                                     const xray::XrayImage& xray_image,
+                                     const std::vector<phantom::Plate>& plates, std::size_t least) {
+  std::optional<SeenPlate> largest;
+  for (const phantom::Plate& plate : plates) {
+    const auto scale = plate.pitch_mm ? expected_scale(xray_image, plate) : std::nullopt;
+    SeenPlate found{seen_lattice(dots, plate, scale), plate.lattice};
+    const std::size_t most = largest ? largest->seen.lattice.dots.size() : least - 1;
+    if (found.seen.lattice.dots.size() > most) largest = std::move(found);
+  }
+  return largest;
+}
+
+/// Distance (px rms) of the rectified dots from a lattice, i.e. from an affine image of it.
+std::optional<double> bend_px(const SeenPlate& plate, const DistortionMap& map) {
+  std::vector<Correspondence> dots;
+  for (const IndexedDot& d : plate.seen.lattice.dots) {
+    const detection::Dot& dot = plate.seen.dots[d.dot];
+    if (const auto uv = map.rectified_from_raw(dot.centre_px))
+      dots.push_back({lattice_point(d.index, plate.kind), *uv, dot.error_px()});
+  }
+  MapOptions straight;
+  straight.order = 1;
+  const auto fit = fit_map(dots, map.width, map.height, straight);
+  return fit ? std::optional(fit->map.residual_rms_px) : std::nullopt;
+}
+
+}  // namespace
+
+Expected<Rectification> with_map(const xray::XrayImage& xray_image, const DistortionMap& map,
+                                 const std::optional<phantom::Plate>& plate) {
+  if (map.width != xray_image.pixels.width() || map.height != xray_image.pixels.height())
+    return fail(Reason::plate_mismatch,
+                fmt::format("the map is for {} x {} pixels, the image has {} x {}", map.width, map.height,
+                            xray_image.pixels.width(), xray_image.pixels.height()));
+  if (auto usable = check_usable(xray_image); !usable) return tl::unexpected<Failure>(usable.error());
+  Rectification result;
+  result.map = map;
+  result.noise = detection::noise_correlation(xray_image);
+  const detection::DotOptions search = dot_search(xray_image, result.metal, plate);
+  result.other_dots = detection::find_dots(xray_image, search);
+  result.other_dots_from_px = search.min_radius_px;
+  // A plate in the image verifies the map: rectified, its dots must form a lattice.
+  const std::size_t least = plate ? least_plate_dots : least_dots_of_any_plate;
+  const auto balls = plate_among(*result.other_dots, xray_image, plates_of(plate, DotKind::balls), least);
+  auto seen = balls;
+  if (const auto holes = plates_of(plate, DotKind::holes); !seen && !holes.empty())
+    seen = plate_among(
+        detection::find_dots(xray_image, dot_search(xray_image, detection::opposite(result.metal), plate)),
+        xray_image, holes, least);
+  if (!seen) return result;
+  const auto bend = bend_px(*seen, map);
+  const double limit = std::max(0.5, 3 * map.held_out_rms_px);
+  if (bend && *bend > limit)
+    return fail(
+        Reason::plate_mismatch,
+        fmt::format(
+            "{} the plate in the image: its rectified dots are {:.2f} px rms off a lattice, limit {:.2f}",
+            map.is_identity() ? "there is no map, but distortion bends" : "the map does not fit", *bend,
+            limit),
+        {{"residual_rms_px", *bend}});
+  result.map_confirmed = bend.has_value();
+  if (!balls) return result;
+  std::vector<detection::Dot> members;
+  for (const IndexedDot& d : balls->seen.lattice.dots) members.push_back(balls->seen.dots[d.dot]);
+  result.other_dots = detection::dots_except(*result.other_dots, members);
+  return result;
+}
+
+}  // namespace helicarm::rectification
