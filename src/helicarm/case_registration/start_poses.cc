@@ -4,9 +4,10 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
-#include "helicarm/core/csv.h"
+#include "helicarm/case_registration/landmark_picks.h"
+#include "helicarm/case_registration/model_box.h"
+#include "helicarm/case_registration/plan_errors.h"
 #include "helicarm/geometry/ray.h"
-#include "helicarm/geometry/triangulation.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -44,58 +45,6 @@ std::vector<RigidTransform> axis_starts(const registration::Model& model, const 
   return starts;
 }
 
-/// Landmarks of the file that are picked in two or more views. Refuses (bad_value) fewer than three.
-std::vector<registration::Landmark> landmarks_of(const pipeline::CaseModel& asked,
-                                                 const pipeline::RegistrationCase& given,
-                                                 const LoadedViews& loaded,
-                                                 const std::vector<RegistrationView>& views) {
-  const std::filesystem::path& path = *asked.landmarks;
-  std::string missing;
-  const CsvTable table = value_or_throw(read_csv(path, {"name", "x_mm", "y_mm", "z_mm"}, {}));
-  std::vector<registration::Landmark> landmarks;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    registration::Landmark landmark{
-        table.text(row, "name"),
-        Vector3d(table.number(row, "x_mm"), table.number(row, "y_mm"), table.number(row, "z_mm")),
-        Vector3d::Zero()};
-    std::vector<geometry::RayObservation> rays;
-    std::vector<double> sigmas;
-    for (const pipeline::Pick& pick : given.base.picks) {
-      if (pick.name != landmark.name) continue;
-      for (std::size_t i = 0; i < views.size(); ++i) {
-        if (views[i].name != pick.view) continue;
-        const auto at = loaded.maps[i] ? rectification::rectified_in_image(*loaded.maps[i], pick.uv_raw)
-                                       : std::optional(pick.uv_raw);
-        if (!at)
-          throw BadInput(Reason::bad_value,
-                         fmt::format("picks: \"{}\" lies outside {}", pick.name, pick.view));
-        rays.push_back({views[i].view, *at});
-        sigmas.push_back(pick.sigma_px.value_or(0.5));
-      }
-    }
-    if (rays.size() < 2) {
-      missing +=
-          fmt::format("{}\"{}\" (in {} views)", missing.empty() ? "" : ", ", landmark.name, rays.size());
-      continue;
-    }
-    Eigen::MatrixXd covariance =
-        Eigen::MatrixXd::Zero(2 * Eigen::Index(rays.size()), 2 * Eigen::Index(rays.size()));
-    for (std::size_t i = 0; i < rays.size(); ++i)
-      covariance.diagonal().segment<2>(2 * Eigen::Index(i)).setConstant(sigmas[i] * sigmas[i]);
-    const auto crossing = value_or_throw(geometry::intersect(rays, covariance));
-    landmark.in_world = crossing.point;
-    landmark.covariance_in_world = crossing.covariance;
-    landmarks.push_back(std::move(landmark));
-  }
-  if (landmarks.size() < registration::least_landmarks)
-    throw BadInput(Reason::bad_value,
-                   fmt::format("models: \"{}\": {}: {} of its landmarks are picked in two views, at least {} "
-                               "are required; not picked so: {}",
-                               asked.name, path.filename().string(), landmarks.size(),
-                               registration::least_landmarks, missing.empty() ? "none" : missing));
-  return landmarks;
-}
-
 }  // namespace
 
 StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedViews& loaded,
@@ -103,10 +52,9 @@ StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedView
                        const std::vector<RegistrationView>& views) {
   if (asked.world_from_model) return {{*asked.world_from_model}, {}, {}};
   if (asked.landmarks) {
-    const auto landmarks = landmarks_of(asked, given, loaded, views);
     StartPoses start;
-    start.landmarks = value_or_throw(registration::register_landmarks(landmarks));
-    for (const registration::Landmark& landmark : landmarks) start.landmark_names.push_back(landmark.name);
+    start.used = picked_landmarks(asked, given, loaded, views);
+    start.landmarks = value_or_throw(registration::register_landmarks(start.used));
     start.poses = {start.landmarks->world_from_model};
     return start;
   }
@@ -118,10 +66,44 @@ StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedView
   return {axis_starts(*model, middle_of(views)), {}, {}};
 }
 
+void compare_with_landmarks(const StartPoses& start, const std::optional<registration::LandmarkFault>& fault,
+                            registration::Registration& result) {
+  if (!start.landmarks) return;
+  const auto add = [&](Failure finding, bool refuses) {
+    finding.message = fmt::format("{}: {}", result.name, finding.message);
+    add_finding(result, std::move(finding), refuses);
+  };
+  if (fault) add(fault->failure, false);
+  if (const auto apart = registration::contradiction(start.used, *start.landmarks, result.world_from_model,
+                                                     result.covariance, result.centre))
+    add(apart->failure, apart->is_certain);
+}
+
+std::vector<Warning> places_outside(const pipeline::CaseModel& asked,
+                                    const std::optional<registration::Model>& model,
+                                    const std::vector<registration::Landmark>& landmarks,
+                                    const std::optional<Plan>& plan) {
+  std::vector<PlacedPoint> of_landmarks, of_plan;
+  for (const registration::Landmark& landmark : landmarks)
+    of_landmarks.push_back({landmark.name, landmark.in_model});
+  if (plan)
+    for (const PlanPoint& point : plan->points) of_plan.push_back({point.name, point.in_model});
+  const ModelBox box = model ? box_of(*model) : box_of(landmarks);
+  std::vector<Warning> warnings;
+  if (asked.landmarks)
+    warnings = check_places(asked.name, asked.landmarks->filename().string(), box, of_landmarks);
+  if (asked.plan) {
+    const auto further = check_places(asked.name, asked.plan->filename().string(), box, of_plan);
+    warnings.insert(warnings.end(), further.begin(), further.end());
+  }
+  return warnings;
+}
+
 registration::RegistrationOptions search_options(const RegisterOptions& options, const LoadedViews& loaded,
-                                                 std::size_t starts) {
+                                                 const pipeline::CaseModel& asked, std::size_t starts) {
   registration::RegistrationOptions how;
   how.max_error_mm = options.max_error_mm;
+  how.scale_sigma = asked.scale_sigma.value_or(registration::usual_scale_sigma);
   how.threads = options.threads;
   how.camera_covariance = loaded.camera_covariance;
   how.search = {options.shift_mm, options.turn_deg, starts > 1 ? 150 * int(starts) : 600, options.interrupt};
