@@ -87,6 +87,87 @@ class Register(SimulatedCase):
             self.assertEqual((done.returncode, "uncertain" in done.stderr), (3, True), done.stderr)
         self.assertFalse((self.root / "limited/points.csv").exists())
 
+    def landmark_case(self, name, targets=None):
+        """A case whose check targets are landmarks of a model that lies 100 mm along x; and the landmarks in the model."""
+        folder = self.root / name
+        shutil.copytree(self.root / "case", folder)
+        truth = json.loads((folder / "truth.json").read_text())
+        case = json.loads((folder / "case.json").read_text())
+        case["picks"], places = [], {}
+        for target, (x, y, z) in list(truth["targets_in_calibrator"].items())[:targets]:
+            places[f"p{target}"] = [x - 100, y, z]
+            for view in truth["views"]:
+                raw = next(t["raw"] for t in view["targets"] if t["name"] == target)
+                case["picks"].append({"name": f"p{target}", "view": view["name"], "uv": raw, "sigma_px": 0.2})
+        case["models"] = [{"name": "body", "start": {"landmarks": "points.csv"}}]
+        return folder, case, places
+
+    def registered(self, folder, case, places, *options):
+        rows = ["name,x_mm,y_mm,z_mm"] + [f"{name},{','.join(map(str, at))}" for name, at in places.items()]
+        (folder / "points.csv").write_text("\n".join(rows) + "\n")
+        (folder / "case.json").write_text(json.dumps(case))
+        out = folder.with_name(folder.name + "-out")
+        done = run("register", folder, "--out", out, *options)
+        file = out / "registration.json"
+        return done, json.loads(file.read_text())["models"][0] if file.exists() else None
+
+    @staticmethod
+    def write_line(folder, *ends):
+        points = [{"label": str(i), "position": list(at)} for i, at in enumerate(ends)]
+        (folder / "plan.mrk.json").write_text(json.dumps({"markups": [
+            {"type": "Line", "name": "planned", "coordinateSystem": "LPS", "controlPoints": points}]}))
+
+    def test_exchanged_landmarks_are_refused_by_name(self):
+        folder, case, places = self.landmark_case("exchanged")
+        first, second = list(places)[:2]
+        places[first], places[second] = places[second], places[first]
+        done, model = self.registered(folder, case, places)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertEqual(model["failure"]["code"], "residual_too_large")
+        self.assertIn(f'"{first}" and "{second}" exchanged', done.stderr)
+
+    def test_three_landmarks_have_no_handedness(self):
+        folder, case, places = self.landmark_case("three", 3)
+        done, model = self.registered(folder, case, places)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("ambiguous_handedness", [note["code"] for note in model["notes"]])
+
+    def test_the_limit_holds_for_planned_points_in_the_tools_frame(self):
+        folder, case, places = self.landmark_case("limit")
+        case["models"][0]["plan"] = "plan.mrk.json"
+        middle = [sum(at[i] for at in places.values()) / len(places) for i in range(3)]
+        self.write_line(folder, middle, [middle[0], middle[1], middle[2] + 20])
+        case["tracker"] = {"sigma_mm": 0.6, "sigma_deg": 0.1}
+        marker = [[1, 0, 0, 10], [0, 1, 0, 20], [0, 0, 1, -900], [0, 0, 0, 1]]
+        for view in case["views"]:
+            view["poses"] = {"tracker_from_calibrator": marker}
+        case["poses_now"] = {"tracker_from_tool": marker}
+        done, model = self.registered(folder, case, places, "--max-error", 20)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        errors = [point["error_95_mm"] for point in model["points"]]
+        limit = 1.05 * max([*errors, 0.5])
+        done, model = self.registered(folder, case, places, "--max-error", limit)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertEqual(model["failure"]["code"], "uncertain")
+        self.assertIn("in the tool's frame", done.stderr)
+
+    def test_a_plan_elsewhere_is_warned_of(self):
+        folder, case, places = self.landmark_case("elsewhere")
+        case["models"][0]["plan"] = "plan.mrk.json"
+        self.write_line(folder, [100, 0, 40], [100, -20, 60])
+        done, model = self.registered(folder, case, places)
+        self.assertIn("outside_model", [warning["code"] for warning in model["warnings"]])
+        self.assertIn("RAS?", done.stderr)
+
+    def test_one_name_is_one_point(self):
+        folder, case, places = self.landmark_case("clash")
+        case["models"][0]["plan"] = "plan.mrk.json"
+        case["models"].append({**case["models"][0], "name": "other"})
+        self.write_line(folder, [-100, 0, 40], [-100, 20, 60])
+        done, _ = self.registered(folder, case, places)
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("name_clash", done.stderr)
+
     def test_register_names_what_is_wrong_with_a_model(self):
         folder = self.root / "no-model"
         shutil.copytree(self.root / "case", folder)

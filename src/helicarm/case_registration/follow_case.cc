@@ -9,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/case_registration/case_plans.h"
+#include "helicarm/case_registration/plan_errors.h"
 #include "helicarm/case_registration/start_poses.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
@@ -41,24 +43,48 @@ void check_frames(const pipeline::RegistrationCase& given, const FrameRange& ran
 struct Followed {
   registration::Model model;
   std::optional<Follower> follower;
+  StartPoses start;
+  std::optional<registration::LandmarkFault> fault;
+  std::optional<Plan> plan;
 };
 
 std::vector<std::unique_ptr<Followed>> followed_models(const pipeline::RegistrationCase& given,
                                                        const RegisterOptions& options,
-                                                       const LoadedViews& loaded) {
+                                                       const LoadedViews& loaded,
+                                                       std::vector<Warning>& warnings) {
   std::vector<std::unique_ptr<Followed>> bodies;
-  for (const pipeline::CaseModel& asked : given.models) {
+  std::vector<std::optional<Plan>> plans = read_plans(given);
+  for (std::size_t i = 0; i < given.models.size(); ++i) {
+    const pipeline::CaseModel& asked = given.models[i];
     auto model = value_or_throw(load_model(asked));
     if (!model)
       throw BadInput(Reason::bad_value,
                      fmt::format("models: \"{}\": a sequence needs a volume or a surface", asked.name));
-    const StartPoses start =
-        start_poses(given, loaded, asked, model, loaded.views, options.run.motion_sigma_mm);
-    auto body = std::make_unique<Followed>(Followed{std::move(*model), {}});
-    body->follower.emplace(body->model, start.poses, search_options(options, loaded, start.poses.size()));
+    StartPoses start = start_poses(given, loaded, asked, model, loaded.views, options.run.motion_sigma_mm);
+    std::optional<registration::LandmarkFault> fault;
+    if (start.landmarks) fault = registration::landmark_fault(start.used, *start.landmarks);
+    if (fault && fault->is_certain) throw BadInput(fault->failure);
+    for (Warning& warning : places_outside(asked, model, start.used, plans[i]))
+      warnings.push_back(std::move(warning));
+    auto body = std::make_unique<Followed>(
+        Followed{std::move(*model), {}, std::move(start), fault, std::move(plans[i])});
+    const std::vector<geometry::RigidTransform>& poses = body->start.poses;
+    body->follower.emplace(body->model, poses, search_options(options, loaded, asked, poses.size()));
     bodies.push_back(std::move(body));
   }
   return bodies;
+}
+
+/// Of the planned points in the world.
+std::optional<PlannedError> largest_error(const std::optional<Plan>& plan, const Registration& result) {
+  if (!plan || !result.is_determined()) return std::nullopt;
+  std::vector<RegisteredPoint> points;
+  for (const PlanPoint& point : plan->points) {
+    points.push_back({point.name, {}});
+    points.back().place.covariance_in_calibrator =
+        registration::point_covariance(result, result.world_from_model * point.in_model);
+  }
+  return case_registration::largest_error(points);
 }
 
 constexpr double degrees = 180 / EIGEN_PI;
@@ -137,7 +163,7 @@ Expected<CaseSequence> follow_case(const pipeline::RegistrationCase& given, cons
     }
     sequence.warnings.insert(sequence.warnings.end(), loaded->warnings.begin(), loaded->warnings.end());
     check_frames(given, range);
-    const auto bodies = followed_models(first, options, *loaded);
+    const auto bodies = followed_models(first, options, *loaded, sequence.warnings);
     const auto begun = std::chrono::steady_clock::now();
     for (int i = 0; i < range.count(); ++i) {
       const int frame = range.first + i * range.step;
@@ -146,6 +172,9 @@ Expected<CaseSequence> follow_case(const pipeline::RegistrationCase& given, cons
       RegisteredFrame made{frame, {}};
       for (const auto& body : bodies) {
         made.models.push_back(body->follower->next(views, frame));
+        if (i == 0) compare_with_landmarks(body->start, body->fault, made.models.back());
+        limit_error(largest_error(body->plan, made.models.back()), options.run.max_error_mm,
+                    made.models.back());
         // For the figures of a report, which a sequence has not.
         for (registration::RegisteredView& view : made.models.back().views) view.agreements = {};
       }

@@ -11,6 +11,7 @@
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/import_matrix.h"
 #include "helicarm/image/tiff.h"
+#include "helicarm/pipeline/belong_together.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/volume/read_volume.h"
 #include "helicarm/xray/read_xray_image.h"
@@ -116,15 +117,31 @@ void check_size(const std::string& view, const char* expected_by, const Eigen::V
                                expected.x(), expected.y(), image.width(), image.height()));
 }
 
+/// Refuses an image of another patient; `known`: the key so far.
+void take_patient(std::string& known, const xray::XrayImage& image) {
+  const std::string& key = image.acquisition.patient_key;
+  if (known.empty()) known = key;
+  if (!key.empty() && key != known)
+    throw BadInput(Reason::patient_mismatch,
+                   fmt::format("{} is of another patient than the images before it", image.name));
+}
+
 LoadedViews views_of_cameras(const pipeline::RegistrationCase& given) {
   LoadedViews loaded;
+  std::vector<xray::XrayImage> images;
+  std::vector<const xray::XrayImage*> together;
+  for (const pipeline::CaseView& view : given.base.views)
+    images.push_back(value_or_throw(xray::read_xray_image(view.image, view.name, view.frame)));
+  for (const xray::XrayImage& image : images) together.push_back(&image);
+  value_or_throw(pipeline::check_images_belong_together(together));
   for (std::size_t i = 0; i < given.base.views.size(); ++i) {
     const pipeline::CaseView& view = given.base.views[i];
-    const xray::XrayImage image = value_or_throw(xray::read_xray_image(view.image, view.name, view.frame));
+    xray::XrayImage& image = images[i];
+    take_patient(loaded.patient_key, image);
     const geometry::ImportedMatrix camera = value_or_throw(geometry::import_matrix(given.cameras[i]));
     if (camera.image_size) check_size(view.name, "the camera is for", *camera.image_size, image.pixels);
     loaded.views.push_back(view_of(image, view.name, camera.view));
-    loaded.views.back().grey = image.pixels;
+    loaded.views.back().grey = std::move(image.pixels);
     loaded.maps.emplace_back();
     // The camera states what the pixels measure.
     std::ranges::copy_if(image.warnings, std::back_inserter(loaded.warnings),
@@ -166,6 +183,7 @@ LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
   for (std::size_t i = 0; i < calibration.views.size(); ++i) {
     const pipeline::LabelledView& image = calibration.images[i];
     const calibration::CalibratedView& view = calibration.views[i];
+    if (loaded.patient_key.empty()) loaded.patient_key = image.xray_image->acquisition.patient_key;
     loaded.views.push_back(view_of(*image.xray_image, view.name, view.view));
     loaded.views.back().grey = rectification::resample(*image.xray_image, image.rectification.map);
     loaded.views.back().usable = usable_of(image, given.base.calibrator, view.view);
@@ -197,6 +215,8 @@ Expected<std::vector<RegistrationView>> with_images(const LoadedViews& loaded,
     for (std::size_t i = 0; i < views.size(); ++i) {
       const pipeline::CaseView& asked = given.base.views[i];
       const auto image = value_or_throw(xray::read_xray_image(asked.image, asked.name, asked.frame));
+      std::string patient = loaded.patient_key;
+      take_patient(patient, image);
       check_size(asked.name, "the sequence's first image has",
                  {views[i].grey.width(), views[i].grey.height()}, image.pixels);
       RegistrationView now = view_of(image, asked.name, views[i].view);

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -18,13 +19,14 @@ struct LoadedViews {
   std::vector<registration::RegistrationView> views;
   std::vector<std::optional<rectification::DistortionMap>> maps;  ///< raw to rectified; nothing: none
   Eigen::MatrixXd camera_covariance;  ///< 11 n x 11 n; empty: cameras taken as exact
+  std::string patient_key;            ///< as xray::Acquisition, of the first view that has one
   std::vector<Warning> warnings;
 };
 
 /// The views of a case: calibrated by the program, then fiducials, plate dots and check targets are masked,
 /// or with cameras of other programs, then the images are taken as free of distortion. Fails as
-/// `read_xray_image`, `import_matrix` and `calibrate_case`, and with bad_size for a camera of another image
-/// size.
+/// `read_xray_image`, `import_matrix`, `check_images_belong_together` and `calibrate_case`, and with bad_size
+/// for a camera of another image size.
 Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const pipeline::RunOptions& run);
 
 /// The views of a case that is calibrated already. Of the paper's method, which has no covariance, each
@@ -33,7 +35,7 @@ LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
                                  const pipeline::CaseCalibration& calibration);
 
 /// The views with the images of another moment: their geometry, distortion and masks stay. Fails as
-/// `read_xray_image`, and with bad_size for another image size.
+/// `read_xray_image`, with bad_size for another image size, and with patient_mismatch for another patient.
 Expected<std::vector<registration::RegistrationView>> with_images(const LoadedViews& loaded,
                                                                   const pipeline::RegistrationCase& given);
 

@@ -6,6 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/case_registration/case_plans.h"
+#include "helicarm/case_registration/landmarks_alone.h"
+#include "helicarm/case_registration/plan_errors.h"
 #include "helicarm/case_registration/registration_figures.h"
 #include "helicarm/case_registration/start_poses.h"
 #include "helicarm/registration/outline.h"
@@ -53,7 +56,7 @@ void carry_plan(const Plan& plan, const pipeline::Case& given, RegisteredModel& 
     located.name = point.name;
     located.point_in_anchor = anchor_from_world * in_world;
     located.covariance_in_anchor = anchor_from_world.rotation *
-                                   registration::point_covariance(pose.covariance, pose.centre, in_world) *
+                                   registration::point_covariance(pose, in_world) *
                                    anchor_from_world.rotation.transpose();
     model.points.push_back(
         {point.name, guidance::guide(located, anchor, dated, given.poses_now, given.tracker)});
@@ -63,36 +66,6 @@ void carry_plan(const Plan& plan, const pipeline::Case& given, RegisteredModel& 
         tunnel.name, model.points[tunnel.start].place, model.points[tunnel.end].place, {}, given.tracker)));
     model.tunnel_ends.push_back({tunnel.start, tunnel.end});
   }
-}
-
-/// Without a model the errors are stated at the landmarks.
-registration::Registration by_landmarks(const std::string& name,
-                                        const registration::LandmarkRegistration& landmarks,
-                                        const std::vector<std::string>& names,
-                                        const std::optional<double>& max_error_mm) {
-  registration::Registration result;
-  result.name = name;
-  result.decision = registration::Decision::accept;
-  result.world_from_model = landmarks.world_from_model;
-  result.covariance = landmarks.covariance;
-  result.centre = landmarks.centre;
-  double worst = 0;
-  for (const Vector3d& place : landmarks.places)
-    worst = std::max(worst, localization::length_at_95(
-                                registration::point_covariance(result.covariance, result.centre, place)));
-  const double limit = max_error_mm.value_or(registration::usual_error_mm);
-  if (worst <= limit) return result;
-  const auto largest = std::ranges::max_element(landmarks.residuals_mm);
-  const std::string message = fmt::format(
-      "{}: a landmark may be off by {:.2f} mm (95 %), limit {:g} mm; the largest residual is {:.2f} mm, of "
-      "\"{}\"",
-      name, worst, limit, *largest, names[std::size_t(largest - landmarks.residuals_mm.begin())]);
-  if (max_error_mm)
-    result.failure = Failure{Reason::uncertain, message, {}, {{"error_mm", worst}, {"limit_mm", limit}}};
-  else
-    result.warnings.push_back({Reason::uncertain, message, {}, {{"error_mm", worst}, {"limit_mm", limit}}});
-  result.decision = max_error_mm ? registration::Decision::refuse : registration::Decision::warn;
-  return result;
 }
 
 /// What no image shows of a body whose poses at the acquisitions are not known.
@@ -116,45 +89,72 @@ class Registrar {
             const LoadedViews& loaded)
       : given_(given), options_(options), loaded_(loaded) {}
 
-  RegisteredModel registered(const pipeline::CaseModel& asked) const {
+  RegisteredModel registered(const pipeline::CaseModel& asked, const std::optional<Plan>& plan) const {
     RegisteredModel made;
     made.moves_with = asked.moves_with;
+    made.registration.name = asked.name;
     const bool follows = asked.moves_with && tracked(given_.base, *asked.moves_with);
     const auto views = follows ? following(loaded_.views, given_.base, *asked.moves_with) : loaded_.views;
     for (const RegistrationView& view : views) made.views.push_back(view.view);
     auto model = value_or_throw(load_model(asked));
     const double motion_sigma_mm = follows ? 0 : options_.run.motion_sigma_mm;
-    StartPoses start = start_poses(given_, loaded_, asked, model, views, motion_sigma_mm);
-    made.landmarks = std::move(start.landmarks);
-    made.landmark_names = std::move(start.landmark_names);
-    const std::vector<RigidTransform>& starts = start.poses;
-    if (model) {
-      registration::RegistrationOptions how = search_options(options_, loaded_, starts.size());
-      how.motion_sigma_mm = motion_sigma_mm;
-      if (options_.on_step) how.on_step = [&](std::string_view step) { options_.on_step(asked.name, step); };
-      made.registration = registration::register_model(*model, views, starts, how);
-      made.outlines = outlines(*model, made.views, made.registration.world_from_model);
-      made.is_surface = model->surface.has_value();
-      for (const RegistrationView& view : views)
-        made.drrs.push_back(drr_image(*model, view.view, made.registration.world_from_model,
-                                      {view.grey.width(), view.grey.height()}, options_.run.threads));
+    const auto start =
+        guarded([&] { return start_poses(given_, loaded_, asked, model, views, motion_sigma_mm); });
+    if (!start) {
+      if (exit_code(start.error().reason) == 2) throw BadInput(start.error());
+      made.by_landmarks_only = true;
+      add_finding(made.registration, start.error(), true);
+      return made;
+    }
+    made.landmarks = start->landmarks;
+    made.used_landmarks = start->used;
+    const auto outside = places_outside(asked, model, start->used, plan);
+    std::optional<registration::LandmarkFault> fault;
+    if (made.landmarks) fault = registration::landmark_fault(start->used, *made.landmarks);
+    if (model && !(fault && fault->is_certain)) {
+      made.registration = registered_by_images(asked, *model, *start, fault, views, motion_sigma_mm);
+      add_figures(*model, views, made);
       made.model = std::make_shared<const registration::Model>(*std::move(model));
     } else {
       made.by_landmarks_only = true;
-      made.registration =
-          by_landmarks(asked.name, *made.landmarks, made.landmark_names, options_.run.max_error_mm);
-      if (loaded_.camera_covariance.size() == 0) {
-        made.registration.warnings.push_back(registration::cameras_without_covariance(asked.name));
-        made.registration.decision = std::max(made.registration.decision, registration::Decision::warn);
-      }
+      made.registration = registered_by_landmarks(asked.name, start->used, *made.landmarks, fault, plan,
+                                                  options_.run.max_error_mm);
+      made.registration.scale_sigma = asked.scale_sigma.value_or(registration::usual_scale_sigma);
+      if (loaded_.camera_covariance.size() == 0)
+        add_finding(made.registration, registration::cameras_without_covariance(asked.name), false);
     }
+    for (const Warning& warning : outside) add_finding(made.registration, warning, false);
     if (!follows && views.size() > 1) made.registration.notes.push_back(motion_note(asked, motion_sigma_mm));
-    if (asked.plan && made.registration.is_determined())
-      carry_plan(value_or_throw(read_plan(*asked.plan)), given_.base, made);
+    if (plan && made.registration.is_determined()) {
+      carry_plan(*plan, given_.base, made);
+      limit_error(largest_error(made.points), options_.run.max_error_mm, made.registration);
+    }
     return made;
   }
 
  private:
+  registration::Registration registered_by_images(const pipeline::CaseModel& asked,
+                                                  const registration::Model& model, const StartPoses& start,
+                                                  const std::optional<registration::LandmarkFault>& fault,
+                                                  const std::vector<RegistrationView>& views,
+                                                  double motion_sigma_mm) const {
+    registration::RegistrationOptions how = search_options(options_, loaded_, asked, start.poses.size());
+    how.motion_sigma_mm = motion_sigma_mm;
+    if (options_.on_step) how.on_step = [&](std::string_view step) { options_.on_step(asked.name, step); };
+    auto result = registration::register_model(model, views, start.poses, how);
+    compare_with_landmarks(start, fault, result);
+    return result;
+  }
+
+  void add_figures(const registration::Model& model, const std::vector<RegistrationView>& views,
+                   RegisteredModel& made) const {
+    made.outlines = outlines(model, made.views, made.registration.world_from_model);
+    made.is_surface = model.surface.has_value();
+    for (const RegistrationView& view : views)
+      made.drrs.push_back(drr_image(model, view.view, made.registration.world_from_model,
+                                    {view.grey.width(), view.grey.height()}, options_.run.threads));
+  }
+
   const pipeline::RegistrationCase& given_;
   const RegisterOptions& options_;
   const LoadedViews& loaded_;
@@ -209,9 +209,10 @@ Expected<CaseRegistration> register_loaded(const pipeline::RegistrationCase& giv
     result.loaded = std::move(loaded);
     result.warnings.insert(result.warnings.end(), result.loaded.warnings.begin(),
                            result.loaded.warnings.end());
+    const auto plans = read_plans(given);
     const Registrar registrar(given, options, result.loaded);
-    for (const pipeline::CaseModel& model : given.models)
-      result.models.push_back(registrar.registered(model));
+    for (std::size_t i = 0; i < given.models.size(); ++i)
+      result.models.push_back(registrar.registered(given.models[i], plans[i]));
     return result;
   });
 }

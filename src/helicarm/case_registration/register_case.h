@@ -39,7 +39,7 @@ struct RegisteredModel {
   registration::Registration registration;
   std::shared_ptr<const registration::Model> model;             ///< as read; null: by landmarks only
   std::optional<registration::LandmarkRegistration> landmarks;  ///< of the start, or the result itself
-  std::vector<std::string> landmark_names;
+  std::vector<registration::Landmark> used_landmarks;
   bool by_landmarks_only = false;
   bool is_surface = false;
   std::optional<guidance::Bone> moves_with;

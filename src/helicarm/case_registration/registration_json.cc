@@ -29,9 +29,9 @@ Json json_of(const registration::RegisteredView& view) {
 Json json_of_landmarks(const RegisteredModel& model) {
   if (!model.landmarks) return nullptr;
   Json residuals = Json::array();
-  for (std::size_t i = 0; i < model.landmark_names.size(); ++i)
+  for (std::size_t i = 0; i < model.used_landmarks.size(); ++i)
     residuals.push_back(
-        {{"name", model.landmark_names[i]}, {"residual_mm", model.landmarks->residuals_mm[i]}});
+        {{"name", model.used_landmarks[i].name}, {"residual_mm", model.landmarks->residuals_mm[i]}});
   return {{"fre_mm", model.landmarks->fre_mm},
           {"fle_mm", model.landmarks->fle_mm},
           {"tre_at_centre_mm", registration::predicted_tre_mm(*model.landmarks, model.registration.centre)},
@@ -54,6 +54,7 @@ Json json_of(const RegisteredModel& model) {
                {"score", r.score},
                {"spacing_mm", r.spacing_mm},
                {"mirrored_cost_ratio", r.mirrored_ratio ? Json(*r.mirrored_ratio) : Json()},
+               {"scale_sigma", r.scale_sigma},
                {"strain", {{"value", r.deformation.strain}, {"sigma", r.deformation.sigma}}},
                {"disagreement", nullptr},
                {"landmarks", json_of_landmarks(model)}};

@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t most_models = 20;
 constexpr Range hu_range{-32768, 32767};
+constexpr Range scale_sigma_range{0, 0.1};
 
 std::optional<fs::path> model_file(JsonReader& reader, const char* key, const fs::path& folder) {
   const auto name = reader.optional_text(key, 1000);
@@ -56,6 +57,7 @@ CaseModel model_from(JsonReader& reader, const fs::path& folder) {
   if (!reader.raw("voxel_mm").is_null())
     model.voxel_mm = Eigen::Vector3d(reader.numbers("voxel_mm", 3, {1e-3, 100}).data());
   model.tiff_offset_hu = reader.optional_number("tiff_offset_hu", hu_range).value_or(0);
+  model.scale_sigma = reader.optional_number("scale_sigma", scale_sigma_range);
   if (!reader.raw("side").is_null())
     model.side = reader.choice("side", {"left", "right"}) == 0 ? "left" : "right";
   if (!reader.raw("moves_with").is_null())

@@ -20,6 +20,7 @@ struct CaseModel {
   std::optional<Eigen::Vector2d> window_hu;
   std::optional<Eigen::Vector3d> voxel_mm;  ///< of a TIFF stack
   double tiff_offset_hu = 0;                ///< added to a TIFF stack's values
+  std::optional<double> scale_sigma;        ///< relative, of the model's size
   std::optional<std::string> side;          ///< left or right; not used
   std::optional<guidance::Bone> moves_with;
   std::optional<geometry::RigidTransform> world_from_model;  ///< start

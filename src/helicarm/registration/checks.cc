@@ -33,6 +33,7 @@ constexpr double most_disagreement_ratio =
     4;                               // chi-square per degree of freedom; by chance once in 2000 registrations
 constexpr double refused_ratio = 9;  // three standard deviations
 constexpr double refused_ratio_exact = 50;  // cameras of unknown error
+constexpr double most_search_mm = 100, most_search_deg = 90;
 
 RigidCovariance inverse_of(const RigidCovariance& matrix) {
   return geometry::solve_spd(matrix, RigidCovariance::Identity()).solution;
@@ -40,9 +41,32 @@ RigidCovariance inverse_of(const RigidCovariance& matrix) {
 
 }  // namespace
 
+namespace {
+
+/// The standard deviations of the model's size by which the own solutions agree best.
+double common_scale(const std::vector<OwnSolution>& own) {
+  Eigen::Matrix<double, 7, 7> information = Eigen::Matrix<double, 7, 7>::Zero();
+  Eigen::Matrix<double, 7, 1> sum = Eigen::Matrix<double, 7, 1>::Zero();
+  information(6, 6) = 1;
+  for (const OwnSolution& each : own) {
+    Eigen::Matrix<double, 6, 7> map;
+    map << RigidCovariance::Identity(), each.by_scale;
+    const Eigen::Matrix<double, 7, 6> weighted = map.transpose() * inverse_of(each.covariance);
+    information += weighted * map;
+    sum += weighted * each.step;
+  }
+  return geometry::solve_spd(information, sum).solution(6, 0);
+}
+
+}  // namespace
+
 Disagreement disagreement_of(const std::vector<RegistrationView>& views, const Vector3d& centre,
-                             const std::vector<OwnSolution>& own) {
+                             const std::vector<OwnSolution>& found) {
+  std::vector<OwnSolution> own = found;
+  const double scale = common_scale(own);
+  for (OwnSolution& each : own) each.step -= scale * each.by_scale;
   Disagreement result;
+  result.chi2 = scale * scale;
   result.dof = 6 * (int(own.size()) - 1);
   RigidCovariance total = RigidCovariance::Zero();
   RigidStep weighted = RigidStep::Zero();
@@ -146,6 +170,22 @@ void check_determined(const Model& model, Registration& result, const Refuse& re
   refuse(Reason::uncertain, model.name + ": the images do not determine its pose", {});
 }
 
+/// What may help a search that ended wrongly, where it may have missed the solution; or nothing.
+std::string wider_search(const RegistrationOptions& options, const Registration& result, double nearest_mm,
+                         double reach_mm) {
+  constexpr double edge_share = 0.6;
+  const bool at_edge = nearest_mm > edge_share * reach_mm, disagree = result.starts > 1 && result.agree < 2;
+  if (options.search.candidates == 0 || !(at_edge || disagree)) return "";
+  return fmt::format(
+      "; {}: if the model is right, search wider (--search-mm {:g} --search-deg {:g}) or start nearer, with "
+      "landmarks",
+      at_edge ? fmt::format("this solution lies {:.1f} mm from the start, where the search of {:.1f} mm ends",
+                            nearest_mm, reach_mm)
+              : fmt::format("only one of {} starts ended here", result.starts),
+      std::min(most_search_mm, 2 * options.search.shift_mm),
+      std::min(most_search_deg, 2 * options.search.turn_deg));
+}
+
 void decide(const Model& model, const std::vector<geometry::RigidTransform>& starts,
             const RegistrationOptions& options, Registration& result) {
   const auto refuse = [&](Reason reason, const std::string& message, std::map<std::string, double> figures) {
@@ -155,6 +195,12 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
     result.warnings.push_back({reason, message, {}, std::move(figures)});
   };
   check_determined(model, result, refuse);
+  double nearest = 1e9;
+  for (const geometry::RigidTransform& start : starts)
+    nearest = std::min(nearest, separation(model, start, result.world_from_model));
+  const double reach = std::hypot(std::sqrt(3.0) * options.search.shift_mm,
+                                  1.5 * model.radius_mm * options.search.turn_deg * EIGEN_PI / 180);
+  const std::string wider = wider_search(options, result, nearest, reach);
   const double least = model.surface ? least_contour_score : least_patch_score;
   for (const RegisteredView& view : result.views)
     if (view.score < least)
@@ -162,20 +208,15 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
              fmt::format(
                  "{}: the model explains {:.2f} of its edges in {}, at least {:.2f} are required: another "
                  "bone, patient or unit, exchanged cameras or images, a start too far away, or the model is "
-                 "hidden",
-                 model.name, view.score, view.name, least),
+                 "hidden{}",
+                 model.name, view.score, view.name, least, wider),
              {{"score", view.score}, {"limit", least}});
-  double nearest = 1e9;
-  for (const geometry::RigidTransform& start : starts)
-    nearest = std::min(nearest, separation(model, start, result.world_from_model));
-  const double reach = std::hypot(std::sqrt(3.0) * options.search.shift_mm,
-                                  1.5 * model.radius_mm * options.search.turn_deg * EIGEN_PI / 180);
   if (nearest > reach)
     refuse(
         Reason::out_of_capture,
         fmt::format(
-            "{}: the solution is {:.1f} mm from the nearest start, beyond the {:.1f} mm that were searched",
-            model.name, nearest, reach),
+            "{}: the solution is {:.1f} mm from the nearest start, beyond the {:.1f} mm that were searched{}",
+            model.name, nearest, reach, wider),
         {{"distance_mm", nearest}, {"limit_mm", reach}});
   if (result.mirrored_ratio && *result.mirrored_ratio < least_mirrored_ratio)
     refuse(Reason::wrong_model,

@@ -12,10 +12,12 @@ namespace helicarm::registration {
 struct OwnSolution {
   RigidStep step;
   RigidCovariance covariance;
+  RigidStep by_scale = RigidStep::Zero();  ///< per standard deviation of the model's size
 };
 
 /// Differences between each view's own solution and the others' weighted mean; in mm along the direction
-/// across both viewing directions, which both views see without depth.
+/// across both viewing directions, which both views see without depth. The model's size, which the views have
+/// in common, is estimated with them.
 Disagreement disagreement_of(const std::vector<RegistrationView>& views, const Eigen::Vector3d& centre,
                              const std::vector<OwnSolution>& own);
 

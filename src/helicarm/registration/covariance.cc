@@ -145,6 +145,14 @@ MatrixXd ErrorModel::of_edges(const Observation& observation, const Vector3d& ce
   return sum;
 }
 
+VectorXd ErrorModel::by_size(const Observation& observation, const Problem& problem) const {
+  const Response response(observation, problem);
+  VectorXd sum = VectorXd::Zero(problem.map.cols());
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if (takes_part(problem.views, i)) sum += response.to(i, growth());
+  return sum;
+}
+
 MatrixXd ErrorModel::covariance(const Observation& observation, const Vector3d& centre,
                                 const Problem& problem, const Linearised& sum) const {
   return sum.covariance() + of_cameras(observation, centre, problem) + of_edges(observation, centre, problem);

@@ -43,6 +43,7 @@ struct ErrorModel {
   Eigen::MatrixXd cameras;  ///< 11 n x 11 n, as `calibration::Calibration::joint_covariance`
   std::vector<double> correlation_px;
   EdgeSigma edge;
+  double scale_sigma = 0;  ///< relative, of the model's size
 
   /// Of the unknowns (a pose: about `centre`). `sum`: the problem, linearised.
   Eigen::MatrixXd covariance(const Observation& observation, const Eigen::Vector3d& centre,
@@ -53,6 +54,9 @@ struct ErrorModel {
                              const Problem& problem = {}) const;
   Eigen::MatrixXd of_edges(const Observation& observation, const Eigen::Vector3d& centre,
                            const Problem& problem = {}) const;
+  /// Error of the unknowns per relative error of the model's size: a body larger than its model by s is found
+  /// s times this away. Not part of `covariance`.
+  Eigen::VectorXd by_size(const Observation& observation, const Problem& problem = {}) const;
 };
 
 /// Local shifts (full-resolution pixels) that the comparisons of a view still ask for, each along its own

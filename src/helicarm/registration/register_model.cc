@@ -5,6 +5,8 @@
 #include <chrono>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/registration/checks.h"
@@ -98,7 +100,8 @@ void compare_views(const Scene& scene, const ErrorModel& errors, const Level& le
     const RigidCovariance shrink = geometry::solve_spd(sum.information, prior).solution;
     own.push_back({step_about(joint.pose, alone.pose, result.centre),
                    errors.covariance(alone.observation, result.centre, problem, sum) +
-                       shrink * prior_covariance * shrink.transpose()});
+                       shrink * prior_covariance * shrink.transpose(),
+                   errors.scale_sigma * errors.by_size(alone.observation, problem)});
   }
   result.disagreement = disagreement_of(scene.views(), result.centre, own);
   for (std::size_t i = 0; i < n; ++i) result.views[i].held_out_mm = result.disagreement->held_out_mm[i];
@@ -117,6 +120,20 @@ void describe(const Scene& scene, const Level& level, const Estimate& best, Regi
   }
 }
 
+Warning depth_from_scale(const RegistrationView& view, const RigidStep& by_size, const Registration& result) {
+  const Vector3d ray = (result.centre - view.view.source_in_world()).normalized();
+  const double mm_per_percent = 0.01 * std::abs(ray.dot(by_size.tail<3>()));
+  return {
+      Reason::depth_from_scale,
+      fmt::format("{}: in one view size and depth are one: a model that is 1 % too large is placed {:.1f} mm "
+                  "too far from the source; its size is taken as known to {:.2g} % (\"scale_sigma\"), which "
+                  "is {:.1f} mm of the depth's error",
+                  result.name, mm_per_percent, 100 * result.scale_sigma,
+                  100 * result.scale_sigma * mm_per_percent),
+      view.name,
+      {{"mm_per_percent", mm_per_percent}, {"scale_sigma", result.scale_sigma}}};
+}
+
 }  // namespace
 
 Warning cameras_without_covariance(const std::string& name) {
@@ -132,12 +149,22 @@ std::string_view word(Decision decision) {
   return decision == Decision::accept ? "accept" : decision == Decision::warn ? "warn" : "refuse";
 }
 
+Eigen::Matrix3d point_covariance(const Registration& registration, const Vector3d& in_world) {
+  const auto at = [&](const RigidCovariance& covariance) {
+    return point_covariance(covariance, registration.centre, in_world);
+  };
+  const RigidStep& step = registration.by_scale;
+  const Vector3d arm = in_world - registration.centre;
+  // A body that is larger lies elsewhere, and its points farther out.
+  const Vector3d error = step.tail<3>() + step.head<3>().cross(arm) - registration.scale_sigma * arm;
+  return at(registration.covariance - step * step.transpose()) + error * error.transpose();
+}
+
 double worst_error_mm(const Model& model, const Registration& registration) {
   double worst = 0;
   for (const Vector3d& sample : model.samples)
-    worst = std::max(worst,
-                     localization::length_at_95(point_covariance(registration.covariance, registration.centre,
-                                                                 registration.world_from_model * sample)));
+    worst = std::max(worst, localization::length_at_95(
+                                point_covariance(registration, registration.world_from_model * sample)));
   return worst;
 }
 
@@ -174,11 +201,18 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
                           model.radius_mm,
                           cameras_with_motion(cameras, options.motion_sigma_mm),
                           correlations_px(views, model, result.centre),
-                          {edge_shift_sigma * finest_mm, growth * finest_mm}};
+                          {edge_shift_sigma * finest_mm, growth * finest_mm},
+                          options.scale_sigma};
   result.covariance = errors.covariance(best.observation, result.centre);
   result.deformation = deformation_of(best.observation, errors, result.centre);
   compare_views(scene, errors, stages.back().level, best, result);
   if (result.disagreement) result.covariance *= result.disagreement->ratio();
+  const RigidStep by_size = errors.by_size(best.observation);
+  result.scale_sigma = options.scale_sigma;
+  result.by_scale = options.scale_sigma * by_size;
+  result.covariance += result.by_scale * result.by_scale.transpose();
+  if (views.size() == 1 && by_size.allFinite())
+    result.notes.push_back(depth_from_scale(views.front(), by_size, result));
   if (options.search.candidates > 0) {
     step("mirror image");
     result.mirrored_ratio = mirrored_cost_ratio(scene, best, stages, options.search, same_mm);

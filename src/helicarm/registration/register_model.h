@@ -17,10 +17,14 @@ namespace helicarm::registration {
 enum class Decision { accept, warn, refuse };
 std::string_view word(Decision decision);
 
+/// Of a model's size where the case states none: a CT's field of view and table, resampling, a threshold.
+inline constexpr double usual_scale_sigma = 0.005;
+
 struct RegistrationOptions {
   SearchOptions search = {};
-  std::optional<double> max_error_mm;  ///< refuse (uncertain) if a point's 95 % error exceeds it
-  unsigned threads = 0;                ///< 0: all cores
+  std::optional<double> max_error_mm;      ///< refuse (uncertain) if a point's 95 % error exceeds it
+  double scale_sigma = usual_scale_sigma;  ///< relative, of the model's size
+  unsigned threads = 0;                    ///< 0: all cores
   /// Of all views' parameters, 11 n x 11 n; empty: the views' own covariances, taken as independent.
   Eigen::MatrixXd camera_covariance = {};
   /// Motion of the model between the first view's acquisition and each later one, per axis, mm.
@@ -78,9 +82,12 @@ struct Registration {
   std::vector<Warning> warnings;
   std::vector<Warning> notes;
   geometry::RigidTransform world_from_model;
-  /// About `centre`, as RigidStep; not a number where the images do not determine the pose (refused).
+  /// About `centre`, as RigidStep, with the error of the model's size; not a number where the images do not
+  /// determine the pose (refused).
   RigidCovariance covariance = RigidCovariance::Constant(std::numeric_limits<double>::quiet_NaN());
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< world
+  double scale_sigma = 0;                            ///< relative, of the model's size
+  RigidStep by_scale = RigidStep::Zero();  ///< error of the pose for a body larger than its model by that
   double score = 0;
   double spacing_mm = 0;  ///< of the finest comparison
   int starts = 0, agree = 0;
@@ -107,6 +114,9 @@ Warning cameras_without_covariance(const std::string& name);
 Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
                             const std::vector<geometry::RigidTransform>& starts,
                             const RegistrationOptions& options);
+
+/// Covariance (mm^2) of a point of the body at a place of the world: of the pose and of the body's size.
+Eigen::Matrix3d point_covariance(const Registration& registration, const Eigen::Vector3d& in_world);
 
 /// 95 % length of the error of the worst of the model's samples, mm.
 double worst_error_mm(const Model& model, const Registration& registration);

@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 
+#include "helicarm/registration/checks.h"
 #include "helicarm/registration/covariance.h"
 #include "helicarm/registration/surface_scene_test.h"
 
@@ -131,6 +132,59 @@ TEST(RegisterModel, OneViewStatesItsDepthAsUncertain) {
     return std::sqrt(ray.dot(result.covariance.bottomRightCorner<3, 3>() * ray));
   };
   EXPECT_GT(depth_sigma(one), 3 * depth_sigma(both));
+}
+
+TEST(RegisterModel, TheModelsSizeIsPartOfTheDepthOfOneView) {
+  const Model model = model_of(lopsided_bone(1.01));
+  auto views = two_views(lopsided_bone());
+  views.pop_back();
+  const Vector3d ray =
+      Vector3d(true_pose() * model_of(lopsided_bone()).centre - view_from(0).source_in_world());
+  const auto error_in_sigmas = [&](double scale_sigma) {
+    RegistrationOptions options = quick();
+    options.scale_sigma = scale_sigma;
+    const auto result = register_model(model, views, {start_near(model, true_pose())}, options);
+    EXPECT_EQ(result.notes.at(0).reason, Reason::depth_from_scale);
+    EXPECT_NEAR(result.notes.at(0).figures.at("mm_per_percent"), 0.01 * ray.norm(), 0.002 * ray.norm());
+    const Vector3d along = ray.normalized();
+    const double error = along.dot(result.centre - view_from(0).source_in_world()) - ray.norm();
+    return error / std::sqrt(along.dot(result.covariance.bottomRightCorner<3, 3>() * along));
+  };
+  const double stated = error_in_sigmas(0.01);
+  EXPECT_LT(std::abs(stated), 1.5);
+  EXPECT_GT(error_in_sigmas(0), 2 * stated);
+}
+
+TEST(RegisterModel, TheModelsSizeMovesAPointAwayFromTheCentre) {
+  Registration result;
+  result.covariance.setZero();
+  result.scale_sigma = 0.005;
+  const Eigen::Matrix3d covariance = point_covariance(result, {100, 0, 0});
+  EXPECT_NEAR(std::sqrt(covariance(0, 0)), 0.5, 1e-9);
+  EXPECT_NEAR(covariance.trace(), covariance(0, 0), 1e-12);
+}
+
+TEST(RegisterModel, SuggestsAWiderSearchToAStartThatIsFarAway) {
+  const auto volume = lopsided_bone();
+  const Model model = model_of(volume);
+  RigidTransform start = true_pose();
+  start.translation += Vector3d(9, 0, -22);
+  const auto result = register_model(model, two_views(volume), {start}, quick());
+  ASSERT_TRUE(result.failure);
+  EXPECT_THAT(result.failure->message, testing::HasSubstr("--search-mm 16"));
+}
+
+TEST(RegisterModel, ViewsThatATooLargeModelMovesApartHaveTheSizeInCommon) {
+  const std::vector<RegistrationView> views = two_views(lopsided_bone());
+  std::vector<OwnSolution> own(2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    own[i].covariance = 0.01 * RigidCovariance::Identity();
+    own[i].by_scale.tail<3>() = 3 * (-views[i].view.source_in_world()).normalized();
+    own[i].step = own[i].by_scale;
+  }
+  EXPECT_LT(disagreement_of(views, Vector3d::Zero(), own).chi2, 1.5);
+  for (OwnSolution& each : own) each.by_scale.setZero();
+  EXPECT_GT(disagreement_of(views, Vector3d::Zero(), own).chi2, 100);
 }
 
 TEST(Covariance, MatchesTheScatterOfNoise) {

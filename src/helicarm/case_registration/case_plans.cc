@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/case_plans.h"
+
+#include <algorithm>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/csv.h"
+
+namespace helicarm::case_registration {
+namespace {
+
+constexpr double same_place_mm = 1;  // of a landmark and a planned point, as two programs round them
+
+[[noreturn]] void refuse_name(const std::string& name, const std::string& first, const std::string& second) {
+  throw BadInput(Reason::name_clash, fmt::format("\"{}\" is {} and {}: one result holds both, so rename one",
+                                                 name, first, second));
+}
+
+/// Whether the model's landmarks hold the point.
+bool is_landmark(const pipeline::CaseModel& model, const PlanPoint& point) {
+  if (!model.landmarks) return false;
+  const CsvTable table = value_or_throw(read_csv(*model.landmarks, {"name", "x_mm", "y_mm", "z_mm"}, {}));
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    if (table.text(row, "name") == point.name)
+      return (Eigen::Vector3d(table.number(row, "x_mm"), table.number(row, "y_mm"),
+                              table.number(row, "z_mm")) -
+              point.in_model)
+                 .norm() < same_place_mm;
+  return false;
+}
+
+void check_points(const Plan& plan, const pipeline::RegistrationCase& given,
+                  const pipeline::CaseModel& model) {
+  for (const PlanPoint& point : plan.points)
+    if (std::ranges::find(given.base.picks, point.name, &pipeline::Pick::name) != given.base.picks.end() &&
+        !is_landmark(model, point))
+      refuse_name(point.name, fmt::format("a point of \"{}\"'s plan", model.name),
+                  "another point, of the picks");
+}
+
+}  // namespace
+
+std::vector<std::optional<Plan>> read_plans(const pipeline::RegistrationCase& given) {
+  std::map<std::string, std::string> owners;
+  for (const pipeline::TunnelPlan& tunnel : given.base.tunnels)
+    owners.emplace(tunnel.name, "a tunnel of the case's picks");
+  std::vector<std::optional<Plan>> plans;
+  for (const pipeline::CaseModel& model : given.models) {
+    plans.emplace_back();
+    if (!model.plan) continue;
+    plans.back() = value_or_throw(read_plan(*model.plan));
+    for (const PlanTunnel& tunnel : plans.back()->tunnels) {
+      const std::string owner =
+          fmt::format("a tunnel of \"{}\"'s plan {}", model.name, model.plan->filename().string());
+      if (const auto [other, is_new] = owners.emplace(tunnel.name, owner); !is_new)
+        refuse_name(tunnel.name, other->second, owner);
+    }
+    check_points(*plans.back(), given, model);
+  }
+  return plans;
+}
+
+}  // namespace helicarm::case_registration

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "helicarm/case_registration/plan.h"
+#include "helicarm/pipeline/registration_case.h"
+
+namespace helicarm::case_registration {
+
+/// The models' plans, nothing for a model without. Throws BadInput: as `read_plan`, and name_clash for two
+/// tunnels of one name, of plans or of the case, and for a planned point named like a pick that is not the
+/// model's landmark there.
+std::vector<std::optional<Plan>> read_plans(const pipeline::RegistrationCase& given);
+
+}  // namespace helicarm::case_registration

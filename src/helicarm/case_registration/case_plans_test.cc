@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/case_plans.h"
+
+#include <gmock/gmock.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+#include "helicarm/core/temporary_folder.h"
+
+namespace helicarm::case_registration {
+namespace {
+
+using testing::HasSubstr;
+
+class CasePlans : public testing::Test {
+ protected:
+  /// A model whose plan has one line and one point.
+  void add_model(const char* name, const char* line, const char* point) {
+    const auto at = [](const char* label, double z) {
+      return Json{{"label", label}, {"position", {1, 2, z}}};
+    };
+    const Json plan = {{"markups",
+                        {{{"type", "Line"}, {"name", line}, {"controlPoints", {at("1", 0), at("2", 30)}}},
+                         {{"type", "Fiducial"}, {"controlPoints", {at(point, 5)}}}}}};
+    pipeline::CaseModel model;
+    model.name = name;
+    model.plan = folder_.path() / (std::string(name) + ".mrk.json");
+    EXPECT_TRUE(write_file(*model.plan, to_text(plan)));
+    given_.models.push_back(model);
+  }
+  void add_pick(const char* name) {
+    pipeline::Pick pick;
+    pick.name = name;
+    given_.base.picks.push_back(pick);
+  }
+  Expected<std::vector<std::optional<Plan>>> plans() {
+    return guarded([&] { return read_plans(given_); });
+  }
+
+  const TemporaryFolder folder_;
+  pipeline::RegistrationCase given_;
+};
+
+TEST_F(CasePlans, PointsOfTwoPlansMayShareANameTunnelsMayNot) {
+  add_model("femur", "one", "F-1");
+  add_model("tibia", "two", "F-1");
+  ASSERT_TRUE(plans()) << plans().error().message;
+  add_model("patella", "one", "F-2");
+  ASSERT_FALSE(plans());
+  EXPECT_EQ(plans().error().reason, Reason::name_clash);
+  EXPECT_THAT(plans().error().message,
+              HasSubstr("\"one\" is a tunnel of \"femur\"'s plan femur.mrk.json and"));
+}
+
+TEST_F(CasePlans, ATunnelOfThePicksIsAnother) {
+  add_model("femur", "one", "F-1");
+  pipeline::TunnelPlan tunnel;
+  tunnel.name = "one";
+  given_.base.tunnels.push_back(tunnel);
+  EXPECT_EQ(plans().error().reason, Reason::name_clash);
+}
+
+TEST_F(CasePlans, APickIsAnotherPoint) {
+  add_model("femur", "one", "entry");
+  add_pick("elsewhere");
+  EXPECT_TRUE(plans());
+  add_pick("entry");
+  EXPECT_EQ(plans().error().reason, Reason::name_clash);
+}
+
+TEST_F(CasePlans, AnEndOfATunnelIsAPointToo) {
+  add_model("femur", "one", "entry");
+  add_pick("one_start");
+  EXPECT_EQ(plans().error().reason, Reason::name_clash);
+}
+
+TEST_F(CasePlans, APickedLandmarkMayBePlanned) {
+  add_model("femur", "one", "entry");
+  add_pick("entry");
+  given_.models[0].landmarks = folder_.path() / "points.csv";
+  EXPECT_TRUE(write_file(*given_.models[0].landmarks, "name,x_mm,y_mm,z_mm\nentry,1,2,5\n"));
+  EXPECT_TRUE(plans()) << plans().error().message;
+  EXPECT_TRUE(write_file(*given_.models[0].landmarks, "name,x_mm,y_mm,z_mm\nentry,1,2,9\n"));
+  EXPECT_EQ(plans().error().reason, Reason::name_clash);
+}
+
+}  // namespace
+}  // namespace helicarm::case_registration

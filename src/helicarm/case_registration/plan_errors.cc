@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/plan_errors.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "helicarm/localization/error_bound.h"
+
+namespace helicarm::case_registration {
+
+std::optional<PlannedError> largest_error(const std::vector<RegisteredPoint>& points) {
+  std::optional<PlannedError> largest;
+  const auto take = [&](const std::string& point, const char* frame, const Eigen::Matrix3d& covariance) {
+    const double error = localization::length_at_95(covariance);
+    if (!largest || error > largest->error_95_mm) largest = PlannedError{point, frame, error};
+  };
+  for (const RegisteredPoint& point : points) {
+    const guidance::PointInFrames& place = point.place;
+    take(point.name, "world", place.covariance_in_calibrator);
+    if (place.covariance_in_femur) take(point.name, "femur's", *place.covariance_in_femur);
+    if (place.covariance_in_tibia) take(point.name, "tibia's", *place.covariance_in_tibia);
+    if (place.covariance_in_tool) take(point.name, "tool's", *place.covariance_in_tool);
+  }
+  return largest;
+}
+
+void limit_error(const std::optional<PlannedError>& largest, const std::optional<double>& max_error_mm,
+                 registration::Registration& result) {
+  const double limit = max_error_mm.value_or(registration::usual_error_mm);
+  if (!largest || largest->error_95_mm <= limit) return;
+  add_finding(
+      result,
+      {Reason::uncertain,
+       fmt::format("{}: the 95 % error of the planned point \"{}\" is {:.3g} mm in the {} frame, over the "
+                   "limit of {:g} mm",
+                   result.name, largest->point, largest->error_95_mm, largest->frame, limit),
+       {},
+       {{"error_95_mm", largest->error_95_mm}, {"limit_mm", limit}}},
+      max_error_mm.has_value());
+}
+
+void add_finding(registration::Registration& result, Failure finding, bool refuses) {
+  using registration::Decision;
+  if (!refuses)
+    result.warnings.push_back(std::move(finding));
+  else if (!result.failure)
+    result.failure = std::move(finding);
+  result.decision = result.failure ? Decision::refuse : std::max(result.decision, Decision::warn);
+}
+
+}  // namespace helicarm::case_registration

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/plan_errors.h"
+
+#include <gmock/gmock.h>
+
+namespace helicarm::case_registration {
+namespace {
+
+using Eigen::Matrix3d;
+using testing::HasSubstr;
+
+RegisteredPoint point_with(const char* name, double sigma_mm, std::optional<double> sigma_in_tool_mm) {
+  RegisteredPoint point{name, {}};
+  point.place.covariance_in_calibrator = sigma_mm * sigma_mm * Matrix3d::Identity();
+  if (sigma_in_tool_mm)
+    point.place.covariance_in_tool = *sigma_in_tool_mm * *sigma_in_tool_mm * Matrix3d::Identity();
+  return point;
+}
+
+registration::Registration limited(const std::vector<RegisteredPoint>& points, std::optional<double> limit) {
+  registration::Registration result;
+  result.name = "femur";
+  result.decision = registration::Decision::accept;
+  limit_error(largest_error(points), limit, result);
+  return result;
+}
+
+TEST(PlanErrors, APlannedPointBeyondTheLimitIsRefused) {
+  const auto result = limited({point_with("near", 0.1, {}), point_with("far", 0.2, {})}, 0.4);
+  ASSERT_TRUE(result.failure);
+  EXPECT_EQ(result.failure->reason, Reason::uncertain);
+  EXPECT_EQ(result.decision, registration::Decision::refuse);
+  EXPECT_THAT(result.failure->message,
+              HasSubstr("\"far\" is 0.559 mm in the world frame, over the limit of 0.4"));
+}
+
+TEST(PlanErrors, TheToolsFrameCountsToo) {
+  const std::vector<RegisteredPoint> points = {point_with("end", 0.1, 0.3)};
+  EXPECT_FALSE(limited(points, 1).failure);
+  const auto result = limited(points, 0.5);
+  ASSERT_TRUE(result.failure);
+  EXPECT_THAT(result.failure->message, HasSubstr("in the tool's frame"));
+}
+
+TEST(PlanErrors, WithoutALimitTwoMillimetresAreWarnedOf) {
+  EXPECT_EQ(limited({point_with("end", 0.5, {})}, {}).decision, registration::Decision::accept);
+  const auto result = limited({point_with("end", 1, {})}, {});
+  EXPECT_FALSE(result.failure);
+  EXPECT_EQ(result.decision, registration::Decision::warn);
+}
+
+}  // namespace
+}  // namespace helicarm::case_registration
