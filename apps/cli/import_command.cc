@@ -6,7 +6,9 @@
 #include "helicarm/core/json.h"
 #include "helicarm/geometry/import_matrix.h"
 #include "helicarm/geometry/itk_transform.h"
+#include "helicarm/geometry/matrix_transform.h"
 #include "helicarm/geometry/view_json.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm::cli {
 namespace {
@@ -20,6 +22,7 @@ Json json_of(const geometry::ImportedMatrix& imported) {
   json["projection"] = geometry::json_rows(view.projection());
   json["image_size"] = nullptr;
   if (const auto& size = imported.image_size) json["image_size"] = {size->x(), size->y()};
+  json["warnings"] = pipeline::json_list_of(imported.warnings);
   return json;
 }
 
@@ -49,33 +52,51 @@ void print_transform(const geometry::RigidTransform& moving_from_fixed, Console&
               << forward.format(rows) << '\n';
 }
 
+/// Of a 4x4 matrix, which does not state what it connects.
+void print_matrix(const geometry::RigidTransform& transform, Console& console) {
+  const Eigen::Matrix4d forward = transform.matrix(), back = transform.inverse().matrix();
+  if (console.json) {
+    console.out << to_text(
+                       Json{{"matrix", geometry::json_rows(forward)}, {"inverse", geometry::json_rows(back)}})
+                << '\n';
+    return;
+  }
+  const Eigen::IOFormat rows(8, 0, "  ", "\n", "  ");
+  console.out << "rigid motion, as in the file (mm)\n"
+              << forward.format(rows) << "\ninverse\n"
+              << back.format(rows) << '\n';
+}
+
+Expected<std::optional<double>> mm_per_unit(const std::optional<std::string>& unit) {
+  if (!unit) return std::nullopt;
+  for (const auto& [word, mm] : {std::pair{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}})
+    if (*unit == word) return mm;
+  return fail(Reason::usage, fmt::format("--unit: \"{}\" is none of: mm, cm, m", *unit));
+}
+
 }  // namespace
 
 CommandResult import_command(const ImportArguments& arguments, Console& console) {
-  if (arguments.unit != "mm" && arguments.unit != "cm")
-    return fail(Reason::usage, fmt::format("--unit: \"{}\" is neither mm nor cm", arguments.unit));
-  geometry::ImportOptions options{.mm_per_unit = arguments.unit == "cm" ? 10.0 : 1.0,
-                                  .column = arguments.column,
-                                  .undistorted = arguments.undistorted};
+  const auto mm = mm_per_unit(arguments.unit);
+  if (!mm) return tl::unexpected<Failure>(mm.error());
+  geometry::ImportOptions options{
+      .mm_per_unit = *mm, .column = arguments.column, .undistorted = arguments.undistorted};
   if (!arguments.image_size.empty()) options.image_size = {arguments.image_size[0], arguments.image_size[1]};
   if (!arguments.pixel_mm.empty()) options.pixel_mm = {arguments.pixel_mm[0], arguments.pixel_mm[1]};
   if (!arguments.origin_mm.empty()) options.origin_mm = {arguments.origin_mm[0], arguments.origin_mm[1]};
-  auto transform = geometry::read_itk_transform(arguments.file);
-  if (!transform) return tl::unexpected<Failure>(transform.error());
-  if (*transform) {
-    (*transform)->translation *= options.mm_per_unit;
-    print_transform(**transform, console);
+  for (const auto& [read, print] : {std::pair{&geometry::read_itk_transform, &print_transform},
+                                    {&geometry::read_matrix_transform, &print_matrix}}) {
+    auto transform = read(arguments.file);
+    if (!transform) return tl::unexpected<Failure>(transform.error());
+    if (!*transform) continue;
+    (*transform)->translation *= mm->value_or(1);
+    print(**transform, console);
     return {};
   }
   const auto imported = geometry::import_matrix(arguments.file, options);
   if (!imported) return tl::unexpected<Failure>(imported.error());
-  const auto& size = imported->image_size;
-  const geometry::Intrinsics& k = imported->view.intrinsics;
-  if (size && !(k.u0 > 0 && k.v0 > 0 && k.u0 < size->x() && k.v0 < size->y()))
-    console.progress << fmt::format(
-        "helicarm: warning: the central ray ({:.0f}, {:.0f}) lies outside the image of {} x {}: check the "
-        "image size\n",
-        k.u0, k.v0, size->x(), size->y());
+  for (const Warning& warning : imported->warnings)
+    console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
   if (console.json)
     console.out << to_text(json_of(*imported)) << '\n';
   else

@@ -12,11 +12,11 @@ namespace helicarm::cli {
 
 struct ImportArguments {
   std::filesystem::path file;
-  std::string unit = "mm";             ///< of lengths in the file: mm or cm
-  std::optional<int> column = {};      ///< of DLT coefficients, RTK, OpenCV
-  std::vector<int> image_size = {};    ///< width, height
-  std::vector<double> pixel_mm = {};   ///< of RTK's projection images: column, row
-  std::vector<double> origin_mm = {};  ///< of their first pixel
+  std::optional<std::string> unit = {};  ///< of lengths in the file: mm, cm or m
+  std::optional<int> column = {};        ///< of DLT coefficients, RTK, OpenCV
+  std::vector<int> image_size = {};      ///< width, height
+  std::vector<double> pixel_mm = {};     ///< of RTK's projection images: column, row
+  std::vector<double> origin_mm = {};    ///< of their first pixel
   bool undistorted = false;
 };
 

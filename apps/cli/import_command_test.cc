@@ -49,5 +49,19 @@ TEST(ImportCommand, ItkTransformIsPrintedInBothDirections) {
   EXPECT_EQ(json["moving_from_fixed"][0], Json({1.0, 0.0, 0.0, -10.0}));
 }
 
+TEST(ImportCommand, RigidMatrixIsPrintedWithItsInverse) {
+  const fs::path path = fs::temp_directory_path() / fmt::format("helicarm_import_command_{}.txt", ::getpid());
+  ASSERT_TRUE(write_file(path, "0 -1 0 1\n1 0 0 2\n0 0 1 3\n0 0 0 1\n"));
+  std::ostringstream out, progress;
+  Console console{out, progress};
+  console.json = true;
+  const auto imported = import_command({path, "m"}, console);
+  fs::remove(path);
+  ASSERT_TRUE(imported) << imported.error().message;
+  const Json json = *parse_json(out.str(), "out");
+  EXPECT_EQ(json["matrix"][0], Json({0.0, -1.0, 0.0, 1000.0}));
+  EXPECT_EQ(json["inverse"][0][3], -2000.0);
+}
+
 }  // namespace
 }  // namespace helicarm::cli

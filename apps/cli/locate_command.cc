@@ -12,6 +12,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/localization/located_point_json.h"
+#include "helicarm/localization/pick_checks.h"
 #include "helicarm/pipeline/result.h"
 #include "helicarm/rectification/distortion_map.h"
 
@@ -91,40 +92,64 @@ GivenCalibration calibration_from(const std::vector<std::string>& words) {
   return {value_or_throw(calibration::calibration_of_cameras(files)), true};
 }
 
+using Located = Expected<localization::LocatedPoint>;
+
+std::vector<Located> located_points(const std::vector<PickedPoint>& picked,
+                                    const calibration::SavedCalibration& calibration,
+                                    double motion_sigma_mm) {
+  std::vector<Located> points;
+  for (const PickedPoint& point : picked)
+    points.push_back(localization::locate(point.name, localization::PointSource::pick, point.images,
+                                          calibration, motion_sigma_mm));
+  localization::inflate_if_views_contradict(points);
+  return points;
+}
+
+std::optional<Warning> taken_as_rectified(const std::vector<PickedPoint>& picked,
+                                          const calibration::SavedCalibration& calibration) {
+  std::vector<localization::PointObservation> picks;
+  for (const PickedPoint& point : picked) picks.insert(picks.end(), point.images.begin(), point.images.end());
+  return localization::pixels_taken_as_rectified(picks, calibration);
+}
+
 /// {"points", "warnings", "notes"}.
 Json located(const LocateArguments& arguments, std::ostream& progress) {
   const auto [calibration, of_cameras] = calibration_from(arguments.calibrations);
   const auto table =
       value_or_throw(read_csv(arguments.picks, {"name", "view", "u_px", "v_px"}, {"sigma_px"}));
+  const std::vector<PickedPoint> picked = picked_points(table, calibration, arguments.raw);
+  const double motion = arguments.motion_sigma_mm;
+  const std::vector<Located> all = located_points(picked, calibration, motion);
   Json points = Json::array();
   std::vector<Warning> warnings, notes;
-  for (const auto& [name, images, unseen] : picked_points(table, calibration, arguments.raw)) {
-    const double motion = arguments.motion_sigma_mm;
-    const auto point =
-        localization::locate(name, localization::PointSource::pick, images, calibration, motion);
+  if (const auto note = arguments.raw ? std::nullopt : taken_as_rectified(picked, calibration)) {
+    progress << fmt::format("{}\n", note->message);
+    notes.push_back(*note);
+  }
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto& [name, images, unseen] = picked[i];
+    const Located& point = all[i];
     const auto unknown = point && of_cameras ? localization::covariance_missing(*point, images, calibration)
                                              : std::optional<Warning>();
-    auto why = unknown  ? unknown
-               : point  ? point->missing_rays
-               : unseen ? unseen
-                        : std::optional(point.error());
     std::vector<Warning> own_warnings, own_notes;
-    if (point && why) own_warnings.push_back(*why);
-    if (why) progress << fmt::format("{}: {}\n", name, why->message);
-    const auto on_ball =
-        point ? localization::pick_on_fiducial(name, images, calibration, calibration.balls, why && !unknown)
-              : std::nullopt;
-    if (on_ball) {
+    std::optional<Failure> refusal = point ? std::nullopt : unseen ? unseen : std::optional(point.error());
+    if (point && point->missing_rays) own_warnings.push_back(*point->missing_rays);
+    if (unknown) own_warnings.push_back(*unknown);
+    if (refusal) progress << fmt::format("{}: {}\n", name, refusal->message);
+    for (const Warning& warning : own_warnings) progress << fmt::format("{}: {}\n", name, warning.message);
+    const bool rays_miss = point && point->missing_rays;
+    if (const auto on_ball =
+            point ? localization::pick_on_fiducial(name, images, calibration, calibration.balls, rays_miss)
+                  : std::nullopt) {
       progress << fmt::format("{}\n", on_ball->message);
       own_warnings.push_back(*on_ball);
-      why = on_ball;
+      refusal = on_ball;
     }
-    const bool is_located = point && !on_ball;
-    points.push_back(!is_located
-                         ? localization::point_json(name, localization::PointSource::pick, why->reason)
+    points.push_back(refusal
+                         ? localization::point_json(name, localization::PointSource::pick, refusal->reason)
                      : unknown ? localization::point_json_without_covariance(*point)
                                : localization::point_json(*point));
-    if (is_located)
+    if (!refusal)
       own_notes.push_back(localization::unobservable_motion(name, point->point_in_anchor,
                                                             calibration.views[images.front().view], motion));
     points.back()["warnings"] = pipeline::json_list_of(own_warnings);

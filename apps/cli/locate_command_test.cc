@@ -84,6 +84,31 @@ TEST(LocateCommand, RaysThatMissAreWarnedOfAtThePointAlsoWithImportedCameras) {
   EXPECT_GE(point["error_95_mm"].get<double>(), 0.5 * point["ray_gap_mm"].get<double>());
 }
 
+TEST(LocateCommand, RaysThatMissAreWarnedOfWithoutACovarianceToo) {
+  const fs::path folder = fs::temp_directory_path() / fmt::format("helicarm_locate_{}", ::getpid());
+  std::vector<std::string> cameras;
+  for (const auto& [name, alpha] : {std::pair{"AP", 0.0}, {"LAT", 1.5}}) {
+    const fs::path file = folder / fmt::format("{}.json", name);
+    EXPECT_TRUE(
+        write_file(file, Json{{"projection", geometry::json_rows(view_at(alpha).projection())}}.dump()));
+    cameras.push_back(fmt::format("{}={}", name, file.string()));
+  }
+  const Eigen::Vector2d a = view_at(0).project({10, 20, 30}), b = view_at(1.5).project({10, 20, 30});
+  EXPECT_TRUE(write_file(folder / "picks.csv", fmt::format("name,view,u_px,v_px\nT,AP,{},{}\nT,LAT,{},{}\n",
+                                                           a.x() + 400, a.y(), b.x(), b.y())));
+  std::ostringstream out, progress;
+  Console console{out, progress};
+  console.json = true;
+  const auto result = locate_command({cameras, folder / "picks.csv", false}, console);
+  fs::remove_all(folder);
+  ASSERT_TRUE(result) << result.error().message;
+  const Json point = (*parse_json(out.str(), "out"))["points"][0];
+  ASSERT_EQ(point["warnings"].size(), 2u);
+  EXPECT_EQ(point["warnings"][0]["code"], "residual_too_large");
+  EXPECT_EQ(point["warnings"][1]["code"], "covariance_missing");
+  EXPECT_TRUE(point["covariance_mm2"].is_null());
+}
+
 TEST(LocateCommand, PickOnABallOfTheResultsCalibratorIsNotLocated) {
   Json result = result_json();
   result["calibrator"] = {{"balls", {{{"label", "P7"}, {"xyz_mm", {10, 20, 30}}, {"diameter_mm", 4}}}}};

@@ -11,7 +11,9 @@
 #include "helicarm/calibration/saved_calibration.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/fiducials/find_target.h"
+#include "helicarm/localization/pick_checks.h"
 #include "helicarm/measures/measure_json.h"
+#include "helicarm/pipeline/result.h"
 #include "helicarm/rectification/distortion_map.h"
 
 namespace helicarm::cli {
@@ -199,7 +201,35 @@ struct Answer {
   std::map<std::string, Json> warnings;
 };
 
-std::vector<Answer> answers_to(const MeasureArguments& arguments) {
+/// Those of the positions to those of the located points.
+void add_warnings(Answer& answer) {
+  for (const measures::Position& position : answer.measure.positions)
+    for (const Warning& warning : position.warnings) {
+      Json& list = answer.warnings[position.point];
+      if (list.is_null()) list = Json::array();
+      list.push_back(pipeline::to_json(warning));
+    }
+}
+
+/// Nothing with --raw or without a distortion map.
+std::optional<Warning> taken_as_rectified(const MeasureArguments& arguments,
+                                          const std::optional<Measured>& measured,
+                                          std::span<const Wanted> all) {
+  if (arguments.raw || !measured) return std::nullopt;
+  std::vector<localization::PointObservation> picks;
+  for (const Wanted& wanted : all)
+    for (const measures::Click& click : wanted.clicks)
+      if (!measured->points.contains(click.name))
+        picks.push_back({view_named(*measured, wanted.view, wanted.name), click.uv, click.covariance_px2});
+  return localization::pixels_taken_as_rectified(picks, measured->calibration);
+}
+
+struct Answers {
+  std::vector<Answer> measures;
+  std::vector<Warning> notes;
+};
+
+Answers answers_to(const MeasureArguments& arguments) {
   if (!arguments.calibration &&
       (arguments.raw || arguments.depth_mm || arguments.at || arguments.registration))
     throw BadInput(Reason::usage, "--raw, --depth, --at and --registration need --calibration");
@@ -211,8 +241,9 @@ std::vector<Answer> answers_to(const MeasureArguments& arguments) {
   if (arguments.calibration) measured = measured_from(arguments);
   const auto table = value_or_throw(
       read_csv(arguments.clicks, {"measure", "kind", "view", "name", "u_px", "v_px"}, {"sigma_px"}));
+  const std::vector<Wanted> all = wanted_measures(table, measured, arguments.raw);
   std::vector<Answer> answers;
-  for (const Wanted& wanted : wanted_measures(table, measured, arguments.raw)) {
+  for (const Wanted& wanted : all) {
     std::optional<measures::ObjectPlane> plane;
     if (measured)
       plane = plane_of(arguments, *measured,
@@ -225,8 +256,10 @@ std::vector<Answer> answers_to(const MeasureArguments& arguments) {
       throw BadInput(std::move(failure));
     }
     answers.push_back({wanted.name, wanted.view, *std::move(measure), wanted.warnings});
+    add_warnings(answers.back());
   }
-  return answers;
+  const auto note = taken_as_rectified(arguments, measured, all);
+  return {std::move(answers), note ? std::vector{*note} : std::vector<Warning>()};
 }
 
 void print(const Answer& answer, std::ostream& out) {
@@ -250,7 +283,8 @@ void print(const Answer& answer, std::ostream& out) {
 
 CommandResult measure_command(const MeasureArguments& arguments, Console& console) {
   return guarded([&] {
-    const std::vector<Answer> answers = answers_to(arguments);
+    const auto [answers, notes] = answers_to(arguments);
+    for (const Warning& note : notes) console.progress << note.message << '\n';
     if (!console.json) {
       for (const Answer& answer : answers) print(answer, console.out);
       return;
@@ -261,7 +295,7 @@ CommandResult measure_command(const MeasureArguments& arguments, Console& consol
       one.update(measures::to_json(answer.measure));
       all.push_back(std::move(one));
     }
-    console.out << to_text({{"measures", std::move(all)}}) << '\n';
+    console.out << to_text({{"measures", std::move(all)}, {"notes", pipeline::json_list_of(notes)}}) << '\n';
   });
 }
 

@@ -80,6 +80,16 @@ TEST(MeasureCommand, LengthsAreInMillimetresOfThePlane) {
   EXPECT_NEAR(at_fs["quantities"][0]["value"].get<double>(), 500 * 820 / 6000., 1e-9);
 }
 
+TEST(MeasureCommand, PositionOutsideTheLandmarksIsWarnedOf) {
+  const std::string rows =
+      "t,tibia_ap,LAT,anterior,500,100,0.5\nt,tibia_ap,LAT,posterior,900,100,0.5\nt,tibia_ap,LAT,X,400,100,0."
+      "5\n";
+  const Json warnings = measured(rows, {}, false).measures()[0]["warnings"]["X"];
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0]["code"], "outside_reference");
+  EXPECT_THAT(measured(rows, {}, false, false).text, HasSubstr("\"X\" with \"anterior\" (20.0 %)"));
+}
+
 TEST(MeasureCommand, LengthsAreInPixelsWithoutACalibration) {
   const Json length = measured(distance, {}, false).measures()[0]["quantities"][0];
   EXPECT_EQ(length["unit"], "px");

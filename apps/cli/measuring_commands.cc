@@ -241,7 +241,7 @@ void add_detect(CLI::App& app, Action& action) {
 void add_import(CLI::App& app, Action& action) {
   auto* command = add_command(
       app, "import",
-      "Read a projection or transform of another program: MayaCam 2, DLT, NRRD, OpenCV, RTK, ITK",
+      "Read a projection or transform of another program: MayaCam, DLT, NRRD, OpenCV, RTK, ITK",
       "helicarm import camera.txt --unit cm --json\n"
       "  helicarm import MergedDlts.csv --column 2 --image-size 1760,1700 --json\n"
       "  helicarm import geometry.xml --column 1 --pixel-mm 0.388,0.388 --image-size 1024,768 --json\n"
@@ -250,12 +250,13 @@ void add_import(CLI::App& app, Action& action) {
   command
       ->add_option(
           "FILE", a.file,
-          "MayaCam 2, NRRD header, OpenCV (YAML, XML), RTK (XML), a 3x4 matrix as text or JSON, XMALab's DLT "
-          "coefficients, or an ITK transform (.tfm, .h5)")
+          "MayaCam 1 or 2, NRRD header, OpenCV (YAML, XML, JSON), RTK (XML), a 3x4 matrix as text or JSON, "
+          "XMALab's DLT coefficients, an ITK transform (.tfm, .h5), or a rigid 4x4 matrix")
       ->required();
-  command->add_option("--unit", a.unit, "Unit of length in the file: mm or cm")
-      ->type_name("WORD")
-      ->capture_default_str();
+  command
+      ->add_option("--unit", a.unit,
+                   "Unit of length in the file: mm, cm or m; needed where mm would be implausible")
+      ->type_name("WORD");
   command
       ->add_option("--column", a.column,
                    "Camera of DLT coefficients, projection of RTK, image of OpenCV; from 1")

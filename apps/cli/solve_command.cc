@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include <fmt/format.h>
@@ -11,8 +12,10 @@
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/json.h"
+#include "helicarm/geometry/import_matrix.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm::cli {
 namespace {
@@ -62,7 +65,7 @@ Expected<Solution> solve(const std::string& method, const std::vector<fiducials:
   });
 }
 
-Json json_of(const Solution& solution, double rms_px) {
+Json json_of(const Solution& solution, double rms_px, std::span<const Warning> warnings) {
   Json json;
   json["dlt"] = solution.dlt ? geometry::json_list(*solution.dlt) : Json();
   json["projection"] = geometry::json_rows(solution.view.projection());
@@ -71,6 +74,7 @@ Json json_of(const Solution& solution, double rms_px) {
   json["covariance"] = solution.covariance ? geometry::json_rows(*solution.covariance) : Json();
   json["reprojection_rms_px"] = rms_px;
   json["condition"] = solution.condition;
+  json["warnings"] = pipeline::json_list_of(warnings);
   return json;
 }
 
@@ -107,6 +111,23 @@ std::string farthest(const Solution& solution, const std::vector<fiducials::Fidu
   return std::ranges::max_element(points, {}, residual)->label;
 }
 
+std::vector<Warning> warnings_of(const Solution& solution, double rms_px,
+                                 const std::vector<fiducials::Fiducial>& points) {
+  std::vector<Warning> warnings;
+  const double limit = calibration::CalibrationOptions{}.largest_rms_px;
+  if (rms_px > limit)
+    warnings.push_back(
+        {Reason::residual_too_large,
+         fmt::format("{:.3g} px rms, over {:g} px: check the point with the largest residual ({}); "
+                     "solve rejects no outlier",
+                     rms_px, limit, farthest(solution, points)),
+         {},
+         {{"rms_px", rms_px}, {"limit", limit}}});
+  if (const auto flipped = geometry::mirrored_or_upwards(solution.view.intrinsics))
+    warnings.push_back(*flipped);
+  return warnings;
+}
+
 }  // namespace
 
 CommandResult solve_command(const SolveArguments& arguments, Console& console) {
@@ -120,14 +141,11 @@ CommandResult solve_command(const SolveArguments& arguments, Console& console) {
   const auto solution = solve(arguments.method, *points, pairs, table->has("sigma_px"));
   if (!solution) return tl::unexpected<Failure>(solution.error());
   const double rms_px = geometry::reprojection_rms(solution->view, pairs);
-  if (rms_px > calibration::CalibrationOptions{}.largest_rms_px)
-    console.progress << fmt::format(
-        "helicarm: warning: residual_too_large: {:.3g} px rms, over {:g} px: check the point with the "
-        "largest residual "
-        "({}); solve rejects no outlier\n",
-        rms_px, calibration::CalibrationOptions{}.largest_rms_px, farthest(*solution, *points));
+  const auto warnings = warnings_of(*solution, rms_px, *points);
+  for (const Warning& warning : warnings)
+    console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
   if (console.json)
-    console.out << to_text(json_of(*solution, rms_px)) << '\n';
+    console.out << to_text(json_of(*solution, rms_px, warnings)) << '\n';
   else
     print_table(*solution, rms_px, *points, console.out);
   return {};

@@ -64,6 +64,13 @@ TEST(SolveCommand, EveryMethodRecoversTheMirroredView) {
   }
 }
 
+TEST(SolveCommand, NegativeFxIsWarnedOf) {
+  const Json warnings = (*parse_json(solve_text(table_of(12, false), "ml").text, "out"))["warnings"];
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0]["code"], "ambiguous_handedness");
+  EXPECT_NE(warnings[0]["message"].get<std::string>().find("upwards"), std::string::npos);
+}
+
 TEST(SolveCommand, TableContainsEveryPoint) {
   const Answer answer = solve_text(table_of(8, false, "0.2"), "ml", false);
   ASSERT_TRUE(answer.result.has_value());

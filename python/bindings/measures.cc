@@ -5,6 +5,7 @@
 #include "checks.h"
 #include "held_calibration.h"
 #include "helicarm/fiducials/find_target.h"
+#include "helicarm/localization/pick_checks.h"
 #include "helicarm/measures/measure_json.h"
 #include "module.h"
 
@@ -47,10 +48,17 @@ measures::Click click_at(const std::string& name, const Eigen::Vector2d& uv, std
   return {name, point.uv, point.sigma_px * point.sigma_px * Eigen::Matrix2d::Identity()};
 }
 
-py::object measure(const std::string& word, const std::map<std::string, Doubles>& clicks,
-                   const HeldCalibration* calibration, const std::optional<ViewKey>& view,
-                   std::optional<double> sigma_px, bool raw, std::optional<double> depth_mm,
-                   double depth_sigma_mm, const std::optional<Doubles>& at, const Points& points) {
+std::optional<Warning> taken_as_rectified(const std::map<std::string, Doubles>& clicks, const InView& in) {
+  std::vector<localization::PointObservation> picks;
+  for (const auto& [name, uv] : clicks)
+    picks.push_back({in.index, row_of<2>(uv, name), Eigen::Matrix2d::Zero()});
+  return localization::pixels_taken_as_rectified(picks, in.calibration);
+}
+
+py::dict measure(const std::string& word, const std::map<std::string, Doubles>& clicks,
+                 const HeldCalibration* calibration, const std::optional<ViewKey>& view,
+                 std::optional<double> sigma_px, bool raw, std::optional<double> depth_mm,
+                 double depth_sigma_mm, const std::optional<Doubles>& at, const Points& points) {
   std::vector<std::string_view> words;
   for (const measures::KindInfo& info : measures::kinds()) words.push_back(info.word);
   const auto kind = measures::kinds()[checked_word(word, words, "kind")].kind;
@@ -68,7 +76,18 @@ py::object measure(const std::string& word, const std::map<std::string, Doubles>
         measures::click_of(name, row_of<3>(point.first, name),
                            checked_covariance(matrix_of(point.second, 3, 3, name), name), in->view().view)));
   const auto plane = in ? plane_of(*in, depth_mm, depth_sigma_mm, at) : std::nullopt;
-  return python_from(measures::to_json(value_or_raise(measures::measure(kind, all, plane))));
+  const measures::Measure found = value_or_raise(measures::measure(kind, all, plane));
+  py::dict result = python_from(measures::to_json(found));
+  for (std::size_t i = 0; i < found.positions.size(); ++i) {
+    py::list warnings;
+    for (const Warning& warning : found.positions[i].warnings) warnings.append(warning_dict(warning));
+    result["positions"][py::int_(i)]["warnings"] = warnings;
+  }
+  py::list notes;
+  if (const auto note = in && !raw ? taken_as_rectified(clicks, *in) : std::nullopt)
+    notes.append(warning_dict(*note));
+  result["notes"] = notes;
+  return result;
 }
 
 }  // namespace
@@ -92,7 +111,8 @@ covariance_mm2 (3, 3))} in the calibrator frame, by their projections.
 calibration, view: lengths are then in mm, in the plane parallel to the detector depth_mm from the source, or through
 at (3,), or through the fiducials' centre; without, in pixels. sigma_px: of a click per axis; not given: 0.5. raw: the
 clicks are raw pixels. Returns {"kind", "depth_mm", "quantities": [{"name", "unit", "value", "sigma"}], "positions":
-[{"point", "percent": {component: value}, "covariance_percent2"}]}. Raises InputError: usage, bad_value (clicks missing,
+[{"point", "percent": {component: value}, "covariance_percent2", "warnings": [outside_reference]}], "notes":
+[pixels_taken_as_rectified]}. Raises InputError: usage, bad_value (clicks missing,
 unknown, or that do not determine the measure); RefusedError: behind_source, not_seen.)");
 }
 

@@ -9,6 +9,7 @@
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/localization/locate.h"
+#include "helicarm/localization/pick_checks.h"
 #include "helicarm/localization/tre_volume.h"
 #include "module.h"
 
@@ -71,15 +72,20 @@ Expected<localization::PointObservation> observation_of(const HeldCalibration& c
                                         seen->sigma_px * seen->sigma_px * Eigen::Matrix2d::Identity()};
 }
 
-localization::LocatedPoint located(const HeldCalibration& calibration,
-                                   const std::map<ViewKey, Doubles>& observations,
-                                   std::optional<double> sigma_px, bool raw, const std::string& name) {
+/// helicarm.LocatedPoint.
+struct HeldPoint : localization::LocatedPoint {
+  std::optional<Warning> note;  ///< pixels_taken_as_rectified
+};
+
+HeldPoint located(const HeldCalibration& calibration, const std::map<ViewKey, Doubles>& observations,
+                  std::optional<double> sigma_px, bool raw, const std::string& name) {
   checked(sigma_px, not_negative, "sigma_px");
   std::vector<localization::PointObservation> observed;
   for (const auto& [view, uv] : by_view(calibration, observations))
     observed.push_back(value_or_raise(observation_of(
         calibration, view, row_of<2>(uv, "observations", calibration.views[view].name), sigma_px, raw)));
-  return value_or_raise(localization::locate(name, localization::PointSource::pick, observed, calibration));
+  return {value_or_raise(localization::locate(name, localization::PointSource::pick, observed, calibration)),
+          raw ? std::nullopt : localization::pixels_taken_as_rectified(observed, calibration)};
 }
 
 using Located = Expected<localization::LocatedPoint>;
@@ -103,6 +109,7 @@ std::vector<Located> located_rows(const HeldCalibration& calibration,
     }
     points[i] = localization::locate("", localization::PointSource::pick, observed, calibration);
   });
+  localization::inflate_if_views_contradict(points);
   return points;
 }
 
@@ -152,8 +159,17 @@ py::dict located_all(const HeldCalibration& calibration, const std::map<ViewKey,
   }
   if (rows.empty()) raise({Reason::bad_value, "observations: is empty", {}, {}});
   const std::size_t count = rows.begin()->second.size();
-  return arrays_of(
-      without_gil([&] { return located_rows(calibration, rows, count, sigma_px, raw, threads); }));
+  auto arrays =
+      arrays_of(without_gil([&] { return located_rows(calibration, rows, count, sigma_px, raw, threads); }));
+  std::vector<localization::PointObservation> picks;
+  for (const auto& [view, of_view] : rows)
+    for (const Eigen::Vector2d& uv : of_view)
+      if (!raw && uv.allFinite()) picks.push_back({view, uv, Eigen::Matrix2d::Zero()});
+  py::list notes;
+  if (const auto note = localization::pixels_taken_as_rectified(picks, calibration))
+    notes.append(warning_dict(*note));
+  arrays["notes"] = notes;
+  return arrays;
 }
 
 py::array predicted(const HeldCalibration& calibration, const Doubles& xyz_mm, double sigma_px) {
@@ -192,38 +208,39 @@ py::dict tre_map(const HeldCalibration& calibration, const Doubles& centre_mm, d
 }  // namespace
 
 void add_points(py::module_& module) {
-  py::class_<localization::LocatedPoint>(module, "LocatedPoint",
-                                         "A point in space with its confidence region.")
-      .def_readonly("name", &localization::LocatedPoint::name)
+  py::class_<HeldPoint>(module, "LocatedPoint", "A point in space with its confidence region.")
+      .def_readonly("name", &HeldPoint::name)
       .def_property_readonly(
-          "xyz_mm",
-          [](const localization::LocatedPoint& p) {
-            return read_only(rows_array<3>({p.point_in_anchor}, true));
-          },
+          "xyz_mm", [](const HeldPoint& p) { return read_only(rows_array<3>({p.point_in_anchor}, true)); },
           "(3,) calibrator frame, mm.")
       .def_property_readonly(
           "covariance_mm2",
-          [](const localization::LocatedPoint& p) { return read_only(matrix_array(p.covariance_in_anchor)); },
+          [](const HeldPoint& p) { return read_only(matrix_array(p.covariance_in_anchor)); },
           "(3, 3) mm^2, axes of the calibrator frame.")
       .def_property_readonly(
           "error_95_mm",
-          [](const localization::LocatedPoint& p) {
-            return localization::length_at_95(p.covariance_in_anchor);
-          },
+          [](const HeldPoint& p) { return localization::length_at_95(p.covariance_in_anchor); },
           "Distance from the true point that 95 % of such points do not exceed, mm.")
-      .def_property_readonly("predicted_rms_mm", &localization::LocatedPoint::predicted_rms_mm,
+      .def_property_readonly("predicted_rms_mm", &HeldPoint::predicted_rms_mm,
                              "Root of the covariance's trace, mm.")
-      .def_readonly("ray_gap_mm", &localization::LocatedPoint::ray_gap_mm,
-                    "Largest distance between two of the rays, mm.")
-      .def_readonly("chi2", &localization::LocatedPoint::chi2, "2n - 3 degrees of freedom with n views.")
-      .def_readonly("views", &localization::LocatedPoint::views)
+      .def_readonly("ray_gap_mm", &HeldPoint::ray_gap_mm, "Largest distance between two of the rays, mm.")
+      .def_readonly("chi2", &HeldPoint::chi2, "2n - 3 degrees of freedom with n views.")
+      .def_readonly("views", &HeldPoint::views)
       .def_property_readonly(
           "warning",
-          [](const localization::LocatedPoint& p) {
+          [](const HeldPoint& p) {
             return p.missing_rays ? py::object(warning_dict(*p.missing_rays)) : py::object(py::none());
           },
           "residual_too_large where the rays miss each other and the covariance was enlarged; else None.")
-      .def("__repr__", [](const localization::LocatedPoint& p) {
+      .def_property_readonly(
+          "note",
+          [](const HeldPoint& p) {
+            return p.note ? py::object(warning_dict(*p.note)) : py::object(py::none());
+          },
+          "pixels_taken_as_rectified: how far raw pixels are from the given ones, where the views have a map "
+          "and "
+          "raw was not set; else None.")
+      .def("__repr__", [](const HeldPoint& p) {
         return fmt::format("<LocatedPoint {}: {:.3f} {:.3f} {:.3f} mm, within {:.3f} mm (95 %){}>", p.name,
                            p.point_in_anchor.x(), p.point_in_anchor.y(), p.point_in_anchor.z(),
                            localization::length_at_95(p.covariance_in_anchor),
@@ -251,7 +268,7 @@ views, or raw pixels off the image), parallel_rays, point_at_infinity, behind_so
 
 Other arguments as locate's. Returns {"xyz_mm": (N, 3), "covariance_mm2": (N, 3, 3), "error_95_mm", "ray_gap_mm",
 "chi2": (N,), all NaN where a point was not located, "reasons", "warnings": lists of N, None or {code, message, view,
-figures}}. Releases the GIL. Raises InputError as locate; a refusal of one point is its entry of "reasons".)")
+figures}, "notes": [pixels_taken_as_rectified] or []}. Where the rays of most points miss, all have the warning. Releases the GIL. Raises InputError as locate; a refusal of one point is its entry of "reasons".)")
       .def("predict", &predicted, py::arg("xyz_mm"), py::kw_only(), py::arg("sigma_px"),
            R"(Covariance (mm^2) of points before they are picked, with this noise per axis in all views.
 

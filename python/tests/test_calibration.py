@@ -237,6 +237,19 @@ def test_points_located_at_once_are_those_of_each(pair):
         calibration.locate_all({"AP": seen["AP"], "LAT": seen["LAT"][:5]})
 
 
+def test_views_that_contradict_each_other_vouch_for_no_point(pair):
+    calibration = pair.calibration()
+    points = np.array([POINT, POINT + 5, POINT - 5])
+    seen = {name: calibration.project(points, name) for name in calibration.names}
+    assert calibration.locate_all(seen, sigma_px=0.4)["warnings"] == [None] * 3
+    seen["LAT"][:2] += (11, 13)
+    contradicting = calibration.locate_all(seen, sigma_px=0.4)
+    assert [w["code"] for w in contradicting["warnings"]] == ["residual_too_large"] * 3
+    alone = calibration.locate({name: uv[2] for name, uv in seen.items()}, sigma_px=0.4)
+    assert alone.warning is None and alone.note is None and contradicting["notes"] == []
+    assert contradicting["error_95_mm"][2] > 3 * alone.error_95_mm
+
+
 def test_own_calibration_is_saved_whole(pair, tmp_path):
     calibration = pair.calibration(noise=0.1, seed=2)
     calibration.save(tmp_path / "calibration.json")

@@ -62,3 +62,12 @@ def test_refusals_are_named(pair):
     with pytest.raises(helicarm.InputError, match="distortion map"):
         helicarm.measure("distance", {"from": (1, 2), "to": (4, 6)}, calibration=pair.calibration(), view="AP",
                          raw=True)
+
+
+def test_position_outside_the_landmarks_is_warned_of():
+    found = helicarm.measure("tibia_ml", {"medial": (200, 9), "lateral": (1000, 9), "X": (0, 9)}, sigma_px=0.5)
+    (warning,) = found["positions"][0]["warnings"]
+    assert warning["code"] == "outside_reference"
+    assert warning["figures"]["percent"] == pytest.approx(-25)
+    assert '"X" with "medial" (20.0 %)' in warning["message"]
+    assert found["notes"] == []

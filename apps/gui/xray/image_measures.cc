@@ -132,6 +132,11 @@ void add_results(EvaluatedMeasure& done, const MeasuredLine& head, const measure
       all << line.value;
       done.lines.push_back(line);
     }
+    for (const Warning& warning : position.warnings) {
+      MeasuredLine line = head;
+      line.what = QString::fromStdString(warning.message);
+      done.lines.push_back(line);
+    }
     const auto click = std::ranges::find(clicks, position.point, &measures::Click::name);
     done.positions.emplace_back(click->uv, text(position.point) + ": " + all.join(", "));
   }

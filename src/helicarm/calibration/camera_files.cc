@@ -45,22 +45,8 @@ SavedCalibration from_solve(const Json& json, const std::string& origin) {
   if (reader.has("covariance"))
     view.covariance = Eigen::Map<const ViewCovariance>(
         reader.matrix("covariance", view_parameters, view_parameters, camera_numbers).data());
-  return one_view(std::move(view));
-}
-
-/// Printed by `helicarm import --json`.
-SavedCalibration from_import(const Json& json, const std::string& origin) {
-  JsonReader reader(json, origin);
-  const auto rotation = reader.matrix("R", 3, 3, camera_numbers);
-  const auto translation = reader.numbers("t", 3, camera_numbers);
-  const auto numbers = reader.matrix("projection", 3, 4, camera_numbers);
-  const Eigen::Matrix3d r = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotation.data());
-  const geometry::Projection projection =
-      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
-  CalibratedView view;
-  view.view = value_or_throw(geometry::decompose(
-      projection, r.transpose() * (Eigen::Vector3d::UnitZ() - Eigen::Vector3d(translation.data()))));
-  view.dlt = geometry::factors_from_projection(projection);
+  for (const char* other : {"dlt", "intrinsics", "covariance", "condition", "warnings"}) reader.raw(other);
+  reader.finish();
   return one_view(std::move(view));
 }
 
@@ -71,9 +57,9 @@ SavedCalibration from_file(const std::filesystem::path& path) {
   if (json && json->is_object() && json->contains("format"))
     return value_or_throw(saved_calibration_from_json(*json, origin));
   if (json && json->is_object() && json->contains("camera_from_world")) return from_solve(*json, origin);
-  if (json && json->is_object() && json->contains("K")) return from_import(*json, origin);
   CalibratedView view;
   view.view = value_or_throw(geometry::import_matrix(path)).view;
+  view.dlt = geometry::factors_from_projection(view.view.projection());
   return one_view(std::move(view));
 }
 

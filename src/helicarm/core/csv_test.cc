@@ -70,5 +70,59 @@ TEST(ReadCsv, FieldsThatAreNotFiniteNumbersAreRefused) {
   EXPECT_THROW(table->number(1, "v_px"), BadInput);
 }
 
+TEST(ReadCsv, QuotedFieldsMayHoldCommasAndQuotes) {
+  const fs::path path = fs::temp_directory_path() / ("helicarm_csv_" + std::to_string(::getpid()) + ".csv");
+  const std::string name = "femur, \"left\" #1";
+  ASSERT_TRUE(write_file(path, "name,u_px\r\n" + csv_field(name) + ",1\r\n \"a\" , \"2\"\r\n\"\",3"));
+  const auto table = read_csv(path, {"name", "u_px"}, {});
+  fs::remove(path);
+  ASSERT_TRUE(table) << table.error().message;
+  ASSERT_EQ(table->rows(), 3u);
+  EXPECT_EQ(table->text(0, "name"), name);
+  EXPECT_EQ(table->text(1, "name"), "a");
+  EXPECT_EQ(table->number(1, "u_px"), 2);
+  EXPECT_EQ(table->text(2, "name"), "");
+}
+
+TEST(ReadCsv, BrokenQuotesAreRefused) {
+  EXPECT_EQ(table_of("u_px,v_px\n\"1,2\n").error().reason, Reason::truncated);
+  EXPECT_EQ(table_of("u_px,v_px\n\"1\"0,2\n").error().reason, Reason::bad_value);
+  EXPECT_EQ(table_of("u_px,v_px\n\"1\n\",2\n").error().reason, Reason::bad_value);
+}
+
+TEST(ReadCsv, NumberMayHaveAPlus) {
+  const auto table = table_of("u_px,v_px\n+0.94,+2e1\n+-1,+\n");
+  ASSERT_TRUE(table);
+  EXPECT_EQ(table->number(0, "u_px"), 0.94);
+  EXPECT_EQ(table->number(0, "v_px"), 20);
+  EXPECT_THROW(table->number(1, "u_px"), BadInput);
+  EXPECT_THROW(table->number(1, "v_px"), BadInput);
+}
+
+TEST(ReadCsv, LineEndsOfAnySystemAreRead) {
+  for (const char* text : {"u_px,v_px\n1,2\n", "u_px,v_px\r\n1,2", "u_px,v_px\r1,2\r"}) {
+    const auto table = table_of(text);
+    ASSERT_TRUE(table) << table.error().message;
+    ASSERT_EQ(table->rows(), 1u);
+    EXPECT_EQ(table->number(0, "v_px"), 2);
+  }
+}
+
+TEST(ReadCsv, SpreadsheetsOfOtherCountriesAreNamed) {
+  const auto message_of = [](const std::string& text) { return table_of(text).error().message; };
+  EXPECT_NE(message_of("u_px;v_px\n1,5;2\n").find("semicolons"), std::string::npos);
+  EXPECT_NE(message_of("u_px\tv_px\n1\t2\n").find("tabs"), std::string::npos);
+  EXPECT_NE(message_of(std::string("u\0_\0p\0", 6)).find("UTF-16"), std::string::npos);
+  EXPECT_NE(message_of("u_px,v_px\n\xE4,2\n").find("UTF-8"), std::string::npos);
+  const auto table = table_of("u_px,v_px\n\"1,5\",2\n");
+  ASSERT_TRUE(table);
+  try {
+    table->number(0, "u_px");
+    FAIL();
+  } catch (const BadInput& bad) {
+    EXPECT_NE(bad.failure().message.find("with a point"), std::string::npos);
+  }
+}
+
 }  // namespace
 }  // namespace helicarm

@@ -2,6 +2,7 @@
 #include "helicarm/core/files.h"
 
 #include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <fstream>
 
@@ -16,14 +17,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-bool sync_to_disk(const fs::path& path, int flags) {
-  const int fd = ::open(path.c_str(), flags);
-  if (fd < 0) return false;
-  const bool good = ::fsync(fd) == 0;
-  ::close(fd);
-  return good;
-}
-
 using Write = std::function<Expected<void>(const fs::path& aside)>;
 
 fs::path folder_of(const fs::path& path) {
@@ -35,29 +28,110 @@ fs::path name_aside(const fs::path& path) {
   return folder_of(path) / fmt::format(".{}.{}.{}.part", path.filename().string(), ::getpid(), serial++);
 }
 
-Expected<void> write_bytes(const fs::path& aside, const fs::path& path, std::string_view bytes) {
-  std::ofstream out(aside, std::ios::binary | std::ios::trunc);
-  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!out) return fail(Reason::cannot_write, fmt::format("{}: {}", path.string(), system_message(errno)));
+Failure cannot_write(const fs::path& path, int error) {
+  return {Reason::cannot_write,
+          fmt::format("{}: cannot be written: {}", path.string(), system_message(error))};
+}
+
+/// Closed on destruction.
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  bool is_open() const { return number_ >= 0; }
+  int number() const { return number_; }
+  /// The name under which a library may open the file, also one without a name.
+  fs::path path() const { return fmt::format("/proc/self/fd/{}", number_); }
+
+ private:
+  const int number_;
+};
+
+/// What is written before it replaces `path`: a file without a name, which the system removes whatever ends
+/// the program, or a named one where the file system has none (NFS, FUSE).
+class FileAside {
+ public:
+  explicit FileAside(const fs::path& path)
+      : path_(path),
+        unnamed_(::open(folder_of(path).c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, mode)),
+        named_(unnamed_.is_open() && fs::exists(unnamed_.path()) ? -1 : open_named()) {}
+  ~FileAside() {
+    if (!name_.empty()) ::unlink(name_.c_str());
+  }
+  FileAside(const FileAside&) = delete;
+  FileAside& operator=(const FileAside&) = delete;
+
+  bool is_open() const { return file().is_open(); }
+  int number() const { return file().number(); }
+  fs::path open_as() const { return name_.empty() ? unnamed_.path() : name_; }
+
+  /// True, or errno is set. A name is needed only to replace a file, from link to rename.
+  bool replace() {
+    if (::fsync(number()) != 0) return false;
+    if (name_.empty()) {
+      if (linked_to(path_)) return true;
+      if (errno != EEXIST) return false;
+      name_ = name_aside(path_);
+      if (!linked_to(name_)) return false;
+    }
+    if (::rename(name_.c_str(), path_.c_str()) != 0) return false;
+    name_.clear();
+    return true;
+  }
+
+ private:
+  static constexpr mode_t mode = 0666;  // less the umask
+
+  const Descriptor& file() const { return named_.is_open() ? named_ : unnamed_; }
+  bool linked_to(const fs::path& name) const {
+    return ::linkat(AT_FDCWD, unnamed_.path().c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0;
+  }
+  int open_named() {
+    const fs::path name = name_aside(path_);
+    const int number = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+    if (number >= 0) name_ = name;
+    return number;
+  }
+
+  const fs::path& path_;
+  fs::path name_;  ///< of the file beside `path_`, where it has one
+  Descriptor unnamed_, named_;
+};
+
+bool write_all(int file, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(file, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+Expected<void> replaced(FileAside& aside, const fs::path& path) {
+  if (!aside.replace()) return tl::unexpected<Failure>(cannot_write(path, errno));
+  const Descriptor folder(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (folder.is_open()) ::fsync(folder.number());
   return {};
 }
 
-/// Atomic replacement: temporary file, fsync, rename, fsync of the folder.
-Expected<void> replace_file(const fs::path& path, const Write& write) {
+Expected<void> make_folder(const fs::path& folder) {
   std::error_code ec;
-  const fs::path aside = name_aside(path);
-  auto written = write(aside);
-  const auto refuse = [&](Failure failure) {
-    fs::remove(aside, ec);
-    return tl::unexpected<Failure>(std::move(failure));
-  };
-  if (!written) return refuse(written.error());
-  if (!sync_to_disk(aside, O_RDONLY) || ::rename(aside.c_str(), path.c_str()) != 0)
-    return refuse(
-        {Reason::cannot_write, fmt::format("{}: {}", path.string(), system_message(errno)), {}, {}});
-  sync_to_disk(folder_of(path), O_RDONLY | O_DIRECTORY);
-  return {};
+  fs::create_directories(folder, ec);
+  std::error_code ignored;
+  if (fs::is_directory(folder, ignored)) return {};
+  return fail(Reason::cannot_write, fmt::format("{}: is not a folder and cannot be created{}",
+                                                folder.string(), ec ? ": " + ec.message() : ""));
+}
+
+bool has_drive(const std::string& name) {
+  return name.size() > 2 && std::isalpha(static_cast<unsigned char>(name[0])) && name[1] == ':' &&
+         (name[2] == '\\' || name[2] == '/');
 }
 
 }  // namespace
@@ -65,35 +139,43 @@ Expected<void> replace_file(const fs::path& path, const Write& write) {
 Expected<std::string> read_file(const fs::path& path, std::uintmax_t max_bytes) {
   std::error_code ec;
   const auto status = fs::status(path, ec);
-  if (!fs::exists(status)) return fail(Reason::missing_file, fmt::format("{}: no such file", path.string()));
+  if (!fs::exists(status))
+    return fail(
+        Reason::missing_file,
+        fmt::format("{}: {}", path.string(),
+                    ec && ec != std::errc::no_such_file_or_directory ? ec.message() : "no such file"));
   if (!fs::is_regular_file(status))
     return fail(Reason::missing_file, fmt::format("{}: not a regular file", path.string()));
   const auto size = fs::file_size(path, ec);
   if (ec || size > max_bytes)
     return fail(Reason::bad_size, fmt::format("{}: {} bytes, limit {}", path.string(), size, max_bytes));
+  errno = 0;
   std::ifstream in(path, std::ios::binary);
+  const int opening_error = in.is_open() ? 0 : errno;
   std::string bytes(size, '\0');
-  if (!in.read(bytes.data(), static_cast<std::streamsize>(size)))
-    return fail(Reason::missing_file, fmt::format("{}: cannot be read", path.string()));
+  if (!in.is_open() || !in.read(bytes.data(), static_cast<std::streamsize>(size)))
+    return fail(Reason::missing_file,
+                fmt::format("{}: cannot be read{}", path.string(),
+                            opening_error != 0 ? ": " + system_message(opening_error) : ""));
   return bytes;
 }
 
 Expected<void> write_file(const fs::path& path, std::string_view bytes) {
-  return write_file_with(path, [&](const fs::path& aside) { return write_bytes(aside, path, bytes); });
+  return make_folder(folder_of(path)).and_then([&] { return write_file_in_folder(path, bytes); });
 }
 
 Expected<void> write_file_in_folder(const fs::path& path, std::string_view bytes) {
-  return replace_file(path, [&](const fs::path& aside) { return write_bytes(aside, path, bytes); });
+  FileAside aside(path);
+  if (!aside.is_open() || !write_all(aside.number(), bytes))
+    return tl::unexpected<Failure>(cannot_write(path, errno));
+  return replaced(aside, path);
 }
 
 Expected<void> write_file_with(const fs::path& path, const Write& write) {
-  std::error_code ec;
-  const fs::path folder = folder_of(path);
-  fs::create_directories(folder, ec);
-  if (!fs::is_directory(folder, ec))
-    return fail(Reason::cannot_write, fmt::format("{}: is not a folder and cannot be created{}",
-                                                  folder.string(), ec ? ": " + ec.message() : ""));
-  return replace_file(path, write);
+  if (auto made = make_folder(folder_of(path)); !made) return made;
+  FileAside aside(path);
+  if (!aside.is_open()) return tl::unexpected<Failure>(cannot_write(path, errno));
+  return write(aside.open_as()).and_then([&] { return replaced(aside, path); });
 }
 
 Expected<fs::path> path_inside(const fs::path& folder, const std::string& relative) {
@@ -103,9 +185,18 @@ Expected<fs::path> path_inside(const fs::path& folder, const std::string& relati
   };
   if (relative.empty() || relative.find('\0') != std::string::npos)
     return fail(Reason::bad_value, "a file name is empty or contains a NUL");
+  if (has_drive(relative) || relative.starts_with("\\\\"))
+    return fail(
+        Reason::path_outside,
+        fmt::format("\"{}\": is an absolute path of Windows: write it relative to the folder {}, with / "
+                    "between folders",
+                    relative, folder.string()));
   const fs::path name(relative);
   if (name.is_absolute()) return outside();
   std::error_code ec;
+  if (relative.find('\\') != std::string::npos && !fs::exists(folder / name, ec))
+    return fail(Reason::missing_file,
+                fmt::format("\"{}\": no such file: write / instead of \\ between folders", relative));
   const fs::path root = fs::weakly_canonical(folder, ec);
   const fs::path target = fs::weakly_canonical(root / name, ec);
   const fs::path below = target.lexically_relative(root);

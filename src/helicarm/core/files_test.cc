@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/core/files.h"
 
+#include <csignal>
 #include <fstream>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 namespace helicarm {
@@ -33,6 +36,62 @@ TEST_F(Files, FailedWriteKeepsTheOldFileAndLeavesNoOther) {
   EXPECT_FALSE(result.has_value());
   EXPECT_EQ(*read_file(folder_ / "b.txt", 10), "old");
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
+TEST_F(Files, KilledWriterLeavesNothing) {
+  const pid_t writer = ::fork();
+  if (writer == 0) {
+    (void)write_file_with(folder_ / "b.txt", [](const fs::path& aside) -> Expected<void> {
+      std::ofstream(aside) << "half";
+      std::raise(SIGKILL);
+      return {};
+    });
+    ::_exit(1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(writer, &status, 0), writer);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+/// A full disk ends a write in the same place, by another number.
+TEST_F(Files, FailureNamesTheSystemsCause) {
+  ASSERT_TRUE(write_file(folder_ / "b.txt", "old"));
+  struct rlimit before {};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const struct rlimit small { 1000, before.rlim_max };
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  const auto result = write_file(folder_ / "b.txt", std::string(5000, 'x'));
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::cannot_write);
+  EXPECT_NE(result.error().message.find("b.txt: cannot be written: File too large"), std::string::npos)
+      << result.error().message;
+  EXPECT_EQ(*read_file(folder_ / "b.txt", 10), "old");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
+TEST_F(Files, FolderThatCannotBeCreatedNamesTheCause) {
+  ASSERT_TRUE(write_file(folder_ / "file", "x"));
+  const auto result = write_file(folder_ / "file" / "sub" / "b.txt", "hello");
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().message.find("Not a directory"), std::string::npos) << result.error().message;
+}
+
+TEST_F(Files, PathsOfWindowsAreNamed) {
+  for (const char* name : {"C:\\data\\AP.dcm", "c:/data/AP.dcm", "\\\\server\\AP.dcm"}) {
+    const auto refused = path_inside(folder_, name);
+    ASSERT_FALSE(refused) << name;
+    EXPECT_EQ(refused.error().reason, Reason::path_outside);
+    EXPECT_NE(refused.error().message.find("Windows"), std::string::npos);
+  }
+  const auto refused = path_inside(folder_, "images\\AP.dcm");
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("write / instead"), std::string::npos);
+  ASSERT_TRUE(write_file(folder_ / "a\\b", "x"));
+  EXPECT_TRUE(path_inside(folder_, "a\\b"));
 }
 
 TEST_F(Files, WriteFileInFolderDoesNotCreateTheFolder) {

@@ -68,6 +68,10 @@ class StructureCheck : public nlohmann::json_sax<Json> {
     for (std::size_t start = at > 10 ? at - 10 : 0; start < at; ++start)
       if (names_non_finite(text_.substr(start)))
         return refuse(Reason::not_finite, fmt::format("a number is not finite at {}", place(start + 1)));
+    if (std::string_view(error.what()).find("ill-formed UTF-8") != std::string_view::npos)
+      return refuse(Reason::bad_json,
+                    fmt::format("not UTF-8 at {}: the file has another encoding (Latin-1?), save it as UTF-8",
+                                place(position)));
     return refuse(Reason::bad_json, fmt::format("not valid JSON at {}", place(position)));
   }
 
@@ -103,6 +107,7 @@ class StructureCheck : public nlohmann::json_sax<Json> {
 }  // namespace
 
 Expected<Json> parse_json(std::string_view text, const std::string& origin) {
+  if (is_utf_16(text)) return fail(Reason::bad_json, fmt::format("{}: is UTF-16: save it as UTF-8", origin));
   StructureCheck check(text, origin);
   if (!Json::sax_parse(text.begin(), text.end(), &check)) return tl::unexpected<Failure>(check.failure());
   return Json::parse(text.begin(), text.end());

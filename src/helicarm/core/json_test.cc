@@ -148,5 +148,15 @@ TEST(ParseJson, SyntaxErrorIsGivenByLineAndColumn) {
   EXPECT_EQ(failure.message, "case.json: not valid JSON at line 3, column 7");
 }
 
+TEST(ParseJson, OtherEncodingsAreNamed) {
+  const auto latin_1 = parse_json("{\n  \"name\": \"M\xFCller\"}", "case.json").error();
+  EXPECT_EQ(latin_1.reason, Reason::bad_json);
+  EXPECT_NE(latin_1.message.find("not UTF-8 at line 2, column 13"), std::string::npos) << latin_1.message;
+  const auto utf_16 = parse_json(std::string("\xFF\xFE{\0}\0", 6), "case.json").error();
+  EXPECT_EQ(utf_16.reason, Reason::bad_json);
+  EXPECT_NE(utf_16.message.find("UTF-16"), std::string::npos);
+  EXPECT_TRUE(parse_json("\xEF\xBB\xBF{\"name\": \"M\xC3\xBCller\"}", "case.json"));
+}
+
 }  // namespace
 }  // namespace helicarm

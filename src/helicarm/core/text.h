@@ -20,4 +20,10 @@ inline std::string without_control_characters(std::string text) {
   return text;
 }
 
+/// By its byte order mark, or the zero byte of its first letter.
+inline bool is_utf_16(std::string_view text) {
+  return text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF") ||
+         (text.size() >= 2 && (text[0] == '\0') != (text[1] == '\0'));
+}
+
 }  // namespace helicarm

@@ -18,9 +18,6 @@ std::string joined(const std::vector<std::string>& names) {
   return path;
 }
 
-/// Indentation of a line; npos of an empty one.
-std::size_t depth_of(std::string_view line) { return line.find_first_not_of(" \t\r"); }
-
 }  // namespace
 
 std::vector<FileField> xml_fields(std::string_view text, const std::string& origin) {
@@ -51,36 +48,6 @@ std::vector<FileField> xml_fields(std::string_view text, const std::string& orig
   if (!open.empty())
     throw BadInput(Reason::truncated,
                    fmt::format("{}: <{}> is not closed", origin, open.back().substr(0, 40)));
-  return fields;
-}
-
-std::vector<FileField> yaml_fields(std::string_view text, const std::string& origin) {
-  std::vector<FileField> fields;
-  std::vector<std::pair<std::size_t, std::string>> keys;  // indentation, name
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
-    const std::string_view line = text.substr(at, end - at);
-    at = end + 1;
-    const std::size_t depth = depth_of(line), colon = line.find(": "), last = line.find_last_not_of(" \t\r");
-    const bool key_alone = last != line.npos && line[last] == ':';
-    if (depth == line.npos || line[depth] == '#' || line[depth] == '%' || line[depth] == '-') continue;
-    if (colon == line.npos && !key_alone) continue;
-    const std::size_t name_end = colon == line.npos ? last : colon;
-    while (!keys.empty() && keys.back().first >= depth) keys.pop_back();
-    keys.emplace_back(depth, trimmed(line.substr(depth, name_end - depth)));
-    if (keys.size() > deepest || fields.size() > most_fields) malformed(origin, "too many YAML keys");
-    std::string path;
-    for (const auto& key : keys) path.append(1, '/').append(key.second);
-    std::string value = trimmed(line.substr(name_end + 1));
-    if (value.starts_with('[') && value.find(']') == value.npos) {  // a list over several lines
-      const std::size_t closed = text.find(']', at);
-      if (closed == text.npos)
-        throw BadInput(Reason::truncated, fmt::format("{}: {}: the list does not end", origin, path));
-      value.append(1, ' ').append(text.substr(at, closed + 1 - at));
-      at = std::min(text.find('\n', closed), text.size() - 1) + 1;
-    }
-    fields.push_back({std::move(path), std::move(value)});
-  }
   return fields;
 }
 

@@ -11,8 +11,8 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
+#include "helicarm/core/text.h"
 #include "helicarm/geometry/import_formats.h"
-#include "helicarm/geometry/rotation.h"
 
 namespace helicarm::geometry {
 namespace {
@@ -20,59 +20,19 @@ namespace {
 constexpr std::uintmax_t max_bytes = 256u << 20;  // an NRRD file includes its pixels
 constexpr double largest_number = 1e12;
 
-/// Numbers after a section's title, up to the next title.
-std::vector<double> section(const std::string& text, const std::string& title, std::size_t count,
-                            const std::string& origin) {
-  std::istringstream lines(text);
-  std::string line;
-  while (std::getline(lines, line) && trimmed(line) != title) continue;
-  const std::string where = fmt::format("{}: {}", origin, title);
-  std::vector<double> numbers;
-  while (numbers.size() < count && std::getline(lines, line)) {
-    const auto more = numbers_in(line, where);
-    numbers.insert(numbers.end(), more.begin(), more.end());
-  }
-  if (numbers.size() < count)
-    throw BadInput(Reason::truncated,
-                   fmt::format("{}: {} numbers, must be {}", where, numbers.size(), count));
-  if (numbers.size() > count)
-    throw BadInput(Reason::bad_value, fmt::format("{}: a line has too many numbers", where));
-  return numbers;
-}
-
-std::string without_line_ends(std::string text) {
-  std::ranges::replace(text, '\n', ' ');
-  return text;
-}
-
-/// XMALab's lens model is OpenCV's, beside K.
-void check_undistorted(const std::string& text, const std::string& origin, const ImportOptions& options) {
-  const auto at = text.find("undistortion");
-  if (at == std::string::npos) return;
-  const std::string where = origin + ": undistortion";
-  refuse_lens_distortion(
-      numbers_in(without_line_ends(text.substr(at + std::string_view("undistortion").size())), where), where,
-      options);
-}
-
-ImportedMatrix parse_maya_cam(const std::string& text, const std::string& origin,
-                              const ImportOptions& options) {
-  check_undistorted(text, origin, options);
-  ImportedMatrix result{
-      camera_of(section(text, "camera matrix", 9, origin), section(text, "rotation", 9, origin),
-                section(text, "translation", 3, origin), origin),
-      std::nullopt};
-  result.image_size = image_size_from(section(text, "image size", 2, origin), origin);
-  return result;
-}
-
-ImportedMatrix parse_nrrd(const std::string& text, const std::string& origin) {
+ImportedMatrix parse_nrrd(const std::string& text, const std::string& origin, const ImportOptions& options) {
   std::istringstream lines(text);
   std::optional<ImportedMatrix> result;
   std::optional<Eigen::Vector2i> size;
   constexpr std::string_view matrix_key = "Projection Matrix:=", size_key = "sizes:";
   for (std::string line; std::getline(lines, line) && !trimmed(line).empty();) {
     const std::string_view view = line;
+    const std::string name = line.substr(0, line.find(':'));
+    if (key_word(name).find("distortion") != std::string::npos &&
+        view.substr(name.size()).starts_with(":=")) {
+      const std::string where = fmt::format("{}: {}", origin, name);
+      refuse_lens_distortion(numbers_in(view.substr(name.size() + 2), where), where, options);
+    }
     if (view.starts_with(matrix_key))
       result = imported(numbers_in(view.substr(matrix_key.size()), origin + ": Projection Matrix"), origin);
     if (view.starts_with(size_key)) {
@@ -87,34 +47,56 @@ ImportedMatrix parse_nrrd(const std::string& text, const std::string& origin) {
   return *result;
 }
 
-/// "K", "R", "t" as `helicarm import --json` prints them.
+/// What `helicarm import --json` prints.
 ImportedMatrix camera_from(JsonReader& reader, const std::string& origin) {
-  using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const auto square = [&](const char* key) -> Eigen::Matrix3d {
-    return Eigen::Map<const RowMajor3>(reader.matrix(key, 3, 3, {-largest_number, largest_number}).data());
-  };
-  const Eigen::Matrix3d k = square("K");
-  Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
-  pose.topLeftCorner<3, 3>() = square("R");
-  pose.topRightCorner<3, 1>() =
-      Eigen::Vector3d(reader.numbers("t", 3, {-largest_number, largest_number}).data());
-  if (k.row(2) != Eigen::RowVector3d(0, 0, 1) || k(1, 0) != 0 || k(0, 0) == 0 || k(1, 1) == 0)
+  const auto k = reader.matrix("K", 3, 3, {-largest_number, largest_number});
+  const auto r = reader.matrix("R", 3, 3, {-largest_number, largest_number});
+  const auto t = reader.numbers("t", 3, {-largest_number, largest_number});
+  reader.raw("warnings");
+  const ImportedMatrix camera{camera_of(k, r, t, origin), std::nullopt, {}, true};
+  const View given =
+      imported(reader.matrix("projection", 3, 4, {-largest_number, largest_number}), origin).view;
+  const Projection own = camera.view.projection(), stated = given.projection();
+  constexpr double rounding = 1e-4;
+  if (std::min((own - stated).norm(), (own + stated).norm()) > rounding * own.norm())
     throw BadInput(Reason::bad_value,
-                   fmt::format("{}: \"K\" is not an upper triangle that ends in 1", origin));
-  reader.raw("projection");
-  return {{{k(0, 0), k(1, 1), k(0, 2), k(1, 2), k(0, 1)},
-           value_or_throw(rigid_transform_from(pose, origin + ": \"R\""))},
-          std::nullopt};
+                   fmt::format("{}: \"projection\" is not that of \"K\", \"R\" and \"t\"", origin));
+  return camera;
 }
 
-ImportedMatrix parse_json_matrix(const std::string& text, const std::string& origin) {
+/// The first three rows; a rigid 4x4 matrix is no camera.
+ImportedMatrix from_4x4(std::vector<double> numbers, const std::string& origin) {
+  if (numbers[12] != 0 || numbers[13] != 0 || numbers[14] != 0 || numbers[15] != 1)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: the last row of a 4x4 matrix must be 0 0 0 1", origin));
+  numbers.resize(12);
+  ImportedMatrix camera = imported(numbers, origin);
+  constexpr double least_focal_px = 20;
+  const double focal = std::min(std::abs(camera.view.intrinsics.fx), std::abs(camera.view.intrinsics.fy));
+  if (focal < least_focal_px)
+    throw BadInput(
+        Reason::unsupported,
+        fmt::format("{}: a 4x4 matrix that is no projection (focal length {:.3g} px, at least {:g}): it "
+                    "has no camera; of a pose, give K, R and t",
+                    origin, focal, least_focal_px));
+  return camera;
+}
+
+ImportedMatrix parse_json_matrix(const std::string& text, const std::string& origin,
+                                 const ImportOptions& options) {
   Json json = value_or_throw(parse_json(text, origin));
   if (json.is_array()) json = Json{{"projection", std::move(json)}};
+  if (!json.contains("projection") && holds_camera(json)) return camera_of_keys(json, origin, options);
+  if (!json.contains("projection") && json.size() == 1 && json.front().is_array() && json.front().size() == 4)
+    json = Json{{"projection", Json(json.front())}};
   JsonReader reader(json, origin);
-  ImportedMatrix result =
-      reader.has("K")
-          ? camera_from(reader, origin)
-          : imported(reader.matrix("projection", 3, 4, {-largest_number, largest_number}), origin);
+  const bool has_4_rows = json["projection"].is_array() && json["projection"].size() == 4;
+  const auto projection = [&] {
+    return reader.matrix("projection", has_4_rows ? 4 : 3, 4, {-largest_number, largest_number});
+  };
+  ImportedMatrix result = reader.has("K") ? camera_from(reader, origin)
+                          : has_4_rows    ? from_4x4(projection(), origin)
+                                          : imported(projection(), origin);
   if (reader.has("image_size"))
     result.image_size = image_size_from(reader.numbers("image_size", 2, {1, largest_side_px}), origin);
   reader.raw("image_size");
@@ -150,15 +132,33 @@ ImportedMatrix from_dlt(const std::vector<std::vector<double>>& rows, const std:
   return result;
 }
 
+/// "3532,97 0;" separates by blanks or semicolons and writes the decimal point as a comma.
+bool has_decimal_commas(std::string_view text) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  const bool other_separators = text.find_first_of("; \t") != text.npos;
+  for (std::size_t at = text.find(','); at != text.npos; at = text.find(',', at + 1))
+    if (at == 0 || at + 1 == text.size() || !is_digit(text[at - 1]) || !is_digit(text[at + 1])) return false;
+  return other_separators && text.find(',') != text.npos;
+}
+
 ImportedMatrix parse_text_matrix(const std::string& text, const std::string& origin,
                                  const ImportOptions& options) {
   constexpr std::size_t dlt_rows = 11, most_rows = 12;
   std::istringstream lines(text);
   std::vector<std::vector<double>> rows;
-  for (std::string line; rows.size() <= most_rows && std::getline(lines, line);)
-    if (!line.starts_with('#'))
-      if (auto row = numbers_in(line, origin); !row.empty()) rows.push_back(std::move(row));
+  for (std::string line; rows.size() <= most_rows && std::getline(lines, line);) {
+    if (line.starts_with('#')) continue;
+    if (has_decimal_commas(trimmed(line)))
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{}: \"{}\": numbers with a decimal comma: write them with a point", origin,
+                                 without_control_characters(trimmed(line).substr(0, 40))));
+    if (auto row = numbers_in(line, origin); !row.empty()) rows.push_back(std::move(row));
+  }
+  const auto all_have = [&](std::size_t count) {
+    return std::ranges::all_of(rows, [&](const auto& row) { return row.size() == count; });
+  };
   if (rows.size() == dlt_rows) return from_dlt(rows, origin, options);
+  if (rows.size() == 5 && all_have(3)) return from_maya_cam_1(rows, origin, options);
   std::vector<double> numbers;
   for (const auto& row : rows) {
     if (row.size() != 4 && row.size() != 12)
@@ -166,35 +166,60 @@ ImportedMatrix parse_text_matrix(const std::string& text, const std::string& ori
                      fmt::format("{}: a row of {} numbers, a 3x4 matrix has rows of 4", origin, row.size()));
     numbers.insert(numbers.end(), row.begin(), row.end());
   }
-  return imported(numbers, origin);
-}
-
-/// Names what is not read, where the beginning of the text tells.
-void refuse_other_formats(const std::string& text, const std::string& origin) {
-  constexpr std::pair<std::string_view, std::string_view> formats[] = {
-      {"#Insight Transform File", "an ITK transform, which has no projection"},
-      {"\x89HDF", "an HDF5 file, which has no projection"},
-      {"%YAML", "a YAML file that OpenCV did not write"},
-      {"<?xml", "an XML file of neither RTK nor OpenCV"}};
-  const std::string_view beginning = std::string_view(text).substr(0, 1000);
-  for (const auto& [mark, name] : formats)
-    if (beginning.find(mark) != beginning.npos)
-      throw BadInput(Reason::unsupported, fmt::format("{}: is {}", origin, name));
+  return rows.size() == 4 && all_have(4) ? from_4x4(std::move(numbers), origin) : imported(numbers, origin);
 }
 
 ImportedMatrix parse(const std::string& text, const std::string& origin, const ImportOptions& options) {
   const auto first = text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) throw BadInput(Reason::truncated, fmt::format("{}: is empty", origin));
-  if (text.starts_with("NRRD")) return parse_nrrd(text, origin);
+  if (text.starts_with("NRRD")) return parse_nrrd(text, origin, options);
+  refuse_other_formats(text, origin);
+  const std::string_view content = std::string_view(text).substr(first);
+  const auto second = content.find_first_not_of(" \t\r\n", 1);
+  if (content[0] == '{' || (content[0] == '[' && second != content.npos && content[second] == '['))
+    return parse_json_matrix(text, origin, options);
   if (is_rtk_geometry(text)) return parse_rtk_geometry(text, origin, options);
   if (is_opencv_file(text)) return parse_opencv_camera(text, origin, options);
-  refuse_other_formats(text, origin);
-  if (text.find('\0') != std::string::npos)
-    throw BadInput(Reason::unsupported,
-                   fmt::format("{}: neither MayaCam 2, NRRD, RTK, OpenCV, JSON nor a text matrix", origin));
   if (text.find("camera matrix") != std::string::npos) return parse_maya_cam(text, origin, options);
-  if (text[first] == '{' || text.substr(first).starts_with("[[")) return parse_json_matrix(text, origin);
   return parse_text_matrix(text, origin, options);
+}
+
+/// The translation in mm. A file without a unit is in mm, unless the source would lie too near.
+void to_mm(ImportedMatrix& camera, std::optional<double> mm_per_unit, const std::string& origin) {
+  camera.view.camera_from_world.translation *= mm_per_unit.value_or(1);
+  if (!camera.view.camera_from_world.translation.allFinite())
+    throw BadInput(Reason::not_finite, fmt::format("{}: the translation is not finite in mm", origin));
+  // C-arms' sources are farther from what they show; in cm or m they seem to be nearer.
+  constexpr double least_mm = 200;
+  const double distance = camera.view.source_in_world().norm();
+  if (mm_per_unit || camera.in_mm || distance >= least_mm) return;
+  throw BadInput(
+      {Reason::usage,
+       fmt::format(
+           "{}: states no unit of length, and in mm the source lies {:.3g} mm from the world's origin "
+           "(at least {:g} mm are taken for granted): state the unit, helicarm import --unit cm ({:.4g} "
+           "mm), m or mm, and use its output",
+           origin, distance, least_mm, 10 * distance),
+       {},
+       {{"distance_mm", distance}, {"limit", least_mm}}});
+}
+
+/// What is unusual in a camera that can be right.
+void add_warnings(ImportedMatrix& camera, const std::string& origin) {
+  const Intrinsics& k = camera.view.intrinsics;
+  if (const auto flipped = mirrored_or_upwards(k)) {
+    camera.warnings.push_back(*flipped);
+    camera.warnings.back().message.insert(0, origin + ": ");
+  }
+  const auto& size = camera.image_size;
+  if (size && !(k.u0 > 0 && k.v0 > 0 && k.u0 < size->x() && k.v0 < size->y()))
+    camera.warnings.push_back(
+        {Reason::intrinsics_inconsistent,
+         fmt::format(
+             "{}: the central ray ({:.0f}, {:.0f}) lies outside the image of {} x {}: check the image size",
+             origin, k.u0, k.v0, size->x(), size->y()),
+         {},
+         {{"u0_px", k.u0}, {"v0_px", k.v0}}});
 }
 
 }  // namespace
@@ -205,15 +230,30 @@ Eigen::Matrix3d xmalab_from_pixels(int image_height) {
   return pixels;
 }
 
+std::optional<Warning> mirrored_or_upwards(const Intrinsics& k) {
+  if (k.fx * k.fy >= 0) return std::nullopt;
+  return Warning{
+      Reason::ambiguous_handedness,
+      fmt::format("fx {:.4g} and fy {:.4g} px have different signs: the image is mirrored, or its v "
+                  "points upwards; v points downwards here (height - 1 - v)",
+                  k.fx, k.fy),
+      {},
+      {{"fx_px", k.fx}, {"fy_px", k.fy}}};
+}
+
 Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, const ImportOptions& options) {
   const auto text = read_file(path, max_bytes);
   if (!text) return tl::unexpected<Failure>(text.error());
   return guarded([&] {
-    ImportedMatrix result = parse(*text, path.filename().string(), options);
-    result.view.camera_from_world.translation *= options.mm_per_unit;
-    if (!result.view.camera_from_world.translation.allFinite())
-      throw BadInput(Reason::not_finite,
-                     fmt::format("{}: the translation is not finite in mm", path.filename().string()));
+    const std::string origin = path.filename().string();
+    ImportedMatrix result = parse(without_byte_order_mark(*text), origin, options);
+    const auto &given = options.image_size, &stated = result.image_size;
+    if (given && stated && *given != *stated)
+      throw BadInput(Reason::bad_size,
+                     fmt::format("{}: is for images of {} x {}, --image-size states {} x {}", origin,
+                                 stated->x(), stated->y(), given->x(), given->y()));
+    to_mm(result, options.mm_per_unit, origin);
+    add_warnings(result, origin);
     return result;
   });
 }

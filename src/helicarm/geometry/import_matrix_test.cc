@@ -10,7 +10,7 @@ namespace helicarm::geometry {
 namespace {
 
 Reason reason_of(const std::string& text) {
-  const auto result = import_text(text);
+  const auto result = import_text(text, {.mm_per_unit = 10});
   EXPECT_FALSE(result.has_value()) << text;
   return result ? Reason::usage : result.error().reason;
 }
@@ -31,19 +31,39 @@ TEST(ImportMatrix, MayaCamValuesAreKept) {
 
 TEST(ImportMatrix, LensDistortionIsRefusedUnlessTheImagesAreUndistorted) {
   const std::string none = "\nundistortion\n0\n0\n0\n0\n0\n0\n0\n0\n";
-  EXPECT_TRUE(import_text(maya_cam + none));
+  EXPECT_TRUE(import_text(maya_cam + none, {.mm_per_unit = 10}));
   const std::string lens = maya_cam + "\nundistortion\n-0.12\n0.03\n0\n0\n0\n0\n0\n0\n";
   const auto refused = import_text(lens);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::unsupported);
   EXPECT_NE(refused.error().message.find("k1 -0.12"), std::string::npos) << refused.error().message;
-  EXPECT_TRUE(import_text(lens, {.undistorted = true}));
+  EXPECT_TRUE(import_text(lens, {.mm_per_unit = 10, .undistorted = true}));
+  const auto other_title = import_text(replaced(lens, "undistortion", "Distortion"));
+  ASSERT_FALSE(other_title);
+  EXPECT_EQ(other_title.error().reason, Reason::unsupported);
+}
+
+/// 198 units: of a file in cm, 2 m.
+TEST(ImportMatrix, UnitIsAskedForWhereMillimetresAreImplausible) {
+  const auto asked = import_text(maya_cam);
+  ASSERT_FALSE(asked);
+  EXPECT_EQ(asked.error().reason, Reason::usage);
+  EXPECT_NE(asked.error().message.find("--unit"), std::string::npos) << asked.error().message;
+  EXPECT_TRUE(import_text(maya_cam, {.mm_per_unit = 1}));
+  EXPECT_TRUE(import_text(replaced(maya_cam, "-68.5", "-685")));
 }
 
 TEST(ImportMatrix, OtherProgramsFormatsAreNamed) {
-  for (const auto& [text, name] : {std::pair{std::string("<?xml version=\"1.0\"?>\n<html></html>"), "XML"},
-                                   {std::string("\x89HDF\r\n\x1a\n"), "HDF5"},
-                                   {std::string("#Insight Transform File V1.0\n#Transform 0\n"), "ITK"}}) {
+  for (const auto& [text, name] :
+       {std::pair{std::string("<?xml version=\"1.0\"?>\n<html></html>"), "XML"},
+        {std::string("\x89HDF\r\n\x1a\n"), "HDF5"},
+        {"(Transform \"EulerTransform\")\n(NumberOfParameters 6)\n", "elastix"},
+        {"// elastix\n(Transform \"EulerTransform\")\n", "elastix"},
+        {"[cam_0]\nname = \"A\"\nmatrix = [ [ 3100.0, 0.0, 498.25,], ]\n", "anipose"},
+        {std::string("\0\0\0\0AffineTransform_double_3_3\0", 32), "ANTs"},
+        {"PK\x03\x04", "ZIP"},
+        {"\xFF\xFE[\0[\0", "UTF-16"},
+        {std::string("#Insight Transform File V1.0\n#Transform 0\n"), "ITK"}}) {
     const auto refused = import_text(text);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().reason, Reason::unsupported);
@@ -53,7 +73,7 @@ TEST(ImportMatrix, OtherProgramsFormatsAreNamed) {
 
 /// The steps of XMALab's export by hand: pixels (u + 1, height - v), divided by the last coefficient.
 TEST(ImportMatrix, DltCoefficientsOfXmalabAreTurnedIntoPixels) {
-  const auto camera = import_text(maya_cam);
+  const auto camera = import_text(maya_cam, {.mm_per_unit = 1});
   ASSERT_TRUE(camera);
   constexpr int height = 1700;
   const Eigen::Vector3d points[] = {{1, 2, 3},    {-20, 5, 12}, {7, -30, 4},
@@ -69,9 +89,12 @@ TEST(ImportMatrix, DltCoefficientsOfXmalabAreTurnedIntoPixels) {
   std::string table;
   for (int i = 0; i < 11; ++i) table += fmt::format("0.5,{}\n", l(i / 4, i % 4));
   EXPECT_EQ(reason_of(table), Reason::usage);
-  EXPECT_EQ(import_text(table, {.column = 3, .image_size = Eigen::Vector2i(1760, height)}).error().reason,
+  EXPECT_EQ(import_text(table, {.mm_per_unit = 1, .column = 3, .image_size = Eigen::Vector2i(1760, height)})
+                .error()
+                .reason,
             Reason::bad_value);
-  const auto read = import_text(table, {.column = 2, .image_size = Eigen::Vector2i(1760, height)});
+  const auto read =
+      import_text(table, {.mm_per_unit = 1, .column = 2, .image_size = Eigen::Vector2i(1760, height)});
   ASSERT_TRUE(read) << read.error().message;
   for (const Eigen::Vector3d& point : points)
     EXPECT_LT((read->view.project(point) - camera->view.project(point)).norm(), 1e-6);
@@ -115,6 +138,45 @@ TEST(ImportMatrix, SameMatrixAsTextJsonAndNrrd) {
   EXPECT_EQ(*nrrd->image_size, Eigen::Vector2i(1024, 760));
 }
 
+TEST(ImportMatrix, ByteOrderMarkPlusSignsAndAFourthRowAreRead) {
+  expect_matrix(import_text("\xEF\xBB\xBF" + rows));
+  expect_matrix(import_text(replaced(rows, "744.3", "+744.3")));
+  expect_matrix(import_text(rows + "0 0 0 1\n"));
+  expect_matrix(
+      import_text("[\n [-506.148,0,-3532.97,376726],[-384,-3532.97,0,285811],[-1,0,0,744.3],[0,0,0,1]\n]"));
+  EXPECT_EQ(import_text(rows + "0 0 1 0\n").error().reason, Reason::bad_value);
+  EXPECT_EQ(import_text("1 0 0 5\n0 1 0 6\n0 0 1 700\n0 0 0 1\n").error().reason, Reason::unsupported);
+}
+
+TEST(ImportMatrix, DecimalCommasAreNamed) {
+  const auto refused = import_text("-506,148 0 -3532,97 376726\n-384 -3532,97 0 285811\n-1 0 0 744,3\n");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::bad_value);
+  EXPECT_NE(refused.error().message.find("decimal comma"), std::string::npos) << refused.error().message;
+}
+
+TEST(ImportMatrix, ProjectionThatIsNotOfItsKRAndTIsRefused) {
+  const std::string json = R"({"K": [[4000,0,512],[0,4000,500],[0,0,1]], "R": [[1,0,0],[0,1,0],[0,0,1]],
+      "t": [0,0,700], "projection": [[4000,0,512,358400],[0,4000,500,350000],[0,0,1,700]], "image_size": null,
+      "warnings": []})";
+  EXPECT_TRUE(import_text(json)) << import_text(json).error().message;
+  EXPECT_EQ(import_text(replaced(json, "358400", "368400")).error().reason, Reason::bad_value);
+}
+
+TEST(ImportMatrix, MirroredCameraIsWarnedOf) {
+  const auto upwards = import_text("600 0 512 409600\n0 -600 512 409600\n0 0 1 800\n");
+  ASSERT_TRUE(upwards);
+  ASSERT_EQ(upwards->warnings.size(), 1u);
+  EXPECT_EQ(upwards->warnings[0].reason, Reason::ambiguous_handedness);
+  EXPECT_TRUE(import_text(rows)->warnings.empty());
+}
+
+TEST(ImportMatrix, TwoImageSizesThatDifferAreRefused) {
+  EXPECT_EQ(
+      import_text(maya_cam, {.mm_per_unit = 10, .image_size = Eigen::Vector2i(1024, 1024)}).error().reason,
+      Reason::bad_size);
+}
+
 TEST(ImportMatrix, NegativeScaleIsRemovedAndAMirroredImageKept) {
   const auto result = import_text("600 0 512 409600\n0 -600 512 409600\n0 0 1 800\n");
   ASSERT_TRUE(result.has_value());
@@ -127,7 +189,7 @@ TEST(ImportMatrix, NegativeScaleIsRemovedAndAMirroredImageKept) {
 TEST(ImportMatrix, TranslationThatOverflowsInMillimetresIsNotFinite) {
   std::string far = maya_cam;
   far.replace(far.find("125.25"), 6, "1e308");
-  EXPECT_TRUE(import_text(far).has_value());
+  EXPECT_TRUE(import_text(far, {.mm_per_unit = 1}).has_value());
   EXPECT_EQ(import_text(far, {.mm_per_unit = 10}).error().reason, Reason::not_finite);
 }
 

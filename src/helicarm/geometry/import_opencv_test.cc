@@ -123,5 +123,148 @@ TEST(ImportOpenCv, BrokenFilesAreNamed) {
   }
 }
 
+/// As PyYAML writes it, with OpenCV's numbers.
+const std::string py_yaml = R"(camera_name: left, upper
+calibrated: 2026-05-04 10:00:00
+image_width: 1024
+image_height: 760
+camera_matrix:
+- - 4012.5
+  - 0.0
+  - 511.25
+- [0.0, 3998.75,
+   380.5]
+- - 0.0
+  - 0.0
+  - 1.0
+distortion_coefficients:
+- 0.0
+- 0.0
+- -0.0
+rvec:
+- 0.3
+- -1.1
+- 0.45
+tvec: !!python/tuple
+- 12.5
+- -8.25
+- 905.0
+)";
+
+TEST(ImportOpenCv, YamlOfPyYamlIsRead) {
+  expect_opencv_pixels(import_text(py_yaml));
+  expect_opencv_pixels(import_text("%YAML:1.0\n---\n" + py_yaml));
+  const auto refused = import_text(replaced(py_yaml, "- -0.0", "- -0.21"));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::unsupported);
+}
+
+TEST(ImportOpenCv, CameraInfoOfRosWithAPoseIsRead) {
+  expect_opencv_pixels(import_text(R"(image_width: 1024
+image_height: 760
+camera_name: narrow
+camera_matrix:
+  rows: 3
+  cols: 3
+  data: [4012.5, 0, 511.25, 0, 3998.75, 380.5, 0, 0, 1]
+distortion_model: plumb_bob
+distortion_coefficients:
+  rows: 1
+  cols: 5
+  data: [0, 0, 0, 0, 0]
+projection_matrix:
+  rows: 3
+  cols: 4
+  data: [4012.5, 0, 511.25, 0, 0, 3998.75, 380.5, 0, 0, 0, 1, 0]
+rvec: [0.3, -1.1, 0.45]
+tvec: [12.5, -8.25, 905]
+)"));
+}
+
+std::string json_camera(const std::string& more, const std::string& k = "camera_matrix") {
+  return "{\"image_width\": 1024, \"image_height\": 760, \"" + k +
+         "\": [[4012.5, 0, 511.25], [0, 3998.75, 380.5], [0, 0, 1]], \"rvec\": [[0.3], [-1.1], [0.45]], "
+         "\"tvec\": [12.5, -8.25, 905]" +
+         (more.empty() ? "" : ", " + more) + "}";
+}
+
+TEST(ImportOpenCv, JsonIsReadUnderTheUsualNames) {
+  for (const char* k : {"camera_matrix", "cameraMatrix", "K", "intrinsic_matrix", "mtx"})
+    expect_opencv_pixels(import_text(json_camera("\"dist\": [0, 0, 0, 0]", k)));
+  expect_opencv_pixels(import_text(json_camera(
+      R"("D": {"type_id": "opencv-matrix", "rows": 1, "cols": 4, "dt": "d", "data": [0, 0, 0, 0]})")));
+}
+
+TEST(ImportOpenCv, LensIsRefusedUnderEveryName) {
+  for (const char* lens : {"\"dist_coeff\": [-0.2, 0.1]",
+                           "\"distortion\": [-0.2]",
+                           "\"distCoeffs\": [[-0.2, 0]]",
+                           "\"D\": [0, 0.1]",
+                           "\"d\": [0.1]",
+                           "\"kc\": [0.1]",
+                           "\"dist_params\": [0.1]",
+                           "\"cam_dist\": [0.1]",
+                           "\"kappa\": 0.1",
+                           "\"k1\": -0.2",
+                           "\"p2\": 1e-4",
+                           "\"K1\": 0.1",
+                           "\"dist\": [0.1]",
+                           "\"distortion\": {\"k1\": 0, \"k2\": 0.1}",
+                           "\"RadialDistortion\": [0.1, 0]",
+                           "\"lens\": {\"radial\": [0.1]}",
+                           "\"intrinsics_extra\": {\"coeffs\": [0.1]}",
+                           "\"xi\": 0.8",
+                           "\"distortion\": \"see lens.txt\"",
+                           "\"distortion_model\": \"equidistant\"",
+                           "\"camera_model\": \"fisheye\", \"D\": [0, 0, 0, 0]",
+                           "\"fisheye_model\": 1",
+                           "\"distortion_coefficients\": {\"rows\": 1, \"cols\": 2, \"data\": [0, 0.1]}"}) {
+    const auto refused = import_text(json_camera(lens));
+    ASSERT_FALSE(refused) << lens;
+    EXPECT_EQ(refused.error().reason, Reason::unsupported) << refused.error().message;
+    expect_opencv_pixels(import_text(json_camera(lens), {.undistorted = true}));
+  }
+}
+
+TEST(ImportOpenCv, NoLensIsAccepted) {
+  for (const char* none : {"\"dist_coeff\": [0, 0]", "\"distortion\": null", "\"D\": []", "\"k1\": 0",
+                           "\"distortion_model\": \"plumb_bob\"", "\"distance_mm\": 900",
+                           "\"undistorted\": true", "\"fisheye_model\": 0", "\"model\": \"Arcadis Orbic\"",
+                           "\"P1\": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]"})
+    expect_opencv_pixels(import_text(json_camera(none)));
+}
+
+TEST(ImportOpenCv, TwoNumbersForOneThingMustAgree) {
+  EXPECT_TRUE(import_text(json_camera("\"skew\": 0")));
+  for (const char* more :
+       {"\"skew\": 12", "\"image_size\": [760, 1024]", "\"R\": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+        "\"K\": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]"}) {
+    const auto refused = import_text(json_camera(more));
+    ASSERT_FALSE(refused) << more;
+    EXPECT_EQ(refused.error().reason, Reason::bad_value) << refused.error().message;
+  }
+}
+
+TEST(ImportOpenCv, DeepNestingIsRefused) {
+  const std::string start = "%YAML:1.0\n---\nK: ";
+  std::string items, columns = start + "\n", tags = "<?xml version=\"1.0\"?>\n<opencv_storage>";
+  for (int i = 0; i < 2000; ++i) {
+    items += "- ";
+    columns += std::string(std::size_t(i) + 1, ' ') + "a:\n";
+    tags += "<a>";
+  }
+  for (const std::string& text :
+       {start + std::string(100000, '['), start + std::string(100000, '[') + std::string(100000, ']'),
+        start + "\n  " + items + "1\n", columns, tags, tags + "</opencv_storage>"})
+    EXPECT_FALSE(import_text(text));
+}
+
+TEST(ImportOpenCv, StereoPairIsNamedByItsKeys) {
+  const auto refused = import_text("%YAML:1.0\n---\nM1: [1, 0, 0]\nD1: [0.1]\nM2: [1]\n");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::truncated);
+  EXPECT_NE(refused.error().message.find("M1, D1, M2"), std::string::npos) << refused.error().message;
+}
+
 }  // namespace
 }  // namespace helicarm::geometry

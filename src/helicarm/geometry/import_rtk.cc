@@ -101,6 +101,7 @@ ImportedMatrix parse_rtk_geometry(std::string_view text, const std::string& orig
   const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = projection;
   ImportedMatrix result = imported({rows.data(), rows.data() + rows.size()}, origin);
   result.image_size = options.image_size;
+  result.in_mm = true;
   return result;
 }
 

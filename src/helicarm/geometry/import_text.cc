@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/text.h"
 #include "helicarm/geometry/decomposition.h"
 #include "helicarm/geometry/import_formats.h"
 #include "helicarm/geometry/rotation.h"
@@ -16,11 +17,14 @@ using CameraRows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 double number_from(std::string_view word, const std::string& where) {
   double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  const bool plus = word.size() > 1 && word[0] == '+' && word[1] != '-';  // from_chars reads no plus
+  const auto [end, error] = std::from_chars(word.data() + plus, word.data() + word.size(), value);
   if (error == std::errc::result_out_of_range || (error == std::errc() && !std::isfinite(value)))
     throw BadInput(Reason::not_finite, fmt::format("{}: \"{}\" is not finite", where, word));
   if (error != std::errc() || end != word.data() + word.size())
-    throw BadInput(Reason::bad_value, fmt::format("{}: \"{}\" is not a number", where, word.substr(0, 40)));
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: \"{}\" is not a number", where,
+                               without_control_characters(std::string(word.substr(0, 40)))));
   return value;
 }
 
@@ -30,6 +34,11 @@ std::string trimmed(std::string_view line) {
   const auto first = line.find_first_not_of(" \t\r\n");
   return first == line.npos ? ""
                             : std::string(line.substr(first, line.find_last_not_of(" \t\r\n") - first + 1));
+}
+
+std::string without_byte_order_mark(const std::string& text) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  return text.starts_with(byte_order_mark) ? text.substr(byte_order_mark.size()) : text;
 }
 
 std::vector<double> numbers_in(std::string_view text, const std::string& where) {
@@ -74,16 +83,6 @@ View camera_of(const std::vector<double>& k_numbers, const std::vector<double>& 
                             Eigen::Map<const Eigen::Vector3d>(t.data())};
   value_or_throw(rigid_transform_from(pose.matrix(), fmt::format("{}: rotation", origin)));
   return {{k(0, 0), k(1, 1), k(0, 2), k(1, 2), k(0, 1)}, pose};
-}
-
-void refuse_lens_distortion(const std::vector<double>& coefficients, const std::string& where,
-                            const ImportOptions& options) {
-  if (options.undistorted || std::ranges::all_of(coefficients, [](double c) { return c == 0; })) return;
-  throw BadInput(
-      Reason::unsupported,
-      fmt::format("{}: the camera has a lens distortion (k1 {:g}, k2 {:g}); export undistorted images, and "
-                  "state that they are (--undistorted)",
-                  where, coefficients[0], coefficients.size() > 1 ? coefficients[1] : 0));
 }
 
 }  // namespace helicarm::geometry

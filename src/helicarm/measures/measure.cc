@@ -8,6 +8,7 @@
 
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/measures/planar.h"
+#include "helicarm/measures/reference.h"
 #include "helicarm/measures/roles.h"
 
 namespace helicarm::measures {
@@ -131,6 +132,8 @@ Expected<Measure> measured_percent(const KindInfo& info, const Placed& placed, c
     const Values percent = [&](const PlanarPoints& p) { return axes.percent(p, p[point]); };
     measure.positions.push_back(
         {clicks[point].name, percent(placed.points), propagated(percent, placed.points, placed.covariances)});
+    Position& position = measure.positions.back();
+    position.warnings = reference_warnings(axes, position, placed.points, point);
   }
   return measure;
 }

@@ -34,6 +34,9 @@ struct Position {
   std::string point;
   Eigen::VectorXd percent;     ///< by the kind's components
   Eigen::MatrixXd covariance;  ///< of the point's and the landmarks' errors
+  /// outside_reference: outside 0 to 100 % by more than the 95 % error; far outside it names the clicks whose
+  /// exchange gives a position inside.
+  std::vector<Warning> warnings = {};
 };
 
 struct Measure {

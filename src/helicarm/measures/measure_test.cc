@@ -264,6 +264,27 @@ TEST(Measure, RefusesClicksThatDetermineNothing) {
   EXPECT_THAT(refusal(Kind::femoral_quadrants, flat), HasSubstr("0 and 100 %"));
 }
 
+/// Anterior and posterior margin 100 px apart, a point at 20 %.
+TEST(Measure, PositionOutsideTheLandmarksIsWarnedOfAndTheExchangedClicksAreNamed) {
+  const auto warnings = [](double anterior, double posterior, double point) {
+    const auto measured = measure(Kind::tibia_ap,
+                                  {{"anterior", {anterior, 0}, half_px},
+                                   {"posterior", {posterior, 0}, half_px},
+                                   {"FS", {point, 0}, half_px}},
+                                  {});
+    return measured->positions[0].warnings;
+  };
+  EXPECT_TRUE(warnings(0, 100, 20).empty());
+  EXPECT_TRUE(warnings(0, 100, -0.3).empty());  // within its error
+  const auto near = warnings(0, 100, -5);
+  ASSERT_EQ(near.size(), 1u);
+  EXPECT_EQ(near[0].reason, Reason::outside_reference);
+  EXPECT_NEAR(near[0].figures.at("percent"), -5, 1e-9);
+  EXPECT_EQ(near[0].message.find("exchanged"), std::string::npos);
+  EXPECT_THAT(warnings(20, 100, 0)[0].message, HasSubstr("\"FS\" with \"anterior\" (20.0 %)"));
+  EXPECT_THAT(warnings(0, 20, 100)[0].message, HasSubstr("\"FS\" with \"posterior\" (20.0 %)"));
+}
+
 TEST(Drawing, GridOfQuartersStartsAtTheLine) {
   const auto grid = drawing_of(Kind::femoral_quadrants, femur());
   ASSERT_EQ(grid.size(), 10u);

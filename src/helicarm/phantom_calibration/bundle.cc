@@ -11,6 +11,7 @@
 #include <Eigen/SparseCore>
 #include <ceres/ceres.h>
 #include <fmt/format.h>
+#include <glog/logging.h>
 
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/phantom_calibration/gauge.h"
@@ -279,6 +280,11 @@ void describe(BundleFit& fit, const Blocks& blocks, const BundleProblem& given) 
   fit.rms_px = std::sqrt(sum / double(std::max<std::size_t>(1, count)));
 }
 
+/// Ceres reports through glog, which writes to stderr unless the program has set it up.
+void silence_ceres() {
+  if (!google::IsGoogleLoggingInitialized()) FLAGS_minloglevel = google::GLOG_FATAL;
+}
+
 }  // namespace
 
 Expected<BundleFit> adjust(const BundleProblem& given, const BundleOptions& options) {
@@ -288,6 +294,7 @@ Expected<BundleFit> adjust(const BundleProblem& given, const BundleOptions& opti
   Blocks blocks;
   if (const auto filled = fill(blocks, given, options); !filled)
     return tl::unexpected<Failure>(filled.error());
+  silence_ceres();
   ceres::Solver::Options how;
   how.linear_solver_type = ceres::DENSE_QR;
   how.max_num_iterations = options.most_iterations;

@@ -101,7 +101,8 @@ Expected<std::unique_ptr<SessionLog>> SessionLog::open(const fs::path& log) {
     if (log.has_parent_path()) fs::create_directories(log.parent_path(), ec);
     const int file = ::open(log.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
     if (file < 0)
-      throw BadInput(Reason::cannot_write, fmt::format("{}: {}", log.string(), system_message(errno)));
+      throw BadInput(Reason::cannot_write,
+                     fmt::format("{}: {}", log.string(), system_message(ec ? ec.value() : errno)));
     std::unique_ptr<SessionLog> session(new SessionLog(log, file));
     if (::flock(file, LOCK_EX | LOCK_NB) != 0)
       throw BadInput(Reason::cannot_write, fmt::format("{}: is open in another program", log.string()));

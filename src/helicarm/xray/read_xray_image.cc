@@ -5,6 +5,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
+#include "helicarm/geometry/import_matrix.h"
 #include "helicarm/image/png.h"
 #include "helicarm/image/tiff.h"
 #include "helicarm/xray/dicom_acquisition.h"
@@ -18,6 +19,12 @@ namespace {
 
 Acquisition read_sidecar(const fs::path& path) {
   const Json json = value_or_throw(read_json(path));
+  if (geometry::holds_camera(json))
+    throw BadInput(
+        Reason::unsupported,
+        fmt::format("{}: lies where an image's \"pixel_mm\" and \"source_detector_mm\" are expected, "
+                    "and holds a camera: rename it, e.g. {}_camera.json",
+                    path.filename().string(), path.stem().string()));
   JsonReader reader(json, path.filename().string());
   Acquisition acquisition;
   if (const auto pixel_mm = reader.optional_number("pixel_mm", {min_pixel_mm, max_pixel_mm}))

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <memory>
 #include <mutex>
@@ -15,6 +16,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/system_message.h"
 #include "helicarm/image/grey_image.h"
 #include "helicarm/xray/dicom_time.h"
 #include "helicarm/xray/uid.h"
@@ -262,9 +264,12 @@ Expected<void> write_dicom(const fs::path& path, const DerivedImage& image) {
   });
   if (!file) return tl::unexpected<Failure>(file.error());
   return write_file_with(path, [&](const fs::path& aside) -> Expected<void> {
+    errno = 0;
     const OFCondition status = (*file)->saveFile(aside.c_str(), syntax);
-    if (status.bad()) return fail(Reason::cannot_write, fmt::format("{}: {}", path.string(), status.text()));
-    return {};
+    if (status.good()) return {};
+    const int error = errno;  // DCMTK calls a full disk "I/O suspension"
+    return fail(Reason::cannot_write, fmt::format("{}: cannot be written: {}", path.string(),
+                                                  error != 0 ? system_message(error) : status.text()));
   });
 }
 

@@ -74,8 +74,8 @@ Expected<std::unique_ptr<Inbox>> Inbox::open(const fs::path& folder) {
   std::error_code ec;
   const bool made = fs::create_directories(folder, ec);
   if (ec || !fs::is_directory(folder))
-    return fail(Reason::cannot_write,
-                fmt::format("{}: is not a folder and cannot be created", folder.string()));
+    return fail(Reason::cannot_write, fmt::format("{}: is not a folder and cannot be created{}",
+                                                  folder.string(), ec ? ": " + ec.message() : ""));
   if (made) fs::permissions(folder, fs::perms::owner_all, ec);
   const int lock = ::open((folder / lock_name).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock < 0)
