@@ -4,6 +4,7 @@
 #include "arrays.h"
 #include "checks.h"
 #include "held_calibration.h"
+#include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/run_case.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -41,7 +42,10 @@ pipeline::Result run(const std::filesystem::path& folder, const std::string& met
   }
   options.threads = threads;
   value_or_raise(check_fields<pipeline::RunOptions>(pipeline::run_fields, options, "run_case"));
-  if (history) options.history = value_or_raise(calibration::history_at(*history));
+  if (history) {
+    value_or_raise(calibration::check_history_file(*history));
+    options.history = value_or_raise(calibration::history_at(*history));
+  }
   const RunHooks hooks = run_hooks(progress);
   options.on_stage = hooks.on_stage;
   options.on_view = hooks.on_view;
@@ -52,10 +56,7 @@ pipeline::Result run(const std::filesystem::path& folder, const std::string& met
   result.options.on_stage = nullptr;
   result.options.on_view = nullptr;
   if (result.failure) raise(*result.failure, py::cast(result));
-  if (history) {
-    calibration::add_entries(*options.history, result.entries);
-    value_or_raise(write_file(*history, to_text(calibration::to_json(*options.history)) + "\n"));
-  }
+  if (history) value_or_raise(calibration::add_to_history(*history, result.entries));
   return result;
 }
 
