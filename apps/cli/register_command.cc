@@ -6,6 +6,7 @@
 #include "helicarm/case_registration/follow_case.h"
 #include "helicarm/core/json.h"
 #include "helicarm/pipeline/registration_case.h"
+#include "helicarm/report/earlier_results.h"
 #include "progress_line.h"
 
 namespace helicarm::cli {
@@ -36,13 +37,6 @@ void print(const RegisteredModel& model, std::ostream& out) {
                        point.place.in_calibrator.x(), point.place.in_calibrator.y(),
                        point.place.in_calibrator.z(),
                        localization::length_at_95(point.place.covariance_in_calibrator));
-}
-
-/// Files of an earlier run could be taken for an answer.
-void forget(const std::filesystem::path& out) {
-  std::error_code ignored;
-  for (const char* file : {"registration.json", "report.html", "registration.csv", "relative.csv"})
-    std::filesystem::remove(out / file, ignored);
 }
 
 /// Every model through a sequence of images.
@@ -81,7 +75,7 @@ void follow(const RegisterArguments& arguments, const case_registration::Registe
 
 CommandResult register_command(const RegisterArguments& arguments, Console& console) {
   return guarded([&] {
-    forget(arguments.out);
+    report::forget_registration(arguments.out);
     case_registration::RegisterOptions options = arguments.options;
     options.threads = console.threads;
     if (!console.quiet)

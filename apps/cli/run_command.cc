@@ -6,10 +6,13 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/advice.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/run_case.h"
+#include "helicarm/report/earlier_results.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/report/report.h"
 #include "helicarm/report/tables.h"
@@ -39,30 +42,11 @@ void print_advice(const pipeline::Result& result, const RunArguments& arguments,
     out << fmt::format("  All that was found: {}\n", (arguments.out / "report.html").string());
 }
 
-/// The views of an earlier result in the folder, if any.
-std::vector<std::string> earlier_views(const std::filesystem::path& out) {
-  std::vector<std::string> names;
-  const auto json = read_json(out / "result.json");
-  if (!json || !json->is_object() || !json->contains("views") || !(*json)["views"].is_array()) return names;
-  for (const Json& view : (*json)["views"])
-    if (view.is_object() && view.contains("name") && view["name"].is_string())
-      names.push_back(view["name"].get<std::string>());
-  return names;
-}
-
-/// Removes files of an earlier or incomplete run, which could be taken for an answer.
-void forget(const std::filesystem::path& out, const std::vector<std::string>& views) {
-  std::error_code ignored;
-  for (const char* file : {"result.json", "report.html"}) std::filesystem::remove(out / file, ignored);
-  for (std::size_t i = 0; i < views.size(); ++i)
-    std::filesystem::remove(out / report::overlay_name(views[i], i), ignored);
-}
-
 /// Adds each image once; nothing if the residuals are inconsistent with the noise model.
-Expected<void> add_to_c_arm_history(const std::filesystem::path& path, calibration::CArmHistory history,
-                                    const pipeline::Result& result, Console& console) {
-  const std::size_t earlier = history.entries.size();
-  const std::size_t added = calibration::add_entries(history, result.entries);
+Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pipeline::Result& result,
+                                    Console& console) {
+  const auto growth = calibration::add_to_history(path, result.entries);
+  if (!growth) return tl::unexpected<Failure>(growth.error());
   if (!console.quiet)
     console.progress << (result.variance_scale > 1
                              ? fmt::format(
@@ -70,8 +54,8 @@ Expected<void> add_to_c_arm_history(const std::filesystem::path& path, calibrati
                                    "the noise model\n",
                                    path.string(), std::sqrt(result.variance_scale))
                              : fmt::format("helicarm: {}: {} earlier acquisitions, {} added\n", path.string(),
-                                           earlier, added));
-  return write_file(path, to_text(calibration::to_json(history)) + "\n");
+                                           growth->earlier, growth->added));
+  return {};
 }
 
 /// result.json is written last, so that its presence implies the other files.
@@ -79,9 +63,11 @@ Expected<void> write(const pipeline::Result& result, const RunArguments& argumen
   auto written = arguments.no_report ? Expected<void>() : report::write_report(result, arguments.out);
   if (written) written = write_file(arguments.out / "result.json", to_text(pipeline::to_json(result)) + "\n");
   if (written) return written;
-  std::vector<std::string> views;
-  for (const pipeline::ViewResult& view : result.views) views.push_back(view.name);
-  forget(arguments.out, views);
+  std::vector<std::string> overlays;
+  for (std::size_t i = 0; i < result.views.size(); ++i)
+    overlays.push_back(report::overlay_name(result.views[i].name, i));
+  forget_files(arguments.out, overlays);
+  report::forget_results(arguments.out);
   return written;
 }
 
@@ -141,11 +127,12 @@ Expected<pipeline::Result> measure(const RunArguments& arguments, Console& conso
 
 Expected<pipeline::Result> run_and_write(const RunArguments& arguments, Console& console) {
   return guarded([&] {
-    forget(arguments.out, earlier_views(arguments.out));
+    report::forget_results(arguments.out);
+    if (arguments.history) value_or_throw(calibration::check_history_file(*arguments.history));
     const pipeline::Result result = value_or_throw(measure(arguments, console));
     value_or_throw(write(result, arguments));
     if (arguments.history && !result.failure)
-      value_or_throw(add_to_c_arm_history(*arguments.history, *result.options.history, result, console));
+      value_or_throw(add_to_c_arm_history(*arguments.history, result, console));
     return result;
   });
 }

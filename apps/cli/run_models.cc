@@ -14,8 +14,6 @@ namespace fs = std::filesystem;
 
 CommandResult run_with_models(const RunArguments& arguments, Console& console) {
   return guarded([&] {
-    std::error_code ignored;
-    fs::remove(arguments.out / "registration.json", ignored);
     std::ostringstream answer;
     Console own{answer, console.progress, console.json, console.quiet, console.threads, console.seed};
     value_or_throw(run_command(arguments, own));
