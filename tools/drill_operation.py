@@ -11,9 +11,11 @@ report the reason and end, and `helicarm replay` must reproduce the record. Need
 
 import argparse
 import json
+import math
 import os
 import pathlib
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -67,7 +69,7 @@ def drill_images(program, folder):
         time.sleep(POSE_WINDOW_S)
         devices.acquire("LAT", "^measure: ")
         devices.navigation.end(signal.SIGKILL)
-        devices.expect_replay("wrong images")
+        devices.expect_replay("wrong images", has_end=False)
     with VirtualDevices(program, folder / "order") as devices:
         devices.acquire("LAT", "waiting for AP")
         check("lateral image first is assigned to LAT",
@@ -129,7 +131,7 @@ def drill_motion(program, folder):
         devices.expect_end("disk full while the robot moves", "cannot_write", 2)
         time.sleep(0.2)
         check("     the robot is at rest", "moving" not in devices.command("where", "^tip "))
-        devices.expect_replay("disk full")
+        devices.expect_replay("disk full", has_end=False)
 
 
 def drill_stale(program, folder):
@@ -173,7 +175,7 @@ def drill_stale(program, folder):
             else:
                 devices.type("\x04")
                 devices.expect_end("     at the end of the input", "plan_stale")
-            devices.expect_replay(name)
+            devices.expect_replay(name, has_end=not words)
     with VirtualDevices(program, folder / "again", terminal=True) as devices:
         devices.register()
         devices.navigation.wait_for("^preview: ")
@@ -184,7 +186,73 @@ def drill_stale(program, folder):
         devices.navigation.wait_for("^plan_stale: ", 30)
         devices.navigation.wait_for("press Enter")
         devices.plan_again("jump during the approach, at a terminal: unlocked, withdrawn, planned again", withdrawn=True)
-        devices.expect_replay("jump during the approach, at a terminal")
+        devices.expect_replay("jump during the approach, at a terminal", has_end=False)
+
+
+def drill_record(program, folder):
+    """The record or an image is removed or replaced by another program; nothing may move without it."""
+    def remove(devices):
+        (devices.session / "session.log").unlink()
+
+    def replace(devices):
+        log, copy = devices.session / "session.log", devices.session / "copy"
+        shutil.copy(log, copy)
+        copy.rename(log)
+
+    def remove_folder(devices):
+        shutil.rmtree(devices.session)
+
+    for name, attack in (("record removed", remove), ("record replaced by its copy", replace),
+                         ("folder removed", remove_folder)):
+        with VirtualDevices(program, folder / f"open {name}", terminal=True) as devices:
+            devices.register()
+            devices.navigation.wait_for("^preview: ")
+            devices.navigation.wait_for("Type \"go\"")
+            rest = devices.tip_mm()
+            attack(devices)
+            devices.type("go\n")
+            devices.expect_end(f"{name} while a confirmation is open", "record_lost")
+            time.sleep(1)
+            check(f"     the robot has moved by {math.dist(rest, devices.tip_mm()):.2f} mm", rest == devices.tip_mm())
+    with VirtualDevices(program, folder / "moving") as devices:
+        devices.acquire_both()
+        devices.navigation.wait_for("navigate: femur", 120)
+        devices.wait_moving()
+        begun = time.monotonic()
+        remove(devices)
+        stop_s = devices.stop_s(begun)
+        check(f"record removed during the approach: at rest after {stop_s * 1000:.0f} ms", stop_s <= 0.2)
+        devices.expect_end("record removed during the approach", "record_lost")
+    with VirtualDevices(program, folder / "image", "--picks", folder / "picks.json") as devices:
+        picks = json.loads(devices.plan.read_text())["picks"]
+        devices.acquire("AP", "waiting for LAT")
+        devices.command("shoot LAT", "shot LAT")
+        time.sleep(1)
+        ap, lat = sorted((devices.session / "inbox").glob("*.dcm"), key=lambda file: file.stat().st_mtime)
+        received = lat.read_bytes()
+        shutil.copy(ap, lat)
+        (folder / "picks.json").write_text(json.dumps({"picks": picks}))
+        devices.expect_end("image replaced in the inbox before the measurement", "image_changed")
+        lat.write_bytes(received)
+        devices.expect_replay("image replaced in the inbox")
+
+
+def drill_busy(program, folder, operations=10):
+    """Whole operations beside a busy loop on each core, as a compiler would be: all must come to their end."""
+    loops = [subprocess.Popen(["bash", "-c", "while :; do :; done"]) for _ in range(os.cpu_count())]
+    ended = []
+    try:
+        for number in range(operations):
+            with VirtualDevices(program, folder / f"busy{number}") as devices:
+                devices.acquire_both()
+                code = devices.navigation.process.wait(600)
+                ended.append("done" if code == 0 else devices.navigation.output().splitlines()[-1])
+                print(f"     operation {number + 1}: {ended[-1]}", flush=True)
+    finally:
+        for loop in loops:
+            loop.kill()
+    check(f"{ended.count('done')} of {operations} operations beside {len(loops)} busy loops come to their end",
+          ended.count("done") == operations)
 
 
 def drill_scripts(program, folder):
@@ -243,7 +311,7 @@ def drill_ends(program, folder):
             devices.navigation.end(signal.SIGKILL)
             stop_s = devices.stop_s(begun)
             check(f"SIGKILL while the robot moves: at rest after {stop_s * 1000:.0f} ms", stop_s <= 0.2)
-            devices.expect_replay("SIGKILL")
+            devices.expect_replay("SIGKILL", has_end=False)
     with VirtualDevices(program, folder / "virtual_or") as devices:
         code, seconds = devices.virtual_or.end()
         check(f"SIGTERM ends virtual-or in {seconds * 1000:.0f} ms with {code}", seconds <= 1 and code == 0)
@@ -328,7 +396,8 @@ def footprint(process):
 
 def main():
     drills = {"whole": drill_whole, "images": drill_images, "checks": drill_checks, "motion": drill_motion,
-              "stale": drill_stale, "scripts": drill_scripts, "ends": drill_ends, "system": drill_system}
+              "stale": drill_stale, "record": drill_record, "busy": drill_busy,
+              "scripts": drill_scripts, "ends": drill_ends, "system": drill_system}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default=ROOT / "build", type=pathlib.Path)
     parser.add_argument("--only", choices=drills)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """For drill_operation.py: programs with output to wait for, and `virtual-or` with `navigate`."""
 
+import json
 import math
 import os
 import pty
@@ -192,7 +193,10 @@ class VirtualDevices:
         output = self.navigation.output()
         check(f"{name}: ends with {reason}", ended == code and reason in output, output.splitlines()[-1])
 
-    def expect_replay(self, name):
-        replayed = subprocess.run([self.program, "replay", self.session], capture_output=True, text=True)
-        check(f"{name}: the record is complete and reproduced", replayed.returncode == 0,
+    def expect_replay(self, name, has_end=True):
+        """`has_end`: else the program was killed, or its disk was full; everything up to there is reproduced."""
+        replayed = subprocess.run([self.program, "replay", self.session, "--json"], capture_output=True, text=True)
+        answer = json.loads(replayed.stdout)
+        check(f"{name}: the record is {'complete' if has_end else 'without an end'} and reproduced",
+              replayed.returncode == (0 if has_end else 3) and answer["finished"] == has_end and not answer["differences"],
               (replayed.stdout + replayed.stderr).strip().splitlines()[-1])

@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
+#include "helicarm/core/private_files.h"
 #include "helicarm/pipeline/case_bundle.h"
 
 namespace helicarm::cli {
@@ -22,9 +24,9 @@ void print(const pipeline::CaseBundle& bundle, const std::filesystem::path& out,
     console.out << fmt::format("  {:<24}{:>12} bytes\n", file.name, file.bytes.size());
   for (const std::string& missing : bundle.left_out) console.out << "  left out: " << missing << '\n';
   console.out << fmt::format(
-      "\n  written to {}\n  Removed: patient data, dates, UIDs, notes, names of files, views, picks, tunnels "
-      "and "
-      "tool lines.\n  Text within the images' pixels stays: look at the images before you send the file.\n",
+      "\n  written to {}\n  Removed: patient data, dates, UIDs, notes, models with their files, names of "
+      "files, views, picks, tunnels, tool lines and bones.\n  Text within the images' pixels stays: look at "
+      "the images before you send the file.\n",
       out.string());
 }
 
@@ -32,6 +34,7 @@ void print(const pipeline::CaseBundle& bundle, const std::filesystem::path& out,
 
 CommandResult bundle_command(const BundleArguments& arguments, Console& console) {
   return guarded([&] {
+    forget_files(arguments.out.parent_path(), {arguments.out.filename().string()});
     pipeline::BundleOptions options{arguments.options, !arguments.no_run, {}};
     options.run.threads = console.threads;
     if (arguments.result)
@@ -39,7 +42,8 @@ CommandResult bundle_command(const BundleArguments& arguments, Console& console)
                                                     ? *arguments.result / "result.json"
                                                     : *arguments.result));
     const pipeline::CaseBundle bundle = value_or_throw(pipeline::bundle_case(arguments.folder, options));
-    value_or_throw(write_file(arguments.out, pipeline::tar_gz(bundle.files)));
+    value_or_throw(make_private_folder(arguments.out.has_parent_path() ? arguments.out.parent_path() : "."));
+    value_or_throw(write_private_file(arguments.out, pipeline::tar_gz(bundle.files)));
     print(bundle, arguments.out, console);
   });
 }

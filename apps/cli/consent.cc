@@ -59,7 +59,8 @@ bool Consent::agreed(const robot::RobotOrder& order, const std::function<Expecte
                     << std::flush;
   ending_.wait_until([&] {
     // Poses may be missing temporarily, for example when the line of sight is blocked.
-    if (const auto held = holds(); !held && held.error().reason == Reason::plan_stale)
+    if (const auto held = holds();
+        !held && (held.error().reason == Reason::plan_stale || held.error().reason == Reason::record_lost))
       throw BadInput(held.error());
     return input_waits();
   });

@@ -40,8 +40,8 @@ class Consent {
   Consent(robot::RobotLink& robot, const Ending& ending, bool yes, Console& console)
       : robot_(robot), ending_(ending), yes_(yes), console_(console) {}
 
-  /// The order's token. Throws BadInput (plan_stale) once the plan no longer holds, without waiting for the
-  /// answer.
+  /// The order's token. Throws BadInput once the plan no longer holds (plan_stale) or the record is lost
+  /// (record_lost), without waiting for the answer.
   Expected<std::string> operator()(
       const robot::RobotOrder& order,
       const std::function<Expected<void>()>& holds = [] { return Expected<void>(); });

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/pipeline/run_case.h"
+#include "helicarm/report/earlier_results.h"
 #include "helicarm/simulation/write_case.h"
 #include "result_files.h"
 #include "result_text.h"
@@ -72,7 +73,7 @@ CommandResult demo_command(const DemoArguments& arguments, Console& console) {
     value_or_throw(simulation::check_case_folder(folder));
     value_or_throw(simulation::write_case(folder, truth));
     if (!console.quiet) console.progress << "helicarm: measuring\n\n";
-    forget_result(out);
+    report::forget_results(out);
     pipeline::RunOptions run;
     run.threads = console.threads;
     const pipeline::Result result =

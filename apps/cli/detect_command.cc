@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/csv.h"
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/detection/find_marks.h"
@@ -58,6 +59,8 @@ void print_table(const std::vector<Detected>& all, std::ostream& out) {
 
 CommandResult detect_command(const DetectArguments& arguments, Console& console) {
   return guarded([&] {
+    if (arguments.out)
+      forget_files(arguments.out->parent_path(), {arguments.out->filename().string()}, arguments.images);
     const detection::MarkKind kind = value_or_throw(detection::mark_kind(arguments.kind));
     const std::vector<std::filesystem::path> files = image_files(arguments.images);
     std::vector<Detected> all;

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/geometry/view_json.h"
@@ -68,6 +69,8 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
 
 CommandResult drr_command(const DrrArguments& arguments, Console& console) {
   return guarded([&] {
+    for (const std::filesystem::path& file : {arguments.out, arguments.raw})
+      forget_files(file.parent_path(), {file.filename().string()}, {arguments.volume});
     const volume::Ramp ramp = ramp_of(arguments.values);
     if (!arguments.centre_mm.empty() && arguments.centre_mm.size() != 3)
       throw BadInput(Reason::usage, "--centre takes three numbers");

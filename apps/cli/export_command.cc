@@ -28,6 +28,7 @@ std::vector<report::Export> exports_named(const std::vector<std::string>& words)
 
 CommandResult export_command(const ExportArguments& arguments, Console& console) {
   return guarded([&] {
+    report::forget_exports(arguments.run.out);
     const std::vector<report::Export> kinds = exports_named(arguments.as);
     const std::filesystem::path& folder = arguments.run.folder;
     if (std::filesystem::exists(folder / "result.json") && !std::filesystem::exists(folder / "case.json"))

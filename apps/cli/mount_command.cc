@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "helicarm/core/earlier_files.h"
+#include "helicarm/core/file_lock.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
@@ -174,7 +176,8 @@ Json mount_json(const tracker::MountCalibration& mount, const MountArguments& ar
 }
 
 void put_into_plan(const std::filesystem::path& file, const Json& facet) {
-  Json plan = value_or_throw(read_json(file));
+  const FileLock lock = value_or_throw(FileLock::of(file));
+  Json plan = value_or_throw(read_json(lock.file()));
   value_or_throw(operation::plan_from(plan, file.string()));
   Json& facets = plan["tracker"]["facets"];
   const auto known =
@@ -183,7 +186,7 @@ void put_into_plan(const std::filesystem::path& file, const Json& facet) {
     facets.push_back(facet);
   else
     *known = facet;
-  value_or_throw(write_file(file, to_text(plan)));
+  value_or_throw(write_file(lock.file(), to_text(plan)));
 }
 
 void print(const tracker::MountCalibration& mount, const MountArguments& arguments, Console& console) {
@@ -211,6 +214,8 @@ void print(const tracker::MountCalibration& mount, const MountArguments& argumen
 
 CommandResult calibrate_mount_command(const MountArguments& arguments, Console& console) {
   return guarded([&] {
+    forget_files(arguments.out.parent_path(), {arguments.out.filename().string()},
+                 {arguments.tip, arguments.calibrator, arguments.plan});
     if (arguments.link.peer.empty() != arguments.touch.empty())
       throw BadInput(Reason::usage, "--touch and the tracker's address:port belong together");
     const bool touches = !arguments.touch.empty() || !arguments.recorded.empty();

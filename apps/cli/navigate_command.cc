@@ -13,6 +13,7 @@
 #include "consent.h"
 #include "guide_by_hand.h"
 #include "helicarm/core/files.h"
+#include "helicarm/core/private_files.h"
 #include "helicarm/core/text.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/phantom/calibrator.h"
@@ -149,8 +150,9 @@ void go_to(const operation::PlannedTunnel& tunnel, operation::Operation& operati
   std::optional<robot::RobotOrder> begun;  // the tool is on its way by this order, or there
   bool reached = false;
   const auto withdraw = [&] {
-    value_or_throw(
-        operation.withdraw(*begun, rest, [&](const robot::RobotOrder& order) { return consent(order); }));
+    value_or_throw(operation.withdraw(*begun, rest, [&](const robot::RobotOrder& order) {
+      return consent(order, [&] { return operation.recorded(); });
+    }));
     begun.reset();
   };
   const auto approach = [&] {
@@ -198,6 +200,7 @@ void take_images(operation::Operation& operation, operation::Connections& device
     std::optional<operation::DatedArrival> image;
     ending.wait_until([&] { return (image = devices.next_image(0)).has_value(); });
     const auto taken = operation.take(view, image->arrival, image->time_s);
+    if (!taken && taken.error().reason == Reason::record_lost) throw BadInput(taken.error());
     if (!taken)
       console.progress << fmt::format("{}: {}: {}; acquire this view again\n", view,
                                       code(taken.error().reason),
@@ -215,9 +218,34 @@ void drive_robot(const operation::OperationPlan& plan, const NavigateArguments& 
   ending.wait_until([&] { return robot.wait_connected({}) || std::chrono::steady_clock::now() > until; });
   value_or_throw(robot.unlock("the operator at the terminal"));
   print_tour(value_or_throw(operation.preview_tour()), console);
-  value_or_throw(operation.register_robot([&](const robot::RobotOrder& order) { return consent(order); }));
+  value_or_throw(operation.register_robot(
+      [&](const robot::RobotOrder& order) { return consent(order, [&] { return operation.recorded(); }); }));
   for (const operation::PlannedTunnel& tunnel : plan.tunnels)
     go_to(tunnel, operation, robot, arguments.out, consent, input, ending, console);
+}
+
+/// From the first image to the last tunnel.
+void carry_out(const operation::OperationPlan& plan, const NavigateArguments& arguments,
+               operation::Operation& operation, operation::Connections& devices, StopSignal& stop,
+               Console& console) {
+  const Ending ending(stop, plan.drill ? nullptr : &devices.robot(), operation);
+  operation.confirmed_by(arguments.yes ? "--yes" : "the person at the terminal");
+  wait_for_devices(plan, devices, ending, console);
+  LineInput input(STDIN_FILENO);
+  for (const operation::PlannedCheck& each : plan.check_points)
+    touch_point(operation, each.name, input, ending, console);
+  take_images(operation, devices, ending, console);
+  if (!arguments.picks.empty()) {
+    ending.wait_until([&] { return fs::exists(arguments.picks); });
+    operation.pick(picks_of(arguments.picks));
+  }
+  value_or_throw(operation.measure());
+  print_points(operation.result(), console);
+  if (plan.drill)
+    for (const operation::PlannedTunnel& tunnel : plan.tunnels)
+      guide_by_hand(tunnel, operation, input, ending, console);
+  else
+    drive_robot(plan, arguments, operation, devices.robot(), input, ending, console);
 }
 
 }  // namespace
@@ -229,28 +257,14 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     if (arguments.plan_age_s) plan.limits.age_s = *arguments.plan_age_s;
     check_plan(plan, arguments);
     StopSignal stop;
+    value_or_throw(make_private_folder(arguments.out));
     operation::Connections devices(plan, value_or_throw(receiver::Inbox::open(arguments.out / "inbox")));
     value_or_throw(devices.listen(arguments.receiver));
     const auto operation = begin(plan, arguments.out, devices, console);
-    const Ending ending(stop, plan.drill ? nullptr : &devices.robot(), *operation);
-    operation->confirmed_by(arguments.yes ? "--yes" : "the person at the terminal");
-    wait_for_devices(plan, devices, ending, console);
-    LineInput input(STDIN_FILENO);
-    for (const operation::PlannedCheck& each : plan.check_points)
-      touch_point(*operation, each.name, input, ending, console);
-    take_images(*operation, devices, ending, console);
-    if (!arguments.picks.empty()) {
-      ending.wait_until([&] { return fs::exists(arguments.picks); });
-      operation->pick(picks_of(arguments.picks));
-    }
-    value_or_throw(operation->measure());
-    print_points(operation->result(), console);
-    if (plan.drill)
-      for (const operation::PlannedTunnel& tunnel : plan.tunnels)
-        guide_by_hand(tunnel, *operation, input, ending, console);
-    else
-      drive_robot(plan, arguments, *operation, devices.robot(), input, ending, console);
-    value_or_throw(operation->finish());
+    const auto done = guarded([&] { carry_out(plan, arguments, *operation, devices, stop, console); });
+    const auto recorded = operation->finish(done ? std::nullopt : std::optional(done.error()));
+    value_or_throw(done);
+    value_or_throw(recorded);
   });
 }
 

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/phantom/body.h"
 #include "helicarm/phantom/calibrator.h"
@@ -210,12 +211,25 @@ void print(const phantom_calibration::PhantomResult& result, const std::filesyst
       out.string());
 }
 
+/// The measured calibrator must not replace the nominal file, which the case reads.
+void refuse_own_calibrator(const std::filesystem::path& given, const std::filesystem::path& out) {
+  const auto json = read_json(pipeline::case_file(given));
+  if (!json || !json->is_object() || !json->value("calibrator", Json()).is_string()) return;
+  std::error_code ignored;
+  const std::filesystem::path nominal =
+      pipeline::folder_of_case(given) / (*json)["calibrator"].get<std::string>();
+  if (std::filesystem::equivalent(nominal, out / "calibrator.json", ignored))
+    throw BadInput(Reason::usage,
+                   fmt::format("--out {}: its calibrator.json is the nominal file of the case: "
+                               "choose another folder",
+                               out.string()));
+}
+
 void measure(const PhantomArguments& arguments, Console& console) {
   if (!arguments.out) throw BadInput(Reason::usage, "phantom measure: --out DIR is required");
   const std::filesystem::path& out = *arguments.out;
-  std::error_code ignored;
-  for (const char* file : {"calibrator.json", "result.json", "report.html"})
-    std::filesystem::remove(out / file, ignored);
+  refuse_own_calibrator(arguments.name_or_file, out);
+  forget_files(out, {"calibrator.json", "result.json", "report.html"});
   const phantom_calibration::PhantomResult result = measured(arguments, console);
   notify(result.warnings, console);
   value_or_throw(phantom_calibration::write_phantom(result, out));
@@ -244,6 +258,7 @@ void print(const phantom_calibration::PhantomVerification& result, Console& cons
 }
 
 void verify(const PhantomArguments& arguments, Console& console) {
+  if (arguments.out) forget_files(*arguments.out, {"result.json", "report.html"});
   const pipeline::Case given = value_or_throw(pipeline::read_case(arguments.name_or_file));
   phantom_calibration::PhantomVerification result =
       value_or_throw(phantom_calibration::verify_phantom(given, console.threads));

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "helicarm/core/file_lock.h"
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/case_picks.h"
@@ -40,7 +41,8 @@ void open_desktop(const fs::path& with, const fs::path& folder) {
 }
 
 void add_from(const fs::path& csv, const PickArguments& arguments, Console& console) {
-  const fs::path file = pipeline::case_file(arguments.folder);
+  const FileLock lock = value_or_throw(FileLock::of(pipeline::case_file(arguments.folder)));
+  const fs::path& file = lock.file();
   const CsvTable table = value_or_throw(read_csv(csv, {"name", "view", "u_px", "v_px"}, {"sigma_px"}));
   const pipeline::PickedCase picked = value_or_throw(pipeline::with_picks(
       value_or_throw(read_json(file)), table, pipeline::folder_of_case(arguments.folder)));

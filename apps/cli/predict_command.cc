@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/c_arm_history.h"
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/localization/error_bound.h"
@@ -65,6 +66,7 @@ void write_map(const localization::TreVolume& volume, const std::filesystem::pat
 
 CommandResult predict_command(const PredictArguments& arguments, Console& console) {
   return guarded([&] {
+    if (arguments.map) forget_files(*arguments.map, {"tre.csv", "tre.vtk", "tre.svg"});
     if (2 * arguments.half_mm / arguments.step_mm + 1 > most_points_per_edge)
       throw BadInput(Reason::usage,
                      fmt::format("--step: {:g} mm over +-{:g} mm gives more than {:g} points per edge",

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rectify_command.h"
 
+#include <fstream>
+
 #include <fmt/format.h>
 
 #include "distinct_names.h"
 #include "helicarm/core/csv.h"
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/image/png.h"
 #include "helicarm/rectification/displacement_field.h"
@@ -187,11 +190,40 @@ void measure_grid(const RectifyArguments& arguments, Console& console) {
         grid.raw.mean_px, grid.raw.max_px, grid.rectified.mean_px, grid.rectified.max_px);
 }
 
+/// Whether this program wrote the image.
+bool is_own_image(const std::filesystem::path& file) {
+  std::string begin(4096, '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<std::size_t>(in.gcount()));
+  return begin.size() > 132 && begin.compare(128, 4, "DICM") == 0 && begin.find("helicarm") != begin.npos;
+}
+
+/// Files of an earlier run, except those that this one reads.
+void forget(const RectifyArguments& arguments) {
+  std::vector<std::filesystem::path> inputs = arguments.images;
+  if (arguments.map) inputs.push_back(*arguments.map);
+  if (arguments.plate) inputs.emplace_back(*arguments.plate);
+  std::vector<std::string> names{
+      "rectified.dcm", "inpainted.dcm",    "map.json",        "residuals.csv",     "displacement.nrrd",
+      "stage-raw.png", "stage-median.png", "stage-edges.png", "stage-circles.png", "stage-inpainted.png"};
+  std::error_code ec;
+  for (std::filesystem::directory_iterator entry(arguments.out, ec), end; !ec && entry != end;
+       entry.increment(ec))
+    if (const std::string name = entry->path().filename().string();
+        name.ends_with("_rectified.dcm") && is_own_image(entry->path()))
+      names.push_back(name);
+  for (const std::filesystem::path& folder : arguments.images)
+    if (std::error_code other; std::filesystem::equivalent(folder, arguments.out, other)) return;
+  forget_files(arguments.out, names, inputs);
+}
+
 }  // namespace
 
 CommandResult rectify_command(const RectifyArguments& arguments, Console& console) {
   return guarded([&] {
     const RectifyArguments& a = arguments;
+    if (!a.images.empty() && !a.points && !a.test_grid_mm) forget(a);
     if (a.stages && (!a.plate || a.method != "paper"))
       throw BadInput(Reason::usage, "rectify: --stages is of IMAGE --plate --method paper");
     if (a.model && (!a.plate || a.method == "paper"))

@@ -8,6 +8,7 @@
 #include "helicarm/case_registration/follow_case.h"
 #include "helicarm/core/json.h"
 #include "helicarm/pipeline/registration_case.h"
+#include "helicarm/report/earlier_results.h"
 #include "progress_line.h"
 
 namespace helicarm::cli {
@@ -38,13 +39,6 @@ void print(const RegisteredModel& model, std::ostream& out) {
                        point.place.in_calibrator.x(), point.place.in_calibrator.y(),
                        point.place.in_calibrator.z(),
                        localization::length_at_95(point.place.covariance_in_calibrator));
-}
-
-/// Files of an earlier run could be taken for an answer.
-void forget(const std::filesystem::path& out) {
-  std::error_code ignored;
-  for (const char* file : {"registration.json", "report.html", "registration.csv", "relative.csv"})
-    std::filesystem::remove(out / file, ignored);
 }
 
 /// Every model through a sequence of images.
@@ -89,7 +83,7 @@ std::string summary_of(const case_registration::CaseRegistration& registration) 
 
 CommandResult register_command(const RegisterArguments& arguments, Console& console) {
   return guarded([&] {
-    forget(arguments.run.out);
+    report::forget_registration(arguments.run.out);
     case_registration::RegisterOptions options = value_or_throw(options_of(arguments.run, console));
     if (!console.quiet)
       options.on_step = [&](const std::string& model, std::string_view step) {

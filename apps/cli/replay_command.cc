@@ -7,6 +7,14 @@
 #include "helicarm/operation/replay.h"
 
 namespace helicarm::cli {
+namespace {
+
+std::string end_of(const operation::ReplayReport& report) {
+  if (!report.finished) return ", operation not ended";
+  return report.ended_by.empty() ? "" : ", ended by " + report.ended_by;
+}
+
+}  // namespace
 
 CommandResult replay_command(const ReplayArguments& arguments, Console& console) {
   return guarded([&] {
@@ -20,20 +28,31 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
                               {"results", report.results},
                               {"hand_eyes", report.hand_eyes},
                               {"decisions", report.decisions},
+                              {"orders", report.orders},
+                              {"confirmations", report.confirmations},
+                              {"outcomes", report.outcomes},
+                              {"files", report.files},
+                              {"ended_by", report.ended_by.empty() ? Json() : Json(report.ended_by)},
                               {"differences", report.differences}})
                   << '\n';
     } else {
       console.out << fmt::format(
           "{} records{}{}: {} acquisitions, {} images of cases, {} results, {} hand-eye calibrations, {} "
-          "decisions on a hand-held drill\n",
-          report.records, report.torn ? " and an incomplete one" : "",
-          report.finished ? "" : ", operation not ended", report.exposures, report.images, report.results,
-          report.hand_eyes, report.decisions);
+          "orders, {} confirmed, {} outcomes, {} decisions on a hand-held drill, {} files\n",
+          report.records, report.torn ? " and an incomplete one" : "", end_of(report), report.exposures,
+          report.images, report.results, report.hand_eyes, report.orders, report.confirmations,
+          report.outcomes, report.decisions, report.files);
       for (const std::string& difference : report.differences) console.out << "  " << difference << '\n';
     }
     if (!report.differences.empty())
       throw BadInput(Reason::replay_differs,
-                     fmt::format("{} recorded values differ on recomputation", report.differences.size()));
+                     fmt::format("{} recorded values or files differ from what the record implies",
+                                 report.differences.size()));
+    if (!report.complete())
+      throw BadInput(Reason::replay_differs,
+                     fmt::format("{}: the record has no end: the program was killed or is still running, or "
+                                 "records were removed",
+                                 arguments.session.string()));
     if (!console.json) console.out << "all recorded values are reproduced bit for bit\n";
   });
 }

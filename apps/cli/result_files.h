@@ -7,9 +7,6 @@
 
 namespace helicarm::cli {
 
-/// Removes the files of an earlier result in the folder, which could be taken for an answer.
-void forget_result(const std::filesystem::path& folder);
-
 /// Writes report.html, NAME_overlay.png for each view unless `no_report`, and result.json: last, so that its
 /// presence implies the other files. After a failure none of them remains.
 Expected<void> write_result(const pipeline::Result& result, const std::filesystem::path& folder,

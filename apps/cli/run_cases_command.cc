@@ -8,9 +8,11 @@
 
 #include "distinct_names.h"
 #include "helicarm/core/csv.h"
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/pipeline/result.h"
+#include "helicarm/report/earlier_results.h"
 
 namespace helicarm::cli {
 namespace {
@@ -82,10 +84,28 @@ Failure gravest(const std::vector<CaseSummary>& cases, const fs::path& csv) {
   return failure;
 }
 
+/// Results of an earlier run of several cases in this folder, by its summary.
+void forget_earlier(const fs::path& out) {
+  std::error_code ignored;
+  const auto summary = read_csv(out / "summary.csv", {"case"},
+                                {"status", "code", "message", "points", "located", "worst_error_95_mm",
+                                 "fre_mean_mm", "tre_mean_mm", "warnings"});
+  if (summary)
+    for (std::size_t row = 0; row < summary->rows(); ++row) {
+      const fs::path name = summary->text(row, "case");
+      if (name.empty() || name != name.filename() || name == "." || name == "..") continue;
+      report::forget_results(out / name);
+      if (fs::is_directory(out / name, ignored) && fs::is_empty(out / name, ignored))
+        fs::remove(out / name, ignored);
+    }
+  forget_files(out, {"summary.csv"});
+}
+
 CommandResult run_several(const RunCasesArguments& arguments, Console& console) {
   const std::vector<std::string> names = names_of(arguments.cases);
   const fs::path csv = arguments.run.out / "summary.csv";
   std::vector<CaseSummary> done;
+  forget_earlier(arguments.run.out);
   for (std::size_t i = 0; i < names.size(); ++i) {
     RunArguments run = arguments.run;
     run.folder = arguments.cases[i];

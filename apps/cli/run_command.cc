@@ -5,8 +5,9 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/core/files.h"
+#include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/pipeline/registration_case.h"
+#include "helicarm/report/earlier_results.h"
 #include "result_files.h"
 #include "result_text.h"
 
@@ -16,10 +17,10 @@ namespace {
 using case_registration::Measurement;
 
 /// Adds each image once; nothing if the residuals are inconsistent with the noise model.
-Expected<void> add_to_c_arm_history(const std::filesystem::path& path, calibration::CArmHistory history,
-                                    const pipeline::Result& result, Console& console) {
-  const std::size_t earlier = history.entries.size();
-  const std::size_t added = calibration::add_entries(history, result.entries);
+Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pipeline::Result& result,
+                                    Console& console) {
+  const auto growth = calibration::add_to_history(path, result.entries);
+  if (!growth) return tl::unexpected<Failure>(growth.error());
   if (!console.quiet)
     console.progress << (result.variance_scale > 1
                              ? fmt::format(
@@ -27,8 +28,8 @@ Expected<void> add_to_c_arm_history(const std::filesystem::path& path, calibrati
                                    "the noise model\n",
                                    path.string(), std::sqrt(result.variance_scale))
                              : fmt::format("helicarm: {}: {} earlier acquisitions, {} added\n", path.string(),
-                                           earlier, added));
-  return write_file(path, to_text(calibration::to_json(history)) + "\n");
+                                           growth->earlier, growth->added));
+  return {};
 }
 
 /// A case whose description excludes an answer (a flat calibrator, for example) is refused like any other.
@@ -84,14 +85,13 @@ Expected<Measurement> measure(const RunArguments& arguments, Console& console) {
 
 Expected<Measurement> run_and_write(const RunArguments& arguments, Console& console) {
   return guarded([&] {
-    forget_result(arguments.out);
-    value_or_throw(case_registration::write_models({}, arguments.out));
+    report::forget_results(arguments.out);
+    if (arguments.history) value_or_throw(calibration::check_history_file(*arguments.history));
     Measurement measured = value_or_throw(measure(arguments, console));
     value_or_throw(case_registration::write_models(measured.registration, arguments.out));
     value_or_throw(write_result(measured.result, arguments.out, arguments.no_report));
     if (arguments.history && !measured.result.failure)
-      value_or_throw(add_to_c_arm_history(*arguments.history, *measured.result.options.history,
-                                          measured.result, console));
+      value_or_throw(add_to_c_arm_history(*arguments.history, measured.result, console));
     return measured;
   });
 }

@@ -116,8 +116,9 @@ Json summary(const SimulateArguments& arguments, const simulation::SimulatedCase
 
 CommandResult simulate_command(const SimulateArguments& arguments, Console& console) {
   return guarded([&] {
-    const simulation::SimulationOptions options = options_from(arguments, console);
     value_or_throw(simulation::check_case_folder(arguments.folder));
+    simulation::forget_case(arguments.folder);
+    const simulation::SimulationOptions options = options_from(arguments, console);
     const simulation::SimulatedCase simulated = value_or_throw(simulation::simulate_case(options));
     value_or_throw(simulation::write_case(arguments.folder, simulated));
     const Json written = summary(arguments, simulated);

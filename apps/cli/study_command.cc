@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/phantom/calibrator.h"
@@ -211,6 +212,8 @@ CommandResult study_command(const StudyArguments& arguments, Console& console) {
     const study::Ranks ranks;
     if (ranks.count() > 1 && ranks.leads() && !console.quiet)
       console.progress << fmt::format("helicarm: {} ranks\n", ranks.count());
+    if (ranks.leads())
+      forget_files(out, {arguments.name + ".csv", arguments.name + ".json", arguments.name + ".svg"});
     StudyRun run{arguments, console, ranks, {}};
     run.engine.threads = console.threads;
     run.engine.journal = out / (arguments.name + ".partial");

@@ -4,6 +4,7 @@
 #include "arrays.h"
 #include "checks.h"
 #include "held_calibration.h"
+#include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/case_registration/measure_case.h"
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -36,6 +37,7 @@ case_registration::Measurement run(const std::filesystem::path& folder, const st
                                    const py::object& progress) {
   case_registration::RegisterOptions options = measuring_options(
       "run_case", method, max_error_mm, motion_sigma_mm, search_mm, search_deg, threads, history);
+  if (history) value_or_raise(calibration::check_history_file(*history));
   const RunHooks hooks = run_hooks(progress);
   listen(hooks, options);
   case_registration::Measurement measured = value_or_raise(without_gil([&] {
@@ -46,10 +48,7 @@ case_registration::Measurement run(const std::filesystem::path& folder, const st
   measured.result.options.on_stage = nullptr;
   measured.result.options.on_view = nullptr;
   if (measured.result.failure) raise(*measured.result.failure, py::cast(measured));
-  if (history) {
-    calibration::add_entries(*options.run.history, measured.result.entries);
-    value_or_raise(write_file(*history, to_text(calibration::to_json(*options.run.history)) + "\n"));
-  }
+  if (history) value_or_raise(calibration::add_to_history(*history, measured.result.entries));
   return measured;
 }
 

@@ -149,7 +149,7 @@ class Controller : public QObject {
   bool picks_came_ = false;                         ///< during the measurement
   std::function<void()> next_source_;               ///< opened as soon as the work in progress has ended
   pipeline::RunOptions options_;
-  operation::FreshnessLimits freshness_;
+  std::optional<operation::FreshnessLimits> freshness_;
   QTimer images_;
   QThreadPool faults_;  ///< of the virtual devices
   QThreadPool stops_;   ///< of the robot; they wait for no other task

@@ -80,7 +80,8 @@ void Controller::open_virtual_or(const virtual_devices::VirtualDevicesOptions& o
       if (field.get(wished) != field.get(operation::OperationPlan())) field.set(plan, field.get(wished));
     const Json offered = std::exchange(plan.picks, Json::array());
     equipment.devices = std::make_unique<operation::Connections>(
-        plan, value_or_throw(receiver::Inbox::open(folder / "inbox")), freshness);
+        plan, value_or_throw(receiver::Inbox::open(folder / "inbox")),
+        freshness.value_or(operation::freshness_limits(plan.tracker)));
     receiver::ReceiverOptions receiver;
     receiver.port = 0;
     value_or_throw(equipment.devices->listen(receiver));

@@ -15,6 +15,11 @@ namespace helicarm::gui {
 /// Resources of a source. The operation and the case belong to the worker; devices and virtual devices may be
 /// used from any thread.
 struct Equipment {
+  /// Records the end of the operation.
+  ~Equipment() {
+    if (operation) static_cast<void>(operation->finish());
+  }
+
   std::unique_ptr<virtual_devices::VirtualDevices> virtual_or;
   std::unique_ptr<operation::Connections> devices;
   std::unique_ptr<operation::Operation> operation;

@@ -227,12 +227,14 @@ void ReplayPanel::verify() {
 void ReplayPanel::show_verdict(const Expected<operation::ReplayReport>& report) {
   progress_->hide();
   verify_->setEnabled(true);
-  const bool same = report && report->differences.empty();
+  const bool same = report && report->complete();
   QString text = tr("Reproduced bit for bit: acquisitions %1, images %2, results %3, registrations %4");
   if (!report) {
     text = tr("Cannot be replayed: %1").arg(QString::fromStdString(report.error().message));
   } else if (same) {
     text = text.arg(report->exposures).arg(report->images).arg(report->results).arg(report->hand_eyes);
+  } else if (report->differences.empty()) {
+    text = tr("The record has no end: the program was killed, or records were removed");
   } else {
     text = tr("These values differ on recomputation:");
     for (const std::string& difference : report->differences)

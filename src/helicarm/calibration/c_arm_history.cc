@@ -5,7 +5,11 @@
 #include <cmath>
 
 #include <Eigen/LU>
+#include <fmt/format.h>
 
+#include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/core/file_lock.h"
+#include "helicarm/core/files.h"
 #include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::calibration {
@@ -136,6 +140,28 @@ std::size_t add_entries(CArmHistory& history, std::span<const HistoryEntry> entr
     if (std::ranges::find(history.entries, entry.image, &HistoryEntry::image) == history.entries.end())
       history.entries.push_back(entry);
   return history.entries.size() - earlier;
+}
+
+Expected<HistoryGrowth> add_to_history(const std::filesystem::path& path,
+                                       std::span<const HistoryEntry> entries) {
+  return guarded([&] {
+    value_or_throw(check_history_file(path));
+    const FileLock lock = value_or_throw(FileLock::of(path));
+    CArmHistory history = value_or_throw(history_at(lock.file()));
+    HistoryGrowth growth{history.entries.size(), add_entries(history, entries)};
+    if (history.entries.size() > most_entries)
+      throw BadInput(Reason::cannot_write,
+                     fmt::format("{}: holds {} acquisitions, limit {}: begin a new file", path.string(),
+                                 growth.earlier, most_entries));
+    value_or_throw(write_file(lock.file(), to_text(to_json(history)) + "\n"));
+    return growth;
+  });
+}
+
+Expected<void> check_history_file(const std::filesystem::path& path) {
+  std::error_code ec;
+  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), ec);
+  return FileLock::of(path).map([](const FileLock&) {});
 }
 
 Expected<CArmHistory> history_from_json(const Json& json, const std::string& origin) {

@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/calibration/c_arm_history.h"
 
+#include <thread>
+
 #include <Eigen/Cholesky>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/calibration/views_test.h"
+#include "helicarm/core/temporary_folder.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -96,6 +101,32 @@ TEST(CArmHistoryJson, RoundTrip) {
   EXPECT_EQ(again->entries.at(0).image, "digest");
   EXPECT_EQ(again->entries[0].estimate_mm, history.entries[0].estimate_mm);
   EXPECT_TRUE(again->entries[0].information.isApprox(history.entries[0].information));
+}
+
+TEST(CArmHistoryFile, AdditionsAtTheSameTimeAreAllKept) {
+  const TemporaryFolder temporary;
+  const std::filesystem::path file = temporary.path() / "new" / "machine.json";
+  {
+    std::vector<std::jthread> runs;
+    for (int run = 0; run < 6; ++run)
+      runs.emplace_back([&, run] {
+        const HistoryEntry entry{fmt::format("image {}", run), "AP", nominal, Eigen::Matrix3d::Identity()};
+        const HistoryEntry same{"image of all", "LAT", nominal, Eigen::Matrix3d::Identity()};
+        EXPECT_TRUE(add_to_history(file, std::vector{entry, same}));
+      });
+  }
+  EXPECT_EQ(read_history(file)->entries.size(), 7u);
+  const auto again = add_to_history(file, read_history(file)->entries);
+  EXPECT_EQ(again->earlier, 7u);
+  EXPECT_EQ(again->added, 0u);
+}
+
+TEST(CArmHistoryFile, ThatCannotBeWrittenIsRefusedBeforehand) {
+  const TemporaryFolder temporary;
+  EXPECT_EQ(check_history_file(temporary.path()).error().reason, Reason::cannot_write);
+  EXPECT_EQ(check_history_file("/dev/null/machine.json").error().reason, Reason::cannot_write);
+  EXPECT_TRUE(check_history_file(temporary.path() / "machine.json"));
+  EXPECT_TRUE(std::filesystem::is_empty(temporary.path()));
 }
 
 TEST(CArmHistoryJson, IndefiniteInformationIsRefused) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/case_registration/measure_case.h"
 
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/run_case.h"
+#include "helicarm/report/earlier_results.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -20,16 +22,6 @@ void add_plan(const RegisteredModel& model, pipeline::Result& result) {
   for (std::size_t i = 0; i < model.tunnels.size(); ++i) {
     const pipeline::TunnelEnds& ends = model.tunnel_ends[i];
     result.model_tunnels.push_back({name, model.tunnels[i], {first + ends.start, first + ends.end}});
-  }
-}
-
-/// The folder is ours alone; what lies there belongs to an earlier measurement.
-void forget(const std::filesystem::path& details) {
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(details, ignored)) {
-    const std::string name = entry.path().filename().string();
-    if (name == "registration.json" || name == "report.html" || name.ends_with("_overlay.png"))
-      std::filesystem::remove(entry.path(), ignored);
   }
 }
 
@@ -63,9 +55,8 @@ Expected<Measurement> measure_case(const pipeline::RegistrationCase& given, cons
 Expected<void> write_models(const std::optional<CaseRegistration>& registration,
                             const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "registration.json", details = folder / "registration";
-  std::error_code ignored;
-  std::filesystem::remove(file, ignored);
-  forget(details);
+  forget_files(folder, {file.filename().string()});
+  report::forget_registration(details);
   if (!registration) return {};
   return write_registration(*registration, details).and_then([&] {
     return write_file(file, to_text(to_json(*registration)) + "\n");

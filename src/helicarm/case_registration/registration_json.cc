@@ -80,7 +80,10 @@ Json to_json(const CaseRegistration& result) {
                {"status", result.refused() ? "refused" : "ok"},
                {"failure", result.failure ? pipeline::to_json(*result.failure) : Json()},
                {"warnings", pipeline::json_list_of(result.warnings)},
+               {"views", Json::array()},
                {"models", Json::array()}};
+  for (const registration::RegistrationView& view : result.loaded.views)
+    json["views"].push_back({{"name", view.name}});
   for (const RegisteredModel& model : result.models) json["models"].push_back(json_of(model));
   json["version"] = HELICARM_VERSION;
   return json;

@@ -8,8 +8,10 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "helicarm/core/private_files.h"
 #include "helicarm/core/system_message.h"
 
 namespace helicarm {
@@ -169,6 +171,33 @@ Expected<void> write_file_in_folder(const fs::path& path, std::string_view bytes
   if (!aside.is_open() || !write_all(aside.number(), bytes))
     return tl::unexpected<Failure>(cannot_write(path, errno));
   return replaced(aside, path);
+}
+
+Expected<void> make_private_folder(const fs::path& named) {
+  const fs::path folder = named.has_filename() ? named : named.parent_path();
+  std::error_code ec;
+  if (fs::is_directory(folder, ec)) return {};
+  fs::create_directories(folder_of(folder), ec);
+  if (::mkdir(folder.c_str(), 0700) == 0 || fs::is_directory(folder, ec)) return {};
+  return fail(Reason::cannot_write, fmt::format("{}: is not a folder and cannot be created: {}",
+                                                folder.string(), ec ? ec.message() : system_message(errno)));
+}
+
+Expected<void> make_private_file(const fs::path& path) {
+  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  if (fd < 0 || ::fchmod(fd, 0600) != 0) {
+    const int error = errno;
+    if (fd >= 0) ::close(fd);
+    return fail(Reason::cannot_write, fmt::format("{}: {}", path.string(), system_message(error)));
+  }
+  ::close(fd);
+  return {};
+}
+
+Expected<void> write_private_file(const fs::path& path, std::string_view bytes) {
+  return replace_file(path, [&](const fs::path& aside) {
+    return make_private_file(aside).and_then([&] { return write_bytes(aside, path, bytes); });
+  });
 }
 
 Expected<void> write_file_with(const fs::path& path, const Write& write) {

@@ -4,9 +4,10 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/operation/case_of.h"
 #include "helicarm/operation/operation.h"
 #include "helicarm/operation/records.h"
-#include "helicarm/xray/read_xray_image.h"
+#include "helicarm/xray/read_dicom.h"
 #include "helicarm/xray/view_of.h"
 
 namespace helicarm::operation {
@@ -83,7 +84,8 @@ xray::Acquisition Operation::acquisition_of(std::string& view, const receiver::A
   if (arrival.repeated)
     throw BadInput(Reason::stale_pose,
                    fmt::format("{}: this image was received before; acquire a new one", view));
-  const xray::Acquisition header = value_or_throw(xray::read_xray_image(arrival.path, view, 1)).acquisition;
+  const std::string bytes = value_or_throw(received_image(arrival.path, arrival.digest));
+  const xray::Acquisition header = value_or_throw(xray::read_dicom(bytes, view, 1)).acquisition;
   refuse_other_views(view, header);
   if (const std::string acquired_view = xray::view_of(header, view, views_to_come());
       acquired_view != view && std::ranges::none_of(views_, [&](const View& other) {
@@ -95,6 +97,13 @@ xray::Acquisition Operation::acquisition_of(std::string& view, const receiver::A
   }
   weigh_delay(view, header, arrival_s);
   return header;
+}
+
+/// The image's folder, by its name within that of the session; null outside. The image's own name may hold
+/// UIDs.
+Json Operation::inbox_of(const std::filesystem::path& image) const {
+  const std::filesystem::path inbox = image.parent_path().lexically_relative(folder_);
+  return inbox.empty() || *inbox.begin() == ".." ? Json() : Json(inbox.string());
 }
 
 Expected<void> Operation::take(const std::string& wanted, const receiver::Arrival& arrival,
@@ -117,6 +126,7 @@ Expected<void> Operation::take(const std::string& wanted, const receiver::Arriva
     const auto seen = poses_of_exposure(window, plan_.tracker);
     record("exposure", {{"view", view},
                         {"picture", arrival.digest},
+                        {"inbox", inbox_of(arrival.path)},
                         {"held_s", held_s(*acquisition, arrival_s)},
                         {"window", to_json(window)},
                         {"poses", seen ? to_json(*seen) : Json()}});
@@ -127,7 +137,7 @@ Expected<void> Operation::take(const std::string& wanted, const receiver::Arriva
                        fmt::format("{}: the marker of the {} was not visible during the acquisition", view,
                                    plan_.tracker.marker_of(tunnel.bone)));
     std::erase_if(views_, [&](const View& other) { return other.name == view; });
-    views_.push_back({view, arrival.path, *acquisition, arrival_s, poses});
+    views_.push_back({view, arrival.path, arrival.digest, *acquisition, arrival_s, poses});
     std::ranges::sort(views_, {}, [&](const View& v) { return std::ranges::find(plan_.views, v.name); });
     result_.reset();
   });

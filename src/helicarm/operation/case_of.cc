@@ -3,9 +3,13 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
 #include "helicarm/core/files.h"
+#include "helicarm/core/private_files.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/records.h"
+#include "helicarm/report/overlay.h"
 #include "helicarm/report/report.h"
 #include "helicarm/xray/digest.h"
 
@@ -39,41 +43,93 @@ bool is_picked(const Json& picks, const std::string& name) {
       picks, [&](const Json& pick) { return pick.is_object() && pick.value("name", Json()) == Json(name); });
 }
 
-/// The name of a built-in is kept; a file is copied into the case.
-std::string brought_along(const std::string& name_or_file, const fs::path& folder) {
-  const fs::path file(name_or_file);
-  if (!fs::exists(file)) return name_or_file;
-  value_or_throw(write_file(folder / file.filename(), value_or_throw(read_file(file, most_file_bytes))));
-  return file.filename().string();
-}
+/// Writes the files of a case and keeps their digests.
+class CaseFolder {
+ public:
+  explicit CaseFolder(fs::path folder) : folder_(std::move(folder)) {
+    std::error_code ec;
+    if (fs::exists(folder_, ec))
+      throw BadInput(Reason::cannot_write,
+                     fmt::format("{}: exists already, not made by this operation", folder_.string()));
+    value_or_throw(make_private_folder(folder_));
+  }
+
+  void add(const std::string& name, const std::string& bytes) {
+    value_or_throw(write_private_file(folder_ / name, bytes));
+    files[name] = xray::digest(bytes);
+  }
+  /// The name of a built-in is kept; a file is copied into the case.
+  std::string bring(const std::string& name_or_file) {
+    const fs::path file(name_or_file);
+    if (!fs::exists(file)) return name_or_file;
+    add(file.filename().string(), value_or_throw(read_file(file, most_file_bytes)));
+    return file.filename().string();
+  }
+
+  Digests files;
+
+ private:
+  fs::path folder_;
+};
 
 }  // namespace
 
-Expected<void> write_operation_case(const fs::path& folder, const OperationPlan& plan,
-                                    const std::vector<CaseImage>& images, const guidance::Poses& now,
-                                    const std::vector<verification::ToolLine>& tool_lines) {
+Json operation_case_json(const OperationPlan& plan, const std::vector<CaseImage>& images,
+                         const guidance::Poses& now, const std::vector<verification::ToolLine>& tool_lines) {
+  const guidance::TrackerNoise noise = plan.tracker.noise();
+  Json json = {
+      {"format", "helicarm-case/1"},
+      {"calibrator", plan.calibrator},
+      {"plate", plan.plate ? Json(*plan.plate) : Json()},
+      {"views", Json::array()},
+      {"poses_now", without(to_json(now), "tracker_from_calibrator")},
+      {"tracker", {{"sigma_mm", noise.sigma_mm}, {"sigma_deg", noise.sigma_deg}, {"samples", "independent"}}},
+      {"picks", plan.picks},
+      {"tunnels", Json::array()},
+      {"tool_lines", Json::array()}};
+  for (const CaseImage& image : images) json["views"].push_back(image_json(image));
+  for (const PlannedTunnel& tunnel : plan.tunnels)
+    if (is_picked(plan.picks, tunnel.start) && is_picked(plan.picks, tunnel.end))
+      json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
+  for (const verification::ToolLine& line : tool_lines) json["tool_lines"].push_back(tool_line_json(line));
+  return json;
+}
+
+Expected<std::string> received_image(const fs::path& image, const std::string& digest) {
   return guarded([&] {
-    const guidance::TrackerNoise noise = plan.tracker.noise();
-    Json json = {{"format", "helicarm-case/1"},
-                 {"calibrator", brought_along(plan.calibrator, folder)},
-                 {"plate", plan.plate ? Json(brought_along(*plan.plate, folder)) : Json()},
-                 {"views", Json::array()},
-                 {"poses_now", without(to_json(now), "tracker_from_calibrator")},
-                 {"tracker",
-                  {{"sigma_mm", noise.sigma_mm}, {"sigma_deg", noise.sigma_deg}, {"samples", "independent"}}},
-                 {"picks", plan.picks},
-                 {"tunnels", Json::array()},
-                 {"tool_lines", Json::array()}};
-    for (const CaseImage& image : images) {
-      value_or_throw(write_file(folder / (image.name + ".dcm"),
-                                value_or_throw(read_file(image.image, most_file_bytes))));
-      json["views"].push_back(image_json(image));
-    }
-    for (const PlannedTunnel& tunnel : plan.tunnels)
-      if (is_picked(plan.picks, tunnel.start) && is_picked(plan.picks, tunnel.end))
-        json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
-    for (const verification::ToolLine& line : tool_lines) json["tool_lines"].push_back(tool_line_json(line));
-    value_or_throw(write_file(folder / "case.json", to_text(json)));
+    std::string bytes = value_or_throw(read_file(image, most_file_bytes));
+    if (xray::digest(bytes) != digest)
+      throw BadInput(Reason::image_changed,
+                     fmt::format("{}: is not the image that was received: its file was changed or replaced; "
+                                 "acquire this view again",
+                                 image.string()));
+    return bytes;
+  });
+}
+
+Expected<Digests> write_operation_case(const fs::path& folder, const OperationPlan& plan,
+                                       const std::vector<CaseImage>& images, const guidance::Poses& now,
+                                       const std::vector<verification::ToolLine>& tool_lines) {
+  return guarded([&] {
+    CaseFolder made(folder);
+    OperationPlan brought = plan;
+    brought.calibrator = made.bring(plan.calibrator);
+    if (plan.plate) brought.plate = made.bring(*plan.plate);
+    for (const CaseImage& image : images)
+      made.add(image.name + ".dcm", value_or_throw(received_image(image.image, image.digest)));
+    made.add("case.json", to_text(operation_case_json(brought, images, now, tool_lines)));
+    return made.files;
+  });
+}
+
+Expected<void> check_digests(const fs::path& folder, const Digests& files) {
+  return guarded([&] {
+    for (const auto& [name, digest] : files)
+      if (const auto bytes = read_file(folder / name, most_file_bytes);
+          !bytes || xray::digest(*bytes) != digest)
+        throw BadInput(Reason::image_changed,
+                       fmt::format("{}: was {} after it was written: measure again", (folder / name).string(),
+                                   bytes ? "changed" : "removed"));
   });
 }
 
@@ -83,7 +139,7 @@ Expected<CaseRun> recompute_case(const fs::path& folder, const OperationPlan& pl
     const pipeline::Case given = value_or_throw(pipeline::read_case(folder));
     pipeline::RunOptions options;
     options.max_error_mm = plan.max_error_mm;
-    CaseRun run{value_or_throw(cache.run(given, options)), {}};
+    CaseRun run{value_or_throw(cache.run(given, options)), {}, {}};
     run.digest = xray::digest(to_text(without(pipeline::to_json(run.result), "timing_ms")));
     return run;
   });
@@ -93,8 +149,13 @@ Expected<CaseRun> run_operation_case(const fs::path& folder, const OperationPlan
                                      pipeline::CalibrationCache& cache) {
   return guarded([&] {
     CaseRun run = value_or_throw(recompute_case(folder, plan, cache));
-    value_or_throw(write_file(folder / "result.json", to_text(pipeline::to_json(run.result))));
     value_or_throw(report::write_report(run.result, folder));
+    value_or_throw(write_file(folder / "result.json", to_text(pipeline::to_json(run.result))));
+    std::vector<std::string> names{"result.json", "report.html"};
+    for (std::size_t i = 0; i < run.result.views.size(); ++i)
+      if (run.result.views[i].xray_image) names.push_back(report::overlay_name(run.result.views[i].name, i));
+    for (const std::string& name : names)
+      run.files[name] = xray::digest(value_or_throw(read_file(folder / name, most_file_bytes)));
     return run;
   });
 }

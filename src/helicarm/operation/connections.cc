@@ -24,11 +24,14 @@ robot::RobotConfig config_of(const RobotPlan& plan, const FreshnessLimits& limit
 
 tracker::PoseBoardOptions board_options(const FreshnessLimits& limits) {
   tracker::PoseBoardOptions options;
-  options.max_age_s = options.gate.frozen_s = limits.pose_s;
+  options.max_age_s = limits.pose_s;
+  options.gate.frozen_s = limits.frozen_s;
   return options;
 }
 
 }  // namespace
+
+FreshnessLimits freshness_limits(const TrackerPlan& tracker) { return {.pose_s = tracker.oldest_pose_s()}; }
 
 Connections::Connections(const OperationPlan& plan, std::unique_ptr<receiver::Inbox> inbox,
                          const FreshnessLimits& limits)

@@ -28,20 +28,25 @@ struct CArmStatus {
   bool broke_off = false;              ///< a connection since then was lost or its request rejected
 };
 
-/// Greatest age of the data that guide a robot, s. Only tests on a busy machine use other limits.
+/// Greatest age of the data that guide a robot, s. Only tests on a busy machine use other limits than those
+/// of the plan's tracker (`freshness_limits`).
 struct FreshnessLimits {
   double pose_s = 0.1;       ///< of tool and bones; a repeated pose has the age of its first arrival
   double state_s = 0.1;      ///< of the robot
   double heartbeat_s = 0.1;  ///< ends this long after the program's last poll
+  double frozen_s = 0.1;     ///< for which a repeated pose is accepted
 };
+FreshnessLimits freshness_limits(const TrackerPlan& tracker);
 
 /// The devices of a plan: C-arm, tracker and, without a hand-held drill, robot. Tracker and robot are
 /// connected at the start and reconnected after a loss.
 class Connections {
  public:
   /// Throws BadInput for invalid addresses.
+  Connections(const OperationPlan& plan, std::unique_ptr<receiver::Inbox> inbox)
+      : Connections(plan, std::move(inbox), freshness_limits(plan.tracker)) {}
   Connections(const OperationPlan& plan, std::unique_ptr<receiver::Inbox> inbox,
-              const FreshnessLimits& limits = {});
+              const FreshnessLimits& limits);
 
   /// Starts receiving images. Refuses as `open_images`.
   Expected<void> listen(const receiver::ImageSourceOptions& options);

@@ -15,9 +15,9 @@ struct Guidance {
   std::optional<TunnelAim> aim;
   std::optional<Motion> bone_moved;  ///< since guidance began, at the tunnel's end that moved more
   std::optional<double> age_s;       ///< of the older of the two poses
-  /// Empty: within the tolerances. no_pose, stale_pose (older than 0.1 s); plan_stale (the bone or its marker
-  /// moved by more than the plan's limits); uncertain (two standard deviations exceed a tolerance);
-  /// off_target (outside a tolerance, or beyond the tunnel's end).
+  /// Empty: within the tolerances. no_pose, stale_pose (older than the tracker's limit); plan_stale (the bone
+  /// or its marker moved by more than the plan's limits); uncertain (two standard deviations exceed a
+  /// tolerance); off_target (outside a tolerance, or beyond the tunnel's end).
   std::optional<Failure> why_not;
 
   /// "on_target", or the code of `why_not`.
@@ -30,10 +30,11 @@ Json to_json(const Guidance& guidance);
 /// moves the target.
 class FreehandGuide {
  public:
-  /// Greatest age of a pose, as for a robot.
+  /// Greatest age of a pose unless the tracker's limit is given (`TrackerPlan::oldest_pose_s`).
   static constexpr double oldest_pose_s = 0.1;
 
-  /// `basis`: the poses when guidance began. Refuses not_seen for a tunnel that is not located; no_pose.
+  /// `basis`: the poses when guidance began; `oldest_s`: greatest age of a pose, as for a robot. Refuses
+  /// not_seen for a tunnel that is not located; no_pose.
   static Expected<FreehandGuide> begin(const OperationPlan& plan, LiveTool live, const std::string& tunnel,
                                        const guidance::Poses& basis, double oldest_s = oldest_pose_s);
 

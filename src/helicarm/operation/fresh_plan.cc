@@ -1,38 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // Orders move the robot only while the poses that they were planned on hold.
-#include <algorithm>
-
+#include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/operation.h"
+#include "helicarm/operation/records.h"
+#include "helicarm/xray/digest.h"
 
 namespace helicarm::operation {
-namespace {
-
-/// Retreat along the tool's axis to the stand-off distance; empty if the tool is already there.
-std::optional<robot::Waypoint> back_to_stand_off(const robot::RobotOrder& order,
-                                                 const geometry::RigidTransform& base_from_tcp) {
-  robot::Waypoint back = order.waypoints.front();
-  const Eigen::Vector3d axis = base_from_tcp.rotation.col(2);
-  const double along_mm = axis.dot(base_from_tcp.translation - back.base_from_tcp.translation);
-  constexpr double near_mm = 1;
-  if (along_mm < near_mm) return std::nullopt;
-  back.base_from_tcp = {base_from_tcp.rotation, base_from_tcp.translation - along_mm * axis};
-  back.speed_mm_s = order.waypoints.back().speed_mm_s;
-  return back;
-}
-
-}  // namespace
-
 /// Before registration the tool's expected pose is unknown.
 robot::Watch Operation::sees_tool() const {
   return [this]() -> Expected<void> {
-    return board_.latest(plan_.tracker.tool, tracker::monotonic_seconds())
-        .map([](const tracker::PoseSample&) {});
+    return recorded().and_then([&] {
+      return board_.latest(plan_.tracker.tool, tracker::monotonic_seconds())
+          .map([](const tracker::PoseSample&) {});
+    });
   };
 }
 
 robot::Watch Operation::in_place(PlanWatch watch) const {
   return [this, watch = std::move(watch)] {
-    return watch.in_place(board_, robot().track(), tracker::monotonic_seconds());
+    return recorded().and_then(
+        [&] { return watch.in_place(board_, robot().track(), tracker::monotonic_seconds()); });
   };
 }
 
@@ -66,6 +53,7 @@ Expected<PlanWatch> Operation::plan_watch(const robot::RobotOrder& order) const 
 
 Expected<void> Operation::check_plan(const robot::RobotOrder& order) {
   return guarded([&] {
+    value_or_throw(recorded());
     const Planned& plan = planned(order);
     if (plan.order != to_text(robot::to_json(order)))
       throw BadInput(
@@ -91,15 +79,12 @@ Expected<void> Operation::withdraw(const robot::RobotOrder& order, const robot::
     const PoseWindow window = look("withdraw");
     const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
     const PlanWatch watch(plan_.limits, plan_.tracker, basis_of(tunnel, window, present));
-    robot::RobotOrder back = order;
-    back.start = present.joints;
-    robot::Waypoint home = order.waypoints.front();
-    home.base_from_tcp = rest.base_from_tcp;
-    back.waypoints = {home};
-    if (const auto stand_off = back_to_stand_off(order, present.base_from_tcp))
-      back.waypoints.insert(back.waypoints.begin(), *stand_off);
-    back.corrections.most = 0;
-    back = robot::slowed_for_joints(std::move(back), plan_.robot.approach.limits);
+    const Withdrawal from{present.base_from_tcp, rest.base_from_tcp};
+    record("withdraw", {{"digest", xray::digest(to_text(robot::to_json(order)))},
+                        {"base_from_tcp", geometry::json_rows(from.base_from_tcp.matrix())},
+                        {"base_from_rest", geometry::json_rows(from.base_from_rest.matrix())}});
+    const robot::RobotOrder back = withdraw_order(order, from, present.joints, plan_.robot.approach.limits);
+    record("robot", joints_json(present.joints));
     record("order", robot::to_json(back));
     const std::string token = value_or_throw(confirm(back));
     value_or_throw(watch.holds(board_, robot().track(), tracker::monotonic_seconds()));

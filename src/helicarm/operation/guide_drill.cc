@@ -29,8 +29,9 @@ void check_in_tunnel(const Guidance& now) {
 
 }  // namespace
 
-Expected<void> Operation::guide(const std::string& name, double oldest_pose_s) {
+Expected<void> Operation::guide(const std::string& name, std::optional<double> oldest) {
   return guarded([&] {
+    const double oldest_pose_s = oldest.value_or(plan_.tracker.oldest_pose_s());
     guide_.reset();
     guided_.reset();
     const PlannedTunnel& tunnel = tunnel_named(name);
@@ -49,6 +50,10 @@ Expected<void> Operation::guide(const std::string& name, double oldest_pose_s) {
 Expected<Guidance> Operation::guidance() {
   return guarded([&] {
     if (!guide_) throw BadInput(Reason::usage, "no tunnel is guided; begin with a tunnel of the plan");
+    if (const auto whole = recorded(); !whole) {
+      guide_.reset();
+      throw BadInput(whole.error());
+    }
     const PoseWindow recent = guide_->recent(board_, tracker::monotonic_seconds());
     Guidance now = guide_->at(recent);
     const bool is_stale = guided_ && guided_->decision() == code(Reason::plan_stale);

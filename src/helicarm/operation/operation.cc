@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/devices/robot/robot_registry.h"
+#include "helicarm/core/private_files.h"
+#include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/hand_eye_tour.h"
 #include "helicarm/operation/records.h"
@@ -68,8 +70,7 @@ Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const 
   return guarded([&] {
     std::unique_ptr<Operation> operation(
         new Operation(std::move(plan), folder, board, robot, std::move(notify)));
-    std::error_code ec;
-    if (fs::create_directories(folder, ec)) fs::permissions(folder, fs::perms::owner_all, ec);
+    value_or_throw(make_private_folder(folder));
     operation->log_ = value_or_throw(session::SessionLog::open(folder / "session.log"));
     if (operation->log_->history().records.size() > 1)
       throw BadInput(Reason::cannot_write,
@@ -106,15 +107,24 @@ void Operation::record_halt(const robot::RobotOrder& order, const Failure& why) 
 
 std::vector<robot::Miss> Operation::carry_out(const robot::RobotOrder& order, const std::string& token,
                                               const robot::Measure& measure, const robot::Watch& watch) {
-  record("confirmed",
-         {{"order", order.name}, {"digest", xray::digest(to_text(robot::to_json(order)))}, {"by", who_}});
+  const Json confirmed = {
+      {"order", order.name}, {"digest", xray::digest(to_text(robot::to_json(order)))}, {"by", who_}};
+  record("confirmed", confirmed);
   auto misses = robot().execute(order, token, measure, watch);
-  if (!misses) record_halt(order, misses.error());
-  return value_or_throw(std::move(misses));
+  if (!misses) {
+    // The first reason is reported, also where it cannot be recorded.
+    static_cast<void>(guarded([&] { record_halt(order, misses.error()); }));
+    throw BadInput(misses.error());
+  }
+  record("carried_out", confirmed);
+  return *std::move(misses);
 }
 
-Expected<void> Operation::finish() {
-  return guarded([&] { record("end", Json::object()); });
+Expected<void> Operation::finish(const std::optional<Failure>& why) {
+  return guarded([&] {
+    if (std::exchange(finished_, true)) return;
+    record("end", why ? Json{{"why", code(why->reason)}, {"message", why->message}} : Json::object());
+  });
 }
 
 pipeline::Result Operation::run(const guidance::Poses& now,
@@ -122,11 +132,14 @@ pipeline::Result Operation::run(const guidance::Poses& now,
   newest_.reset();
   const std::string name = fmt::format("case-{}", ++measurements_);
   std::vector<CaseImage> images;
-  for (const View& view : views_) images.push_back({view.name, view.image, view.poses});
-  value_or_throw(write_operation_case(folder_ / name, plan_, images, now, tool_lines));
-  record("case", {{"folder", name}, {"case", value_or_throw(read_json(folder_ / name / "case.json"))}});
+  for (const View& view : views_) images.push_back({view.name, view.image, view.digest, view.poses});
+  const Digests files = value_or_throw(write_operation_case(folder_ / name, plan_, images, now, tool_lines));
+  record("case", {{"folder", name},
+                  {"case", value_or_throw(read_json(folder_ / name / "case.json"))},
+                  {"files", files}});
   CaseRun run = value_or_throw(run_operation_case(folder_ / name, plan_, cache_));
-  record("result", {{"folder", name}, {"digest", run.digest}});
+  value_or_throw(check_digests(folder_ / name, files));
+  record("result", {{"folder", name}, {"digest", run.digest}, {"files", run.files}});
   newest_ = std::move(run.result);
   if (newest_->failure) throw BadInput(*newest_->failure);
   return *newest_;
@@ -157,10 +170,12 @@ Expected<void> Operation::register_robot(const Confirm& confirm) {
     std::vector<tracker::HandEyePair> pairs;
     const robot::RobotState begin = value_or_throw(robot().wait_connected(robot_patience));
     const std::vector<geometry::RigidTransform> tour = hand_eye_tour(begin.base_from_tcp);
+    record("tour", {{"base_from_tcp", geometry::json_rows(begin.base_from_tcp.matrix())}});
     for (const geometry::RigidTransform& pose : tour) {
       const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
       const robot::RobotOrder order = tour_order(plan_.robot, present, pose);
       const PlanWatch age(plan_.limits, plan_.tracker, {.time_s = tracker::monotonic_seconds()});
+      record("robot", joints_json(present.joints));
       record("order", robot::to_json(order));
       const std::string token = value_or_throw(confirm(order));
       value_or_throw(age.young(tracker::monotonic_seconds()));
@@ -193,31 +208,32 @@ Expected<robot::RobotOrder> Operation::plan_tunnel(const std::string& name) {
     notify_(Step::plan, name);
     const PoseWindow window = look("plan");
     const guidance::Poses now = value_or_throw(poses_now(window, plan_.tracker));
-    const robot::TunnelAxis axis =
-        axis_in_base(value_or_throw(tunnel_in_bone(*result_, tunnel)), now, *hand_eye_);
     const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
     const PlanBasis basis = basis_of(tunnel, window, present);
     value_or_throw(refuse_moved_base(*hand_eye_, basis, present, plan_.limits));
     robot::RobotOrder order =
-        value_or_throw(robot::plan_approach(name, value_or_throw(robot::robot_model(plan_.robot.model)),
-                                            plan_.robot.tool, present.joints, axis, plan_.robot.approach));
-    planned_.insert_or_assign(
-        name, Planned{to_text(robot::to_json(order)),
-                      now.tracker_from(tunnel.bone)->inverse() * hand_eye_->tracker_from_base *
-                          order.waypoints.back().base_from_tcp,
-                      {plan_.limits, plan_.tracker, basis}});
+        value_or_throw(tunnel_order(plan_, tunnel, *result_, *hand_eye_, now, present.joints));
+    planned_.insert_or_assign(name, Planned{to_text(robot::to_json(order)),
+                                            target_in_bone(order, tunnel.bone, now, *hand_eye_),
+                                            {plan_.limits, plan_.tracker, basis}});
+    record("robot", joints_json(present.joints));
     record("order", robot::to_json(order));
     draw_preview(order);
     return order;
   });
 }
 
-void Operation::draw_preview(const robot::RobotOrder& order) const {
+void Operation::draw_preview(const robot::RobotOrder& order) {
   const PathPreview path = value_or_throw(preview(order));
+  Digests files;
   for (std::size_t i = 0; i < views_.size(); ++i)
-    if (const auto shown = path.by_view.find(views_[i].name); shown != path.by_view.end())
-      value_or_throw(write_file(folder_ / fmt::format("preview-{}-{}.png", order.name, views_[i].name),
-                                report::overlay_png(*result_, i, shown->second)));
+    if (const auto shown = path.by_view.find(views_[i].name); shown != path.by_view.end()) {
+      const std::string name = fmt::format("preview-{}-{}.png", order.name, views_[i].name);
+      const std::string png = report::overlay_png(*result_, i, shown->second);
+      value_or_throw(write_private_file(folder_ / name, png));
+      files[name] = xray::digest(png);
+    }
+  record("preview", {{"order", order.name}, {"files", files}});
 }
 
 std::map<std::string, fs::path> Operation::images() const {
@@ -286,9 +302,11 @@ Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std:
     value_or_throw(loop);
     record("navigated", {{"tunnel", order.name}, {"loop", to_json(*loop)}});
     notify_(Step::verify, order.name);
-    TunnelOutcome outcome = check(tunnel);
-    outcome.loop = *loop;
-    return outcome;
+    auto outcome = guarded([&] { return check(tunnel); });
+    if (!outcome) static_cast<void>(guarded([&] { record_halt(order, outcome.error()); }));
+    value_or_throw(outcome);
+    outcome->loop = *loop;
+    return *outcome;
   });
 }
 
@@ -298,16 +316,8 @@ TunnelOutcome Operation::check(const PlannedTunnel& tunnel) {
   const verification::ToolLine line =
       value_or_throw(tool_line(tunnel.name, tunnel.bone, views_.front().poses, now, tracked.marker_from_tip));
   const pipeline::Result checked = run(now, {line});
-  const auto end = [&](const std::string& name) {
-    const auto point = std::ranges::find(checked.points, name, &pipeline::PointResult::name);
-    if (point == checked.points.end() || !point->place || !point->place->in_tool)
-      throw BadInput(Reason::not_seen, fmt::format("{}: is not located in the tool marker's frame", name));
-    return end_miss(*point->place->in_tool, *point->place->covariance_in_tool, tracked);
-  };
-  TunnelOutcome outcome{tunnel.name, {}, end(tunnel.start), end(tunnel.end), {}};
-  if (!checked.verifications.empty()) outcome.verification = checked.verifications.front();
-  record("outcome",
-         {{"tunnel", tunnel.name}, {"start", to_json(outcome.start)}, {"end", to_json(outcome.end)}});
+  TunnelOutcome outcome = value_or_throw(outcome_of(tunnel, checked, tracked));
+  record("outcome", to_json(outcome));
   return outcome;
 }
 

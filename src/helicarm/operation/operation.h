@@ -15,6 +15,7 @@
 #include "helicarm/operation/freehand.h"
 #include "helicarm/operation/image_delays.h"
 #include "helicarm/operation/live_tool.h"
+#include "helicarm/operation/orders.h"
 #include "helicarm/operation/plan_watch.h"
 #include "helicarm/pipeline/calibration_cache.h"
 #include "helicarm/session/session_log.h"
@@ -26,15 +27,6 @@ namespace helicarm::operation {
 enum class Step { acquire, measure, register_robot, plan, navigate, verify };
 std::string_view name_of(Step step);
 
-/// Position of a tool relative to its tunnel after the robot's approach.
-struct TunnelOutcome {
-  std::string tunnel;
-  std::vector<robot::Miss> loop;  ///< measurements of the closed loop; the last one is within the tolerance
-  EndMiss start;                  ///< across the tool's axis, from tracker and X-ray images
-  EndMiss end;
-  std::optional<verification::Verification> verification;  ///< Eq. 17 in the X-ray images
-};
-
 /// Path of the tip to a tunnel, for a bone at rest.
 struct PathPreview {
   std::map<std::string, std::vector<Eigen::Vector2d>> by_view;  ///< in each X-ray image, rectified px (Eq. 6)
@@ -42,8 +34,8 @@ struct PathPreview {
 };
 
 /// One operation from the first X-ray image to verification, on connected devices. Each decision is written
-/// to the session log with its inputs before it takes effect; a failed write stops the operation. Call
-/// members from one thread, except `interrupt`.
+/// to the session log with its inputs before it takes effect; a failed write stops the operation, and so does
+/// the loss of the log (record_lost), also during a motion. Call members from one thread, except `interrupt`.
 class Operation {
  public:
   /// Called at the beginning of each step and with its outcome.
@@ -63,8 +55,11 @@ class Operation {
   void confirmed_by(std::string who) { who_ = std::move(who); }
   /// Ends every wait for the tracker with `interrupted`, permanently; from any thread.
   void interrupt() { end_.request_stop(); }
-  /// Records the end of the operation.
-  Expected<void> finish();
+  /// Records the end of the operation, and why it did not succeed. Without effect after the first call.
+  Expected<void> finish(const std::optional<Failure>& why = {});
+  /// Whether the record of the operation is still in its place (record_lost); poll it while a confirmation is
+  /// open. From any thread.
+  Expected<void> recorded() const { return log_->intact(); }
   /// Views without an image, in the plan's order.
   std::vector<std::string> views_to_come() const;
 
@@ -80,7 +75,8 @@ class Operation {
   /// the acquisition window. The positioner angle decides the view, else `view`. Refuses as
   /// `poses_of_exposure`; a tunnel's bone that was not visible (no_pose); an image received before or delayed
   /// in the C-arm, whose poses are unknown (stale_pose); an image of another view (views_too_close) or
-  /// another patient (patient_mismatch). An earlier image found to be delayed must be acquired again.
+  /// another patient (patient_mismatch); a file that changed since its arrival (image_changed). An earlier
+  /// image found to be delayed must be acquired again.
   Expected<void> take(const std::string& view, const receiver::Arrival& arrival, double arrival_s);
 
   /// The accepted images by view.
@@ -89,8 +85,8 @@ class Operation {
   /// Picks as in case.json; they replace those of the plan.
   void pick(Json picks) { plan_.picks = std::move(picks); }
 
-  /// Rectifies, calibrates, locates; fails with the refusal of the case. The calibration is kept until the
-  /// next image.
+  /// Rectifies, calibrates, locates; fails with the refusal of the case, and (image_changed) if an image is
+  /// no longer the one that was received. The calibration is kept until the next image.
   Expected<void> measure();
   const pipeline::Result& result() const { return *result_; }
   /// The last measurement, also a refused one.
@@ -136,11 +132,11 @@ class Operation {
 
   /// Begins to guide a hand-held drill to a tunnel, at the poses of the next 0.75 s. Refuses (usage) before
   /// the measurement and before the bone's check points were touched; not_seen for a tunnel that is not
-  /// located; no_pose.
-  Expected<void> guide(const std::string& tunnel, double oldest_pose_s = FreehandGuide::oldest_pose_s);
+  /// located; no_pose. `oldest_pose_s`: limit of a pose's age instead of the tracker's.
+  Expected<void> guide(const std::string& tunnel, std::optional<double> oldest_pose_s = {});
   /// The drill at the newest poses. A new decision is recorded with its samples before it is returned. Once
   /// plan_stale, it stays so until `guide` is called again, and check points must be touched again. Refuses
-  /// (usage) before `guide`.
+  /// (usage) before `guide`, and (record_lost) without the log, which ends the guidance.
   Expected<Guidance> guidance();
   /// Compares the drill, held still in the drilled tunnel or along it, with the tunnel in the tracker's frame
   /// and in the X-ray images. Ends its guidance.
@@ -152,6 +148,7 @@ class Operation {
   struct View {
     std::string name;
     std::filesystem::path image;
+    std::string digest;  ///< of the file when it was received
     xray::Acquisition acquisition;
     double arrival_s;
     guidance::Poses poses;
@@ -184,6 +181,7 @@ class Operation {
   void refuse_other_views(const std::string& view, const xray::Acquisition& shown) const;
   void weigh_delay(const std::string& view, const xray::Acquisition& shown, double arrival_s);
   double held_s(const xray::Acquisition& shown, double arrival_s) const;
+  Json inbox_of(const std::filesystem::path& image) const;
   void notify_once(const std::string& warning);
   robot::Watch sees_tool() const;
   robot::Watch in_place(PlanWatch watch) const;
@@ -195,7 +193,7 @@ class Operation {
   std::vector<robot::Miss> carry_out(const robot::RobotOrder& order, const std::string& token,
                                      const robot::Measure& measure, const robot::Watch& watch);
   TunnelOutcome check(const PlannedTunnel& tunnel);
-  void draw_preview(const robot::RobotOrder& order) const;
+  void draw_preview(const robot::RobotOrder& order);
 
   OperationPlan plan_;
   std::filesystem::path folder_;
@@ -204,6 +202,7 @@ class Operation {
   Notify notify_;
   std::stop_source end_;
   std::unique_ptr<session::SessionLog> log_;
+  bool finished_ = false;
   std::string who_ = "unknown";
   std::vector<View> views_;
   ImageDelays delays_;

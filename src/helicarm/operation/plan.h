@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -40,6 +41,10 @@ struct TrackerPlan {
   std::optional<Pointer> pointer;
   double sigma_mm = 0.12;  ///< error of a pose averaged over 1 s, per axis
   double sigma_deg = 0.05;
+
+  /// Greatest age of a pose that guides a robot or a drill, s: three frames may be lost, and a busy machine
+  /// may be 0.1 s late. Not above 0.25 s, in which an approach at 10 mm/s covers 2.5 mm.
+  double oldest_pose_s() const { return std::min(0.25, 0.1 + 3 / rate_hz); }
 
   /// Of every reading, with the largest error of a facet's mount: it acts as one of the calibrator's reading.
   guidance::TrackerNoise noise() const;

@@ -15,14 +15,14 @@ namespace {
 using Eigen::Vector3d;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// The limit of FreshnessLimits for poses and states.
+/// The limit of FreshnessLimits for states.
 constexpr double recent_s = 0.1;
 /// The median of the last `most` samples in `window_s` is compared with the plan.
 struct MedianWindow {
   double window_s;
   std::size_t most;
 };
-constexpr MedianWindow of_bone{recent_s, 5};
+constexpr std::size_t most_of_bone = 5;
 /// The tool's rotational noise acts on the tip by the tool's length: with 0.2 degrees per sample the median
 /// of five samples deviates by up to 1.25 mm in ten minutes, of twelve by 0.74 mm, at a limit of 1 mm.
 constexpr MedianWindow of_tool{0.25, 12};
@@ -53,9 +53,9 @@ Vector6d median_of(const std::vector<Vector6d>& steps) {
 }
 
 std::vector<tracker::PoseSample> recent(const tracker::PoseBoard& board, const std::string& name,
-                                        double now_s, const MedianWindow& wanted) {
-  if (const auto elsewhere = board.elsewhere(name, now_s, recent_s)) return {*elsewhere};
-  value_or_throw(board.latest(name, now_s, recent_s));
+                                        double now_s, double oldest_s, const MedianWindow& wanted) {
+  if (const auto elsewhere = board.elsewhere(name, now_s, oldest_s)) return {*elsewhere};
+  value_or_throw(board.latest(name, now_s, oldest_s));
   // A sample may arrive after `now`.
   std::vector<tracker::PoseSample> samples =
       board.between(name, now_s - wanted.window_s, std::numeric_limits<double>::infinity());
@@ -125,7 +125,8 @@ Expected<void> PlanWatch::young(double now_s) const {
 
 Expected<Motion> PlanWatch::bone_motion(const tracker::PoseBoard& board, double now_s) const {
   return guarded([&] {
-    return motion_since(basis_.tracker_from_bone, recent(board, basis_.bone, now_s, of_bone),
+    return motion_since(basis_.tracker_from_bone,
+                        recent(board, basis_.bone, now_s, oldest_pose_s_, {oldest_pose_s_, most_of_bone}),
                         basis_.points_in_bone);
   });
 }
@@ -133,7 +134,7 @@ Expected<Motion> PlanWatch::bone_motion(const tracker::PoseBoard& board, double 
 Expected<Motion> PlanWatch::base_motion(const tracker::PoseBoard& board, const robot::ToolTrack& track,
                                         double now_s) const {
   return guarded([&] {
-    const std::vector<tracker::PoseSample> samples = recent(board, tool_, now_s, of_tool);
+    const std::vector<tracker::PoseSample> samples = recent(board, tool_, now_s, oldest_pose_s_, of_tool);
     std::vector<Vector6d> steps;
     for (const tracker::PoseSample& sample : samples) {
       const geometry::RigidTransform seen = sample.tracker_from_tool * basis_.marker_from_tcp;

@@ -57,14 +57,17 @@ Motion motion_since(const geometry::RigidTransform& then, std::span<const tracke
 Expected<void> check_motion(const std::string& what, const Motion& motion, const PlanLimits& limits,
                             const std::string& since = "planning", const std::string& then = "plan again");
 
-/// Compares the newest poses with those of the plan. Each value is the componentwise median of up to five
-/// samples of the last 0.1 s (bone) or twelve of the last 0.25 s (tool): single outliers have no effect, and
-/// a motion is detected with the third or seventh sample, also a jump that the gate does not accept yet. A
-/// value: each thread may use a copy.
+/// Compares the newest poses with those of the plan; they are at most as old as the tracker's limit. Each
+/// value is the componentwise median of up to five samples of that time (bone) or twelve of the last 0.25 s
+/// (tool): single outliers have no effect, and a motion is detected with the third or seventh sample, also a
+/// jump that the gate does not accept yet. A value: each thread may use a copy.
 class PlanWatch {
  public:
   PlanWatch(const PlanLimits& limits, const TrackerPlan& tracker, PlanBasis basis)
-      : limits_(limits), tool_(tracker.tool), basis_(std::move(basis)) {}
+      : limits_(limits),
+        tool_(tracker.tool),
+        oldest_pose_s_(tracker.oldest_pose_s()),
+        basis_(std::move(basis)) {}
 
   /// Fails with plan_stale when the plan's age, s, exceeds the limit.
   Expected<void> young(double now_s) const;
@@ -91,6 +94,7 @@ class PlanWatch {
  private:
   PlanLimits limits_;
   std::string tool_;
+  double oldest_pose_s_;
   PlanBasis basis_;
 };
 

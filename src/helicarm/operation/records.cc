@@ -66,4 +66,10 @@ Json to_json(const EndMiss& end) {
           {"predicted_mm", end.predicted_mm()}};
 }
 
+Json to_json(const TunnelOutcome& outcome) {
+  return {{"tunnel", outcome.tunnel}, {"start", to_json(outcome.start)}, {"end", to_json(outcome.end)}};
+}
+
+Json joints_json(const robot::Joints& joints) { return {{"joints_rad", geometry::json_list(joints)}}; }
+
 }  // namespace helicarm::operation

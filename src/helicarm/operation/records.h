@@ -6,7 +6,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/devices/tracker/hand_eye.h"
 #include "helicarm/guidance/poses.h"
-#include "helicarm/operation/tool_line.h"
+#include "helicarm/operation/orders.h"
 
 /// Values as the session log stores them: exact to the last bit.
 namespace helicarm::operation {
@@ -18,5 +18,9 @@ Json to_json(const std::vector<tracker::HandEyePair>& pairs);
 Expected<std::vector<tracker::HandEyePair>> hand_eye_pairs_from(const Json& json, const std::string& origin);
 Json to_json(const std::vector<robot::Miss>& loop);
 Json to_json(const EndMiss& end);
+/// Of an outcome, the two ends.
+Json to_json(const TunnelOutcome& outcome);
+/// Of the robot before an order.
+Json joints_json(const robot::Joints& joints);
 
 }  // namespace helicarm::operation

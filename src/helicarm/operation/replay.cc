@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -11,6 +12,7 @@
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/freehand.h"
 #include "helicarm/operation/records.h"
+#include "helicarm/operation/replay_orders.h"
 #include "helicarm/session/session_log.h"
 #include "helicarm/xray/digest.h"
 
@@ -19,17 +21,6 @@ namespace {
 
 constexpr std::uintmax_t most_image_bytes = std::uintmax_t{256} << 20;
 
-/// Names of the first differing fields, for a message.
-std::string where(const Json& then, const Json& now) {
-  constexpr std::size_t most = 4;
-  const Json patch = Json::diff(then, now);
-  std::string fields;
-  for (std::size_t i = 0; i < std::min(most, patch.size()); ++i)
-    fields += (i == 0 ? ": " : ", ") + patch[i].at("path").get<std::string>();
-  if (patch.size() > most) fields += fmt::format(" and {} more", patch.size() - most);
-  return fields;
-}
-
 Json without_timing(Json result) {
   result.erase("timing_ms");
   return result;
@@ -37,19 +28,40 @@ Json without_timing(Json result) {
 
 class Replay {
  public:
-  explicit Replay(std::filesystem::path session) : session_(std::move(session)) {}
+  explicit Replay(std::filesystem::path session)
+      : session_(std::move(session)),
+        orders_([this](const std::string& origin, const std::string& how) { differ(origin, how); }) {}
 
   void take(const session::SessionRecord& record) {
     const std::string origin = fmt::format("record {}", record.number);
+    if (report.finished) differ(origin, "a record after the end of the operation");
     if (record.kind == "plan") plan_ = value_or_throw(plan_from(record.content, origin));
     if (record.kind == "exposure") exposure(record, origin);
     if (record.kind == "touched") touched(record, origin);
+    if (record.kind == "refused") refused(record);
     if (record.kind == "case") images(record, origin);
-    if (record.kind == "end") report.finished = true;
+    if (record.kind == "end") end(record);
     if (record.kind == "result") result(record, origin);
-    if (record.kind == "hand_eye") hand_eye(record, origin);
+    if (record.kind == "preview") compare_files(record, "", origin);
+    if (record.kind == "hand_eye") ++report.hand_eyes;
     if (record.kind == "guide") guide(record, origin);
     if (record.kind == "guided") guided(record, origin);
+    orders_.take(record, plan_, result_);
+    report.orders = orders_.orders;
+    report.confirmations = orders_.confirmations;
+    report.outcomes = orders_.outcomes;
+  }
+
+  /// A record that cannot be read differs from those that an operation writes.
+  void take_whole(const session::SessionRecord& record) {
+    const std::string origin = fmt::format("record {}", record.number);
+    try {
+      take(record);
+    } catch (const Json::exception&) {
+      differ(origin, "a field that its kind requires is missing");
+    } catch (const BadInput& error) {
+      differ(origin, error.failure().message);
+    }
   }
 
   ReplayReport report;
@@ -61,15 +73,61 @@ class Replay {
   void compare(const Json& then, const Json& now, const std::string& origin, const char* what) {
     if (then != now)
       differ(origin, fmt::format("the {} differs from the recorded value on recomputation{}", what,
-                                 where(then, now)));
+                                 differing_fields(then, now)));
   }
 
   void exposure(const session::SessionRecord& record, const std::string& origin) {
     ++report.exposures;
-    image_digests_[record.content.at("view").get<std::string>()] = record.content.at("picture");
+    const std::string view = record.content.at("view").get<std::string>();
+    const std::string digest = record.content.at("picture").get<std::string>();
     const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
     const auto poses = poses_of_exposure(window, plan_.tracker);
     compare(record.content.at("poses"), poses ? to_json(*poses) : Json(), origin, "pose");
+    if (const Json inbox = record.content.value("inbox", Json()); inbox.is_string())
+      if (!received(inbox.get<std::string>()).contains(digest))
+        differ(origin,
+               fmt::format("{}: the image of {} is missing or was changed", inbox.get<std::string>(), view));
+    const bool accepted = poses && std::ranges::all_of(plan_.tunnels, [&](const PlannedTunnel& tunnel) {
+                            return poses->tracker_from(tunnel.bone).has_value();
+                          });
+    if (accepted) views_[view] = {view, {}, digest, *poses};
+  }
+
+  /// An earlier image that turned out to be delayed has no digest.
+  void refused(const session::SessionRecord& record) {
+    if (!record.content.contains("picture")) views_.erase(record.content.at("view").get<std::string>());
+  }
+
+  /// Digests of all files of an inbox.
+  const std::set<std::string>& received(const std::string& inbox) {
+    auto [entry, is_new] = inboxes_.try_emplace(inbox);
+    std::error_code ec;
+    if (is_new)
+      for (const auto& file :
+           std::filesystem::directory_iterator(value_or_throw(path_inside(session_, inbox)), ec))
+        if (const auto bytes = read_file(file.path(), most_image_bytes))
+          entry->second.insert(xray::digest(*bytes));
+    return entry->second;
+  }
+
+  void end(const session::SessionRecord& record) {
+    report.finished = true;
+    report.ended_by = record.content.value("why", "");
+  }
+
+  /// The files that a record lists, in this folder of the session, by their digests.
+  void compare_files(const session::SessionRecord& record, const std::string& folder,
+                     const std::string& origin) {
+    if (!record.content.contains("files")) return differ(origin, "the digests of its files are missing");
+    for (const auto& [name, digest] : record.content.at("files").items()) {
+      ++report.files;
+      const std::string file = folder.empty() ? name : folder + "/" + name;
+      const auto bytes = read_file(value_or_throw(path_inside(session_, file)), most_image_bytes);
+      if (!bytes)
+        differ(origin, fmt::format("{} is missing or cannot be read", file));
+      else if (xray::digest(*bytes) != digest)
+        differ(origin, fmt::format("{} was changed", file));
+    }
   }
 
   void touched(const session::SessionRecord& record, const std::string& origin) {
@@ -81,48 +139,70 @@ class Replay {
     compare(record.content.at("in_bone"), tip ? geometry::json_list(*tip) : Json(), origin, "touched point");
   }
 
-  /// The case must equal the recorded one, and its images those received.
+  /// The case must equal the recorded one, which holds the accepted images with their poses.
   void images(const session::SessionRecord& record, const std::string& origin) {
     const std::string folder = record.content.at("folder").get<std::string>();
-    if (record.content.contains("case")) {
-      const std::string name = folder + "/case.json";
-      const auto now = read_json(value_or_throw(path_inside(session_, name)));
-      if (!now)
-        differ(origin, now.error().message);
-      else if (*now != record.content.at("case"))
-        differ(origin, fmt::format("{} was changed{}", name, where(record.content.at("case"), *now)));
-    }
-    for (const auto& [view, recorded] : image_digests_) {
+    compare_files(record, folder, origin);
+    const Json& recorded = record.content.at("case");
+    const std::string name = folder + "/case.json";
+    if (const auto now = read_json(value_or_throw(path_inside(session_, name))); now && *now != recorded)
+      differ(origin, fmt::format("{} was changed{}", name, differing_fields(recorded, *now)));
+    for (const auto& [view, image] : views_) {
       ++report.images;
-      const std::string name = fmt::format("{}/{}.dcm", folder, view);
-      const auto file = read_file(value_or_throw(path_inside(session_, name)), most_image_bytes);
-      if (!file)
-        differ(origin, file.error().message);
-      else if (xray::digest(*file) != recorded)
-        differ(origin, name + " is not the recorded image");
+      const std::string file = fmt::format("{}.dcm", view);
+      if (record.content.value("files", Json::object()).value(file, Json()) != image.digest)
+        differ(origin, fmt::format("{}/{} is not the recorded image", folder, file));
     }
+    const auto derived = guarded([&] { return derived_case(recorded); });
+    if (!derived) return differ(origin, fmt::format("{}: {}", name, derived.error().message));
+    compare(recorded, *derived, origin, "case");
+  }
+
+  /// From the records before it; the picks are the user's.
+  Json derived_case(const Json& recorded) {
+    OperationPlan plan = plan_;
+    plan.picks = recorded.at("picks");
+    const auto brought = [](const std::string& planned, const Json& used) {
+      const std::string file = std::filesystem::path(planned).filename().string();
+      return used == file ? file : planned;
+    };
+    plan.calibrator = brought(plan_.calibrator, recorded.at("calibrator"));
+    if (plan_.plate) plan.plate = brought(*plan_.plate, recorded.at("plate"));
+    std::vector<CaseImage> images;
+    for (const std::string& view : plan_.views)
+      if (const auto taken = views_.find(view); taken != views_.end()) images.push_back(taken->second);
+    guidance::Poses now;
+    std::vector<verification::ToolLine> lines;
+    if (const auto look = orders_.take_verify_look()) {
+      now = value_or_throw(poses_now(*look, plan_.tracker));
+      const Json& line = recorded.at("tool_lines");
+      const std::string name = line.empty() ? "" : line.at(0).at("tunnel").get<std::string>();
+      const auto tunnel = std::ranges::find(plan_.tunnels, name, &PlannedTunnel::name);
+      const auto tool = orders_.tool(plan_);
+      if (tunnel == plan_.tunnels.end() || !tool || images.empty())
+        throw BadInput(Reason::bad_value, "its tool line is of no tunnel of the plan, or of no tool");
+      lines.push_back(
+          value_or_throw(tool_line(name, tunnel->bone, images.front().poses, now, tool->marker_from_tip)));
+    }
+    return operation_case_json(plan, images, now, lines);
   }
 
   void result(const session::SessionRecord& record, const std::string& origin) {
     ++report.results;
     const std::string folder = record.content.at("folder").get<std::string>();
+    compare_files(record, folder, origin);
     const std::filesystem::path inside = value_or_throw(path_inside(session_, folder));
     const auto run = recompute_case(inside, plan_, cache_);
     if (!run) return differ(origin, run.error().message);
     result_ = run->result;
-    if (record.content.at("digest") == run->digest) return;
+    if (record.content.at("digest") != run->digest)
+      differ(origin, fmt::format("{}: the result differs from the recorded one on recomputation", folder));
     const auto then = read_json(inside / "result.json");
-    differ(origin,
-           fmt::format(
-               "{}: the result differs from the recorded one on recomputation{}", folder,
-               then ? where(without_timing(*then), without_timing(pipeline::to_json(run->result))) : ""));
-  }
-
-  void hand_eye(const session::SessionRecord& record, const std::string& origin) {
-    ++report.hand_eyes;
-    const auto pairs = value_or_throw(hand_eye_pairs_from(record.content.at("pairs"), origin));
-    const auto found = tracker::calibrate_hand_eye(pairs);
-    compare(record.content.at("found"), found ? to_json(*found) : Json(), origin, "hand-eye calibration");
+    const Json now = without_timing(pipeline::to_json(run->result));
+    if (!then) return differ(origin, then.error().message);
+    if (const Json written = without_timing(*then); written != now)
+      differ(origin, fmt::format("{}/result.json differs from the recomputed result{}", folder,
+                                 differing_fields(written, now)));
   }
 
   void guide(const session::SessionRecord& record, const std::string& origin) {
@@ -150,7 +230,9 @@ class Replay {
   std::optional<pipeline::Result> result_;
   std::optional<FreehandGuide> guide_;
   pipeline::CalibrationCache cache_;
-  std::map<std::string, std::string> image_digests_;
+  OrderReplay orders_;
+  std::map<std::string, CaseImage> views_;  ///< the accepted images, without their paths
+  std::map<std::string, std::set<std::string>> inboxes_;
 };
 
 }  // namespace
@@ -163,15 +245,12 @@ Expected<ReplayReport> replay(const std::filesystem::path& session, const GoOn& 
     Replay replay(session);
     replay.report.records = history.records.size();
     replay.report.torn = history.torn;
-    for (const session::SessionRecord& record : history.records) try {
-        if (!go_on(record.number, history.records.size()))
-          throw BadInput(Reason::interrupted,
-                         fmt::format("{}: stopped at record {}", session.string(), record.number));
-        replay.take(record);
-      } catch (const Json::exception&) {
-        throw BadInput(Reason::bad_value,
-                       fmt::format("record {}: a field that its kind requires is missing", record.number));
-      }
+    for (const session::SessionRecord& record : history.records) {
+      if (!go_on(record.number, history.records.size()))
+        throw BadInput(Reason::interrupted,
+                       fmt::format("{}: stopped at record {}", session.string(), record.number));
+      replay.take_whole(record);
+    }
     return replay.report;
   });
 }

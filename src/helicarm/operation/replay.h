@@ -13,22 +13,36 @@ namespace helicarm::operation {
 struct ReplayReport {
   std::size_t records = 0;
   bool torn = false;      ///< the last record is incomplete: the program was killed while writing
-  bool finished = false;  ///< the operation was ended
+  bool finished = false;  ///< the end of the operation is recorded
+  std::string ended_by;   ///< code of the failure that ended it; empty: none did
   std::size_t exposures = 0;
   std::size_t images = 0;
   std::size_t results = 0;
   std::size_t hand_eyes = 0;
-  std::size_t decisions = 0;             ///< on a hand-held drill
-  std::vector<std::string> differences;  ///< recomputed values that differ from the record
+  std::size_t decisions = 0;  ///< on a hand-held drill
+  std::size_t orders = 0;
+  std::size_t confirmations = 0;
+  std::size_t outcomes = 0;
+  std::size_t files = 0;                 ///< compared with their recorded digests
+  std::vector<std::string> differences;  ///< what differs from the record, or from what it implies
+
+  /// Whether the record has its end and nothing differs.
+  bool complete() const { return finished && !torn && differences.empty(); }
 };
 
 /// Called before each record with the number done; false stops the replay.
 using GoOn = std::function<bool(std::size_t done, std::size_t all)>;
 
-/// Recomputes an operation from its record: acquisition poses from the tracker samples, each case from its
-/// images (which must be the recorded ones), the hand-eye calibration from its pairs, decisions
-/// on a hand-held drill from the samples; all must agree to the
-/// last bit. Refuses as `read_session`; an empty record (bad_value); a stop by the callback (interrupted).
+/// Recomputes an operation from its record; all must agree to the last bit:
+/// - acquisition poses from the tracker samples, each case from the accepted images and their poses, its
+/// result
+///   from its files;
+/// - the hand-eye calibration from the samples, each order from poses, measurement and the robot's joints,
+/// each
+///   confirmation and the end of its motion from the order, the closed loop and the outcome at a tunnel;
+/// - decisions on a hand-held drill from the samples;
+/// - every file by its recorded digest, also the images in the session's inbox.
+/// Refuses as `read_session`; an empty record (bad_value); a stop by the callback (interrupted).
 Expected<ReplayReport> replay(
     const std::filesystem::path& session, const GoOn& go_on = [](std::size_t, std::size_t) { return true; });
 

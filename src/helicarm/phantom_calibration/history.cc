@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "helicarm/core/file_lock.h"
 #include "helicarm/core/files.h"
 #include "helicarm/phantom_calibration/verify_phantom.h"
 #include "helicarm/xray/digest.h"
@@ -44,7 +45,8 @@ std::string digest_of(const phantom::Calibrator& calibrator) {
 
 Expected<void> add_to_history(const std::filesystem::path& path, const PhantomVerification& verification) {
   return guarded([&] {
-    Json json = {{"format", format}, {"verifications", earlier_entries(path)}};
+    const FileLock lock = value_or_throw(FileLock::of(path));
+    Json json = {{"format", format}, {"verifications", earlier_entries(lock.file())}};
     Json entry = {{"date", verification.date},
                   {"calibrator", verification.calibrator},
                   {"status", verification.failure ? "refused" : "ok"},
@@ -55,7 +57,7 @@ Expected<void> add_to_history(const std::filesystem::path& path, const PhantomVe
                                 {"distance_mm", ball.distance_mm ? Json(*ball.distance_mm) : Json(nullptr)},
                                 {"state", word(ball.state)}});
     json["verifications"].push_back(std::move(entry));
-    value_or_throw(write_file(path, to_text(json) + "\n"));
+    value_or_throw(write_file(lock.file(), to_text(json) + "\n"));
   });
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <span>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -23,6 +24,17 @@ namespace fs = std::filesystem;
 constexpr std::uintmax_t most_bundled_bytes = std::uintmax_t{256} << 20;
 
 using Renamed = std::map<std::string, std::string>;
+
+/// What of case.json and its views is packed; all else may name a person or a file.
+constexpr std::array packed_keys{"format", "calibrator", "plate",     "diameters_mm", "views",
+                                 "picks",  "tunnels",    "poses_now", "tracker",      "tool_lines"};
+constexpr std::array packed_view_keys{"name",     "image", "frame",    "plate_image",       "map",
+                                      "mirrored", "poses", "pixel_mm", "source_detector_mm"};
+
+void keep_only(Json& object, std::span<const char* const> keys) {
+  for (auto entry = object.begin(); entry != object.end();)
+    entry = std::ranges::find(keys, entry.key()) == keys.end() ? object.erase(entry) : std::next(entry);
+}
 
 /// New names of a list's entries, numbered in their order.
 Renamed numbered(const Json& json, const char* list, const char* stem) {
@@ -50,12 +62,19 @@ class Bundler {
   }
 
   void write() {
-    json_.erase("notes");
+    leave_out_models();
+    keep_only(json_, packed_keys);
+    for (Json& view : json_["views"]) keep_only(view, packed_view_keys);
     write_descriptions();
     for (std::size_t i = 0; i < given_.views.size(); ++i) write_view(i);
     for (Json& pick : json_["picks"]) {
       rename(pick, "name", picks_);
       rename(pick, "view", views_);
+      if (pick.contains("bone") && pick["bone"].is_object()) {
+        const auto name = pick["bone"]["name"].get<std::string>();
+        pick["bone"]["name"] =
+            bones_.try_emplace(name, fmt::format("bone{}", bones_.size() + 1)).first->second;
+      }
     }
     for (Json& tunnel : json_["tunnels"]) {
       rename(tunnel, "name", tunnels_);
@@ -72,11 +91,13 @@ class Bundler {
   const fs::path& folder() const { return folder_.path(); }
   CaseBundle& bundle() { return bundle_; }
   const std::string& log() const { return log_; }
+  bool has_all_images() const { return whole_; }
 
   /// Every new name by the old one.
   Renamed names() const {
     Renamed all = views_;
-    for (const Renamed* some : {&picks_, &tunnels_, &lines_}) all.insert(some->begin(), some->end());
+    for (const Renamed* some : {&picks_, &tunnels_, &lines_, &bones_, &models_})
+      all.insert(some->begin(), some->end());
     return all;
   }
 
@@ -96,6 +117,18 @@ class Bundler {
 
   void leave_out(const std::string& name, const Failure& why) {
     bundle_.left_out.push_back(fmt::format("{}: {}", name, code(why.reason)));
+    whole_ = false;
+  }
+
+  /// A CT shows a person's face, and files of models are named by their users.
+  void leave_out_models() {
+    const Json models = listed(json_, "models");
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      const std::string name = fmt::format("model{}", i + 1);
+      if (models[i].is_object() && models[i].value("name", Json()).is_string())
+        models_.emplace(models[i]["name"].get<std::string>(), name);
+      bundle_.left_out.push_back(name + ": models are not packed");
+    }
   }
 
   void write_descriptions() {
@@ -153,11 +186,12 @@ class Bundler {
 
   const Case& given_;
   Json json_;
-  Renamed views_, picks_, tunnels_, lines_;
+  Renamed views_, picks_, tunnels_, lines_, bones_, models_;
   xray::DeIdentification de_identify_;
   TemporaryFolder folder_;
   CaseBundle bundle_;
   std::string log_;
+  bool whole_ = true;  ///< every file of the views was read
 };
 
 /// All texts and keys of a value.
@@ -226,7 +260,7 @@ Expected<CaseBundle> bundle_case(const fs::path& path, const BundleOptions& opti
         fmt::format("helicarm {}, compiler {}\n", HELICARM_VERSION, __VERSION__) + bundler.log();
     for (const std::string& missing : bundle.left_out) log += fmt::format("not packed: {}\n", missing);
     Renamed known = bundler.names();
-    if (options.measure && bundle.left_out.empty()) {
+    if (options.measure && bundler.has_all_images()) {
       const Json result = measured(value_or_throw(read_case(bundler.folder())), options.run, log);
       bundle.files.push_back({"result.json", to_text(result) + "\n"});
       if (options.result) collect_texts(result, known);

@@ -66,6 +66,31 @@ TEST_F(BundleOfNamedCase, HoldsNoNameAndRuns) {
   EXPECT_FALSE(result->contains("timing_ms"));
 }
 
+TEST_F(BundleOfNamedCase, HoldsNothingOfItsModels) {
+  Json json = *read_json(folder_.path() / "case.json");
+  json["models"] = {{{"name", "doe_femur"},
+                     {"volume", "doe_ct.nrrd"},
+                     {"mask", "doe_mask.nrrd"},
+                     {"start", {{"landmarks", "doe_points.csv"}}},
+                     {"plan", "doe_plan.mrk.json"}},
+                    {{"name", "doe_tibia"},
+                     {"surface", "doe_tibia.stl"},
+                     {"start", {{"world_from_model", Json::array({1234.5})}}}}};
+  json["picks"][0]["bone"] = {{"name", "doe_bone"}, {"side", "left"}};
+  ASSERT_TRUE(write_file(folder_.path() / "case.json", to_text(json)));
+  const CaseBundle made = bundle({.result = Json{{"models", {{{"name", "doe_femur"}, {"x", 1}}}}}});
+  EXPECT_THAT(made.left_out,
+              testing::ElementsAre("model1: models are not packed", "model2: models are not packed"));
+  EXPECT_THAT(names(made), testing::Contains("result.json"));
+  for (const ArchivedFile& file : made.files)
+    for (const char* word : {"doe", "nrrd", "stl", "csv", "1234.5", "mrk"})
+      if (!file.name.ends_with(".dcm")) {
+        EXPECT_EQ(file.bytes.find(word), std::string::npos) << file.name << ": " << word;
+      }
+  const auto packed = std::ranges::find(made.files, "case.json", &ArchivedFile::name);
+  EXPECT_EQ(parse_json(packed->bytes, "case.json")->at("picks")[0]["bone"]["name"], "bone1");
+}
+
 TEST_F(BundleOfNamedCase, IsTheSameEachTime) {
   const BundleOptions only_files{.measure = false};
   EXPECT_EQ(tar_gz(bundle(only_files).files), tar_gz(bundle(only_files).files));

@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/private_files.h"
 #include "helicarm/core/text.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/pipeline/case.h"
@@ -292,7 +293,9 @@ Expected<void> write_new_case(const NewCase& made, const fs::path& folder) {
       if (fs::exists(folder / copy.to))
         throw BadInput(Reason::cannot_write,
                        fmt::format("{} exists: choose another folder", (folder / copy.to).string()));
-      value_or_throw(write_file(folder / copy.to, value_or_throw(read_file(copy.from, most_copied_bytes))));
+      value_or_throw(make_private_folder((folder / copy.to).parent_path()));
+      value_or_throw(
+          write_private_file(folder / copy.to, value_or_throw(read_file(copy.from, most_copied_bytes))));
     }
     value_or_throw(write_file(folder / "case.json", to_text(made.json) + "\n"));
     value_or_throw(read_case(folder));

@@ -159,6 +159,55 @@ TEST_F(FaultyOperation, RepeatedImageIsRefused) {
   EXPECT_EQ(operation_->take("AP", again.arrival, again.time_s).error().reason, Reason::stale_pose);
 }
 
+TEST_F(FaultyOperation, ImageReplacedBeforeItIsTakenIsRefused) {
+  const operation::DatedArrival image = acquired_view("AP");
+  fs::copy_file(acquired_view("LAT").arrival.path, image.arrival.path, fs::copy_options::overwrite_existing);
+  const auto taken = operation_->take("AP", image.arrival, image.time_s);
+  ASSERT_FALSE(taken);
+  EXPECT_EQ(taken.error().reason, Reason::image_changed) << taken.error().message;
+  EXPECT_NE(log().find(R"("why":"image_changed")"), std::string::npos);
+  EXPECT_EQ(operation_->views_to_come().size(), 2u);
+}
+
+TEST_F(FaultyOperation, ImageReplacedInTheInboxIsNotMeasured) {
+  expose("AP");
+  expose("LAT");
+  const auto images = operation_->images();
+  const std::string lateral = read_file(images.at("LAT"), 1 << 24).value();
+  std::string changed = lateral;
+  changed[changed.size() - 4000] ^= 1;  // one grey value
+  ASSERT_TRUE(write_file(images.at("LAT"), changed));
+  const auto measured = operation_->measure();
+  ASSERT_FALSE(measured);
+  EXPECT_EQ(measured.error().reason, Reason::image_changed) << measured.error().message;
+  EXPECT_NE(measured.error().message.find(images.at("LAT").string()), std::string::npos);
+  ASSERT_TRUE(write_file(images.at("LAT"), lateral));
+  EXPECT_TRUE(operation_->measure());
+}
+
+TEST_F(FaultyOperation, NothingIsMeasuredWithoutTheRecord) {
+  expose("AP");
+  const operation::DatedArrival lateral = acquired_view("LAT");
+  const fs::path log = session_ / "session.log", aside = session_ / "aside";
+  fs::rename(log, aside);
+  EXPECT_EQ(operation_->recorded().error().reason, Reason::record_lost);
+  EXPECT_EQ(operation_->take("LAT", lateral.arrival, lateral.time_s).error().reason, Reason::record_lost);
+  fs::copy_file(aside, log);
+  EXPECT_EQ(operation_->take("LAT", lateral.arrival, lateral.time_s).error().reason, Reason::record_lost);
+  fs::rename(aside, log);
+  EXPECT_TRUE(operation_->recorded());
+}
+
+TEST_F(FaultyOperation, ImagesOfACaseAreReadableByTheirOwnerOnly) {
+  expose("AP");
+  expose("LAT");
+  ASSERT_TRUE(operation_->measure());
+  const fs::path folder = session_ / "case-1";
+  EXPECT_EQ(fs::status(folder).permissions(), fs::perms::owner_all);
+  for (const char* image : {"AP.dcm", "LAT.dcm"})
+    EXPECT_EQ(fs::status(folder / image).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+}
+
 TEST_F(FaultyOperation, ImageOfATimeWithoutPosesIsRefused) {
   const operation::DatedArrival image = acquired_view("AP");
   for (const double off_s : {3600.0, -3600.0})  // the later one first, else it would count as delayed

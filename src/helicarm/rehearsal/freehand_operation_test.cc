@@ -116,5 +116,16 @@ TEST_F(GuidedDrill, DecisionsFollowTheScene) {
   EXPECT_TRUE(replayed->differences.empty()) << replayed->differences.front();
 }
 
+TEST_F(GuidedDrill, GuidanceEndsWithItsRecord) {
+  EXPECT_TRUE(waits_for("off_target"));
+  std::filesystem::remove(folder_.path() / "session" / "session.log");
+  const auto now = operation_->guidance();
+  ASSERT_FALSE(now);
+  EXPECT_EQ(now.error().reason, Reason::record_lost) << now.error().message;
+  EXPECT_EQ(operation_->guidance().error().reason, Reason::usage);
+  EXPECT_EQ(operation_->guide("femur", oldest_s).error().reason, Reason::record_lost);
+  EXPECT_EQ(operation_->verify_drilled("femur").error().reason, Reason::record_lost);
+}
+
 }  // namespace
 }  // namespace helicarm::rehearsal

@@ -172,6 +172,72 @@ TEST_F(StalePlan, StaleOrderDoesNotMoveTheRobotThoughConfirmed) {
   EXPECT_TRUE(replayed->differences.empty());
 }
 
+TEST_F(StalePlan, NothingMovesWithoutTheRecord) {
+  const std::filesystem::path session = folder_.path() / "session", log = session / "session.log",
+                              aside = folder_.path() / "aside";
+  const robot::RobotOrder order = plan();
+  const auto expect_no_motion = [&](const char* attack) {
+    SCOPED_TRACE(attack);
+    if (robot().status().phase != robot::LinkPhase::ready) {
+      ASSERT_TRUE(robot().unlock("tester"));
+    }
+    const robot::Joints before = virtual_or_->robot().truth().state.joints;
+    EXPECT_EQ(operation_->check_plan(order).error().reason, Reason::record_lost);
+    for (const auto& done : {operation_->go(order, robot().confirm(order)).map([](const auto&) {}),
+                             operation_->withdraw(order, robot().wait_connected(5s).value(), nod_),
+                             operation_->register_robot(nod_)}) {
+      ASSERT_FALSE(done);
+      EXPECT_EQ(done.error().reason, Reason::record_lost) << done.error().message;
+    }
+    EXPECT_EQ(virtual_or_->robot().truth().state.joints, before);
+  };
+  std::filesystem::rename(log, aside);
+  expect_no_motion("the log is removed");
+  std::filesystem::copy_file(aside, log);
+  expect_no_motion("the log is replaced by its copy");
+  std::filesystem::rename(aside, log);
+  std::filesystem::rename(session, aside);
+  expect_no_motion("the folder is removed");
+  std::filesystem::rename(aside, session);
+  // While a confirmation of the registration is open.
+  const robot::Joints before = virtual_or_->robot().truth().state.joints;
+  try_to([&] {
+    const auto registered = operation_->register_robot([&](const robot::RobotOrder& move) {
+      std::filesystem::rename(log, aside);
+      return nod_(move);
+    });
+    if (!registered && registered.error().reason == Reason::record_lost) return Expected<void>();
+    return registered;
+  });
+  EXPECT_EQ(virtual_or_->robot().truth().state.joints, before);
+}
+
+TEST_F(StalePlan, RobotStopsWhenTheRecordIsRemovedDuringItsMotion) {
+  bool stopped = false;
+  for (int attempt = 0; attempt < most_attempts && !stopped; ++attempt) {
+    const robot::RobotOrder order = plan();
+    const std::filesystem::path log = folder_.path() / "session" / "session.log",
+                                aside = folder_.path() / "aside";
+    std::jthread attacker([&] {
+      for (int i = 0; i < 2000 && !virtual_or_->robot().truth().moving; ++i) std::this_thread::sleep_for(5ms);
+      std::filesystem::rename(log, aside);
+    });
+    const auto gone = operation_->go(order, robot().confirm(order));
+    attacker.join();
+    std::filesystem::rename(aside, log);
+    ASSERT_FALSE(gone);
+    stopped = gone.error().reason == Reason::record_lost;
+    if (!stopped) {
+      ASSERT_TRUE(is_timing_failure(gone.error()) || gone.error().reason == Reason::plan_stale)
+          << gone.error().message;
+    }
+    std::this_thread::sleep_for(500ms);
+    EXPECT_FALSE(virtual_or_->robot().truth().moving);
+    ASSERT_TRUE(robot().unlock("tester"));
+  }
+  EXPECT_TRUE(stopped);
+}
+
 TEST_F(StalePlan, TwoTunnelsAreCarriedOutOnOneCalibration) {
   for (const operation::PlannedTunnel& tunnel : plan_.tunnels) {
     bool done = false;

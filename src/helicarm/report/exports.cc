@@ -2,12 +2,15 @@
 #include "helicarm/report/exports.h"
 
 #include <algorithm>
+#include <array>
+#include <fstream>
 #include <map>
 #include <string>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/csv.h"
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/rectification/rectified_dicom.h"
@@ -18,6 +21,9 @@ namespace helicarm::report {
 namespace {
 
 using Files = std::map<std::string, std::string>;
+
+constexpr std::string_view points_header =
+    "name,source,frame,x_mm,y_mm,z_mm,sigma_x_mm,sigma_y_mm,sigma_z_mm,error_95_mm\n";
 
 /// A located point under the name and source that the table states.
 struct ExportedPoint {
@@ -59,7 +65,7 @@ std::string points_csv(const pipeline::Result& result) {
       rows += csv_row(point, "tool", *at.in_tool, *at.covariance_in_tool);
   }
   if (rows.empty()) return rows;
-  return "name,source,frame,x_mm,y_mm,z_mm,sigma_x_mm,sigma_y_mm,sigma_z_mm,error_95_mm\n" + rows;
+  return std::string(points_header) + rows;
 }
 
 Json control_point(const std::string& name, const guidance::PointInFrames& place) {
@@ -147,6 +153,38 @@ Files files_of(const pipeline::Result& result, std::span<const Export> kinds) {
   return files;
 }
 
+/// End of a file's name, and what the file holds near its begin.
+struct ExportedFile {
+  std::string_view ending;
+  std::string_view mark;
+};
+constexpr std::array exported_files{ExportedFile{"points.csv", points_header},
+                                    ExportedFile{"points.mrk.json", "helicarm"},
+                                    ExportedFile{"_mayacam.txt", "image size\n"},
+                                    ExportedFile{"_matrix.txt", "# 3x4: calibrator (mm) to rectified pixels"},
+                                    ExportedFile{"_opencv.yml", "%YAML:1.0\n---\nimage_width: "},
+                                    ExportedFile{"_pose.tfm", "#Insight Transform File"},
+                                    ExportedFile{"_rtk.xml", "<!-- Projection image: spacing"},
+                                    ExportedFile{"_rectified.dcm", "helicarm"}};
+
+/// Rows of 11 coefficients of each view, nothing else.
+bool is_dlt_table(std::string_view text) {
+  return text.find_first_not_of("0123456789+-.eE,\n") == text.npos && std::ranges::count(text, '\n') == 11;
+}
+
+bool is_exported(const std::filesystem::path& file) {
+  const std::string name = file.filename().string();
+  std::string begin(64 << 10, '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<std::size_t>(in.gcount()));
+  if (name == "dlt.csv") return is_dlt_table(begin);
+  return std::ranges::any_of(exported_files, [&](const ExportedFile& kind) {
+    const bool is_named = kind.ending.starts_with('_') ? name.ends_with(kind.ending) : name == kind.ending;
+    return is_named && begin.find(kind.mark) != begin.npos;
+  });
+}
+
 /// NAME_rectified.dcm for each calibrated view: the pixels that its projection refers to.
 std::map<std::string, xray::DerivedImage> images_of(const pipeline::Result& result,
                                                     std::span<const Export> kinds) {
@@ -167,9 +205,19 @@ std::map<std::string, xray::DerivedImage> images_of(const pipeline::Result& resu
 
 }  // namespace
 
+void forget_exports(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  std::error_code ec;
+  for (std::filesystem::directory_iterator entry(folder, ec), end; !ec && entry != end; entry.increment(ec))
+    if (std::error_code gone; entry->is_regular_file(gone) && is_exported(entry->path()))
+      names.push_back(entry->path().filename().string());
+  forget_files(folder, names);
+}
+
 Expected<std::vector<std::filesystem::path>> write_exports(const pipeline::Result& result,
                                                            const std::filesystem::path& folder,
                                                            std::span<const Export> kinds) {
+  forget_exports(folder);
   if (result.failure) return tl::unexpected<Failure>(*result.failure);
   std::vector<std::filesystem::path> paths;
   auto written = guarded([&] {

@@ -22,10 +22,13 @@ inline constexpr std::array every_export{Export::csv,    Export::slicer, Export:
 inline constexpr std::array<std::string_view, every_export.size()> export_words{
     "csv", "slicer", "mayacam", "dlt", "matrix", "images", "opencv", "rtk", "itk"};
 
-/// Writes the available parts of a result into `folder` and returns the files' paths; all files or none.
-/// Refuses with the result's own failure, `point_at_infinity` for a view without DLT coefficients,
-/// `name_clash` if two views would share a file, `cannot_write`; where not all formats are written, also what
-/// RTK cannot represent (`unsupported`, `behind_source`).
+/// Removes the files of an earlier export, recognised by name and content.
+void forget_exports(const std::filesystem::path& folder);
+
+/// Writes the available parts of a result into `folder`, which then holds no file of an earlier export, and
+/// returns the files' paths; all files or none. Refuses with the result's own failure, `point_at_infinity`
+/// for a view without DLT coefficients, `name_clash` if two views would share a file, `cannot_write`; where
+/// not all formats are written, also what RTK cannot represent (`unsupported`, `behind_source`).
 Expected<std::vector<std::filesystem::path>> write_exports(const pipeline::Result& result,
                                                            const std::filesystem::path& folder,
                                                            std::span<const Export> kinds = every_export);

@@ -11,6 +11,7 @@
 #include <fmt/ranges.h>
 #include <openssl/evp.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "helicarm/core/files.h"
@@ -89,6 +90,19 @@ Progress read(const fs::path& log, std::string_view bytes) {
   return progress;
 }
 
+std::int64_t changed_ns(const struct stat& file) {
+  return file.st_mtim.tv_sec * std::int64_t{1'000'000'000} + file.st_mtim.tv_nsec;
+}
+
+/// So that the name of a new file outlives a loss of power.
+void sync_folder(const fs::path& file) {
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  const int opened = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (opened < 0) return;
+  ::fsync(opened);
+  ::close(opened);
+}
+
 }  // namespace
 
 Expected<SessionHistory> read_session(const fs::path& log) {
@@ -113,16 +127,47 @@ Expected<std::unique_ptr<SessionLog>> SessionLog::open(const fs::path& log) {
     session->size_ = session->history_.whole_bytes;
     if (session->history_.torn && ::ftruncate(file, static_cast<off_t>(session->size_)) != 0)
       throw BadInput(Reason::cannot_write, fmt::format("{}: {}", log.string(), system_message(errno)));
-    if (session->next_ == 0)
+    if (struct stat opened; ::fstat(file, &opened) == 0) session->written_ns_ = changed_ns(opened);
+    if (session->next_ == 0) {
+      sync_folder(log);
       value_or_throw(session->append("session", {{"format", format_name}, {"version", HELICARM_VERSION}}));
+    }
     return session;
   });
 }
 
 SessionLog::~SessionLog() { ::close(file_); }
 
+Expected<void> SessionLog::intact() {
+  const std::lock_guard lock(mutex_);
+  return check_file();
+}
+
+Expected<void> SessionLog::check_file() {
+  const auto lost = [&](std::string_view how) {
+    return fail(Reason::record_lost,
+                fmt::format("{}: the record of this operation {}; nothing may move without it: begin a new "
+                            "operation in another folder",
+                            log_.string(), how));
+  };
+  struct stat ours, named;
+  if (::fstat(file_, &ours) != 0) return lost("cannot be read");
+  if (::stat(log_.c_str(), &named) != 0) return lost("was removed");
+  if (ours.st_dev != named.st_dev || ours.st_ino != named.st_ino) return lost("was replaced by another file");
+  if (static_cast<std::size_t>(ours.st_size) != size_)
+    return lost(fmt::format("was changed by another program: it holds {} bytes, {} were written",
+                            ours.st_size, size_));
+  if (changed_ns(ours) == written_ns_) return {};
+  // Network file systems also adjust the time; the content decides.
+  const auto now = guarded([&] { return read(log_, value_or_throw(read_file(log_, most_log_bytes))).chain; });
+  if (!now || *now != chain_) return lost("was changed by another program");
+  written_ns_ = changed_ns(ours);
+  return {};
+}
+
 Expected<void> SessionLog::append(const std::string& kind, Json content) {
   const std::lock_guard lock(mutex_);
+  if (auto whole = check_file(); !whole) return whole;
   const std::string text =
       Json{{"n", next_}, {"time_s", now_s()}, {"kind", kind}, {"content", std::move(content)}}.dump(
           -1, ' ', false, Json::error_handler_t::replace);
@@ -134,12 +179,14 @@ Expected<void> SessionLog::append(const std::string& kind, Json content) {
   if (written != static_cast<ssize_t>(line.size()) || ::fdatasync(file_) != 0) {
     const int error = written < 0 ? errno : ENOSPC;
     [[maybe_unused]] const int cut = ::ftruncate(file_, static_cast<off_t>(size_));
+    if (struct stat now; ::fstat(file_, &now) == 0) written_ns_ = changed_ns(now);
     return fail(Reason::cannot_write, fmt::format("{}: {}", log_.string(), system_message(error)));
   }
   chain_ = std::move(chain);
   size_ += line.size();
   ++next_;
-  return {};
+  if (struct stat now; ::fstat(file_, &now) == 0) written_ns_ = changed_ns(now);
+  return check_file();  // it may have been removed meanwhile
 }
 
 }  // namespace helicarm::session

@@ -33,8 +33,8 @@ struct SessionHistory {
 /// bad_value (with the line), and as `parse_json`.
 Expected<SessionHistory> read_session(const std::filesystem::path& log);
 
-/// The record of an operation: append-only; each record is on disk when `append` returns. Thread-safe. Must
-/// not contain patient data: images are identified by their digests.
+/// The record of an operation: append-only; each record is on disk, in the file of this name, when `append`
+/// returns. Thread-safe. Must not contain patient data: images are identified by their digests.
 class SessionLog {
  public:
   /// Continues an existing log (and removes an incomplete last record) or begins one. Refuses cannot_write,
@@ -44,15 +44,21 @@ class SessionLog {
   SessionLog(const SessionLog&) = delete;
   SessionLog& operator=(const SessionLog&) = delete;
 
-  /// Refuses cannot_write, and bad_json for content that `parse_json` could not read back; the log is then
-  /// unchanged. An action that cannot be recorded must not be carried out.
+  /// Refuses as `intact`, cannot_write, and bad_json for content that `parse_json` could not read back; the
+  /// log is then unchanged. An action that cannot be recorded must not be carried out.
   Expected<void> append(const std::string& kind, Json content);
+
+  /// Whether the file of this name is still the one that was opened and holds what was appended, nothing else
+  /// (record_lost). Costs two system calls, so that it may be polled while a robot moves.
+  Expected<void> intact();
 
   /// Content of the log when it was opened.
   const SessionHistory& history() const { return history_; }
 
  private:
   SessionLog(std::filesystem::path log, int file) : log_(std::move(log)), file_(file) {}
+
+  Expected<void> check_file();
 
   std::filesystem::path log_;
   int file_;
@@ -61,6 +67,7 @@ class SessionLog {
   std::string chain_;
   std::uint64_t next_ = 0;
   std::size_t size_ = 0;
+  std::int64_t written_ns_ = 0;  ///< time of the file's last change by this program
 };
 
 }  // namespace helicarm::session

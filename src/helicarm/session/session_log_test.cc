@@ -4,6 +4,7 @@
 #include <array>
 #include <csignal>
 #include <fstream>
+#include <thread>
 
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
@@ -167,6 +168,72 @@ TEST_F(Session, FullDiskIsReportedAndKeepsTheLogIntact) {
   const SessionHistory history = read_session(log_).value();
   ASSERT_EQ(history.records.size(), 2u);
   EXPECT_EQ(history.records[1].content.at("x_mm"), 2);
+}
+
+/// An open log and its folder, which others may change.
+class AttackedSession : public Session {
+ protected:
+  void SetUp() override {
+    session_ = SessionLog::open(log_).value();
+    ASSERT_TRUE(session_->append("order", {{"name", "femur"}}));
+    ASSERT_TRUE(session_->intact());
+  }
+  void expect_lost() {
+    EXPECT_EQ(session_->intact().error().reason, Reason::record_lost);
+    const auto appended = session_->append("confirmed", {{"order", "femur"}});
+    ASSERT_FALSE(appended);
+    EXPECT_EQ(appended.error().reason, Reason::record_lost) << appended.error().message;
+    EXPECT_NE(appended.error().message.find(log_.string()), std::string::npos);
+  }
+
+  const fs::path aside_ = temporary_.path() / "aside";
+  std::unique_ptr<SessionLog> session_;
+};
+
+TEST_F(AttackedSession, RemovedLogIsLost) {
+  fs::remove(log_);
+  expect_lost();
+  EXPECT_FALSE(fs::exists(log_));
+}
+
+TEST_F(AttackedSession, LogReplacedByItsCopyIsLost) {
+  fs::copy_file(log_, aside_);
+  fs::rename(aside_, log_);
+  expect_lost();
+}
+
+TEST_F(AttackedSession, LogWhoseFolderWasMovedIsLostUntilItIsBack) {
+  const fs::path inner = temporary_.path() / "session", log = inner / "session.log";
+  session_ = SessionLog::open(log).value();
+  fs::rename(inner, aside_);
+  EXPECT_EQ(session_->append("order", {}).error().reason, Reason::record_lost);
+  fs::rename(aside_, inner);
+  EXPECT_TRUE(session_->append("order", {}));
+  EXPECT_EQ(read_session(log).value().records.size(), 2u);
+}
+
+TEST_F(AttackedSession, LogThatWasCutIsLost) {
+  fs::resize_file(log_, fs::file_size(log_) - 5);
+  expect_lost();
+}
+
+TEST_F(AttackedSession, LogThatOthersAppendToIsLost) {
+  std::ofstream(log_, std::ios::app) << "x\n";
+  expect_lost();
+}
+
+TEST_F(AttackedSession, LogOfTheSameSizeWithAnotherContentIsLost) {
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));  // the file system's clock ticks
+  std::string content = bytes();
+  content[content.size() - 8] ^= 1;
+  std::fstream(log_, std::ios::in | std::ios::out | std::ios::binary) << content;
+  expect_lost();
+}
+
+TEST_F(AttackedSession, TouchedLogWithItsContentIsNotLost) {
+  fs::last_write_time(log_, fs::file_time_type::clock::now() - std::chrono::hours(1));
+  EXPECT_TRUE(session_->intact());
+  EXPECT_TRUE(session_->append("confirmed", {}));
 }
 
 TEST_F(Session, FolderThatCannotBeCreatedIsReported) {

@@ -62,8 +62,9 @@ Expected<void> write_json(const std::filesystem::path& path, const Json& json) {
   return write_file(path, to_text(json) + "\n");
 }
 
-/// Files of an earlier simulation of another kind: its views by the names in its truth.
-void remove_leftovers(const std::filesystem::path& folder) {
+}  // namespace
+
+void forget_case(const std::filesystem::path& folder) {
   const auto truth = read_json(folder / truth_file);
   if (!truth) return;
   std::error_code ignored;
@@ -75,9 +76,8 @@ void remove_leftovers(const std::filesystem::path& folder) {
     const std::filesystem::path file = view["name"].get<std::string>() + ".dcm";
     if (file == file.filename()) std::filesystem::remove(folder / file, ignored);
   }
+  std::filesystem::remove(folder / truth_file, ignored);
 }
-
-}  // namespace
 
 xray::DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t number) {
   const SimulatedView& view = simulated.views[number];
@@ -134,7 +134,7 @@ Expected<void> write_case(const std::filesystem::path& folder, const SimulatedCa
   std::filesystem::create_directories(folder, error);
   if (error) return fail(Reason::cannot_write, fmt::format("{}: {}", folder.string(), error.message()));
   return guarded([&] {
-    remove_leftovers(folder);
+    forget_case(folder);
     // truth.json first: it marks the folder as a simulation if writing is interrupted.
     value_or_throw(write_json(folder / truth_file, truth_json(simulated)));
     for (std::size_t i = 0; i < simulated.views.size(); ++i)

@@ -18,6 +18,9 @@ xray::DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t view);
 /// Refuses (cannot_write) a folder with files other than an earlier simulation.
 Expected<void> check_case_folder(const std::filesystem::path& folder);
 
+/// Removes the files of an earlier simulation from its folder, by their names in its truth.json; others stay.
+void forget_case(const std::filesystem::path& folder);
+
 /// Writes an image NAME.dcm for each view, calibrator.json, plate.json, case.json and truth.json; for kind
 /// grid PLATE.dcm, GRID.dcm (with several distances GRID-30.dcm and so on), plate.json and truth.json. Each
 /// file is written atomically; leftovers of an earlier simulation are removed.

@@ -7,6 +7,8 @@
 #include <condition_variable>
 #include <limits>
 
+#include "helicarm/core/real_time.h"
+
 namespace helicarm::virtual_devices {
 namespace {
 
@@ -72,6 +74,7 @@ void VirtualTracker::set(TrackerFault fault, bool on) {
 }
 
 void VirtualTracker::run(const std::stop_token& stop) {
+  const RealTime priority;
   const auto period =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1 / options_.rate_hz));
   std::mutex mutex;

@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/private_files.h"
 #include "helicarm/core/system_message.h"
 #include "helicarm/image/grey_image.h"
 #include "helicarm/xray/dicom_time.h"
@@ -264,6 +265,8 @@ Expected<void> write_dicom(const fs::path& path, const DerivedImage& image) {
   });
   if (!file) return tl::unexpected<Failure>(file.error());
   return write_file_with(path, [&](const fs::path& aside) -> Expected<void> {
+    if (image.patient_study)
+      if (auto made = make_private_file(aside); !made) return made;
     errno = 0;
     const OFCondition status = (*file)->saveFile(aside.c_str(), syntax);
     if (status.good()) return {};

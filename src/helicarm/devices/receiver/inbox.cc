@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/private_files.h"
 #include "helicarm/core/system_message.h"
 #include "helicarm/devices/receiver/pdu.h"
 #include "helicarm/xray/dicom_tags.h"
@@ -71,12 +72,7 @@ std::optional<std::string> class_in_meta_group(std::string_view head) {
 }  // namespace
 
 Expected<std::unique_ptr<Inbox>> Inbox::open(const fs::path& folder) {
-  std::error_code ec;
-  const bool made = fs::create_directories(folder, ec);
-  if (ec || !fs::is_directory(folder))
-    return fail(Reason::cannot_write, fmt::format("{}: is not a folder and cannot be created{}",
-                                                  folder.string(), ec ? ": " + ec.message() : ""));
-  if (made) fs::permissions(folder, fs::perms::owner_all, ec);
+  if (auto made = make_private_folder(folder); !made) return tl::unexpected<Failure>(made.error());
   const int lock = ::open((folder / lock_name).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock < 0)
     return fail(Reason::cannot_write, fmt::format("{}: {}", folder.string(), system_message(errno)));
@@ -129,9 +125,7 @@ Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin)
              fmt::format("{}: another image with the same SOP Instance UID is stored already; both are kept",
                          origin)});
     }
-    value_or_throw(write_file_in_folder(arrival.path, file));
-    std::error_code ec;
-    fs::permissions(arrival.path, fs::perms::owner_read | fs::perms::owner_write, ec);
+    value_or_throw(write_private_file(arrival.path, file));
     return arrival;
   });
 }

@@ -23,20 +23,24 @@ tl::unexpected<Failure> refuse(Reason reason, const std::string& why, const std:
 
 }  // namespace
 
+Expected<Miss> miss_of(const ToolMeasurement& seen) {
+  const geometry::RigidTransform tcp_from_target = seen.tracker_from_tcp.inverse() * seen.tracker_from_target;
+  if (!tcp_from_target.matrix().allFinite() || !seen.covariance.allFinite())
+    return fail(Reason::not_finite, "the tracker's measurement of the tool is not finite");
+  return Miss{tcp_from_target.translation.norm(),
+              geometry::vector_from_rotation(tcp_from_target.rotation).norm() * 180 / std::numbers::pi,
+              std::sqrt(std::max(0.0, seen.covariance.topLeftCorner<3, 3>().trace()))};
+}
+
 Expected<std::vector<Miss>> follow_target(const Corrections& corrections, const Measure& measure,
                                           const MoveTool& move) {
   std::vector<Miss> misses;
   for (;;) {
     const auto seen = measure();
     if (!seen) return tl::unexpected<Failure>(seen.error());
-    const geometry::RigidTransform tcp_from_target =
-        seen->tracker_from_tcp.inverse() * seen->tracker_from_target;
-    if (!tcp_from_target.matrix().allFinite() || !seen->covariance.allFinite())
-      return fail(Reason::not_finite, "the tracker's measurement of the tool is not finite");
-    misses.push_back(
-        {tcp_from_target.translation.norm(),
-         geometry::vector_from_rotation(tcp_from_target.rotation).norm() * 180 / std::numbers::pi,
-         std::sqrt(std::max(0.0, seen->covariance.topLeftCorner<3, 3>().trace()))});
+    const auto miss = miss_of(*seen);
+    if (!miss) return tl::unexpected<Failure>(miss.error());
+    misses.push_back(*miss);
     const Miss& now = misses.back();
     if (2 * now.sigma_mm > corrections.tolerance_mm)
       return refuse(Reason::uncertain, "the tracker's uncertainty exceeds the tolerance", misses);
@@ -48,7 +52,8 @@ Expected<std::vector<Miss>> follow_target(const Corrections& corrections, const 
       return refuse(Reason::off_target, "the next correction exceeds its limit", misses);
     if (misses.size() > 1 && now.distance_mm > misses[misses.size() - 2].distance_mm + 2 * now.sigma_mm)
       return refuse(Reason::off_target, "the last correction increased the error", misses);
-    if (const auto moved = move(tcp_from_target); !moved) return tl::unexpected<Failure>(moved.error());
+    if (const auto moved = move(seen->tracker_from_tcp.inverse() * seen->tracker_from_target); !moved)
+      return tl::unexpected<Failure>(moved.error());
   }
 }
 

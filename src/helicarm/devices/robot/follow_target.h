@@ -23,6 +23,9 @@ struct Miss {
   double sigma_mm = 0;  ///< of the position, root of the covariance's trace
 };
 
+/// Refuses not_finite.
+Expected<Miss> miss_of(const ToolMeasurement& seen);
+
 using Measure = std::function<Expected<ToolMeasurement>()>;
 /// Moves the tool to a pose given relative to its present one.
 using MoveTool = std::function<Expected<void>(const geometry::RigidTransform& tcp_from_new)>;

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/real_time.h"
 #include "helicarm/core/text.h"
 #include "helicarm/devices/robot/robot_registry.h"
 #include "helicarm/devices/robot/straight_path.h"
@@ -151,6 +152,7 @@ Expected<void> RobotLink::send(const RobotOrder& order, Stops since) {
 }
 
 Expected<RobotState> RobotLink::supervise(Stops since, const Watch& watch) {
+  const RealTime priority;
   auto looked = Clock::now();
   std::unique_lock lock(guard_);
   for (;;) {

@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <mutex>
 
+#include "helicarm/core/real_time.h"
 #include "helicarm/devices/robot/rtde_message.h"
 #include "helicarm/devices/robot/timed_socket.h"
 
@@ -56,6 +57,7 @@ RtdeClient::RtdeClient(RtdeOptions options, RobotListener listener)
 RtdeClient::~RtdeClient() = default;
 
 void RtdeClient::run(const std::stop_token& stop) {
+  const RealTime priority;
   std::mutex guard;
   std::condition_variable_any ended;
   double retry_s = 0.1;

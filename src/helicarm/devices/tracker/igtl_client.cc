@@ -4,6 +4,7 @@
 #include <mutex>
 #include <thread>
 
+#include "helicarm/core/real_time.h"
 #include "helicarm/devices/tracker/igtl_connection.h"
 #include "helicarm/devices/tracker/pose_board.h"
 
@@ -132,7 +133,10 @@ Expected<std::unique_ptr<IgtlClient>> IgtlClient::start(const IgtlClientOptions&
   if (!endpoint) return tl::unexpected(endpoint.error());
   auto impl = std::make_unique<Impl>(options, *endpoint, std::move(on_message), std::move(on_connect));
   impl->connect();
-  impl->thread = std::jthread([raw = impl.get()] { raw->io.run(); });
+  impl->thread = std::jthread([raw = impl.get()] {
+    const RealTime priority;
+    raw->io.run();
+  });
   return std::unique_ptr<IgtlClient>(new IgtlClient(std::move(impl)));
 }
 

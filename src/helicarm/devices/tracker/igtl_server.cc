@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/line_limit.h"
+#include "helicarm/core/real_time.h"
 #include "helicarm/devices/tracker/igtl_connection.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/devices/tracker/pose_gate.h"
@@ -250,7 +251,10 @@ Expected<std::unique_ptr<IgtlServer>> IgtlServer::start(const IgtlServerOptions&
   auto impl = std::make_unique<Impl>(options, std::move(on_message));
   if (auto listening = impl->listen(*endpoint); !listening) return tl::unexpected(listening.error());
   impl->accept();
-  impl->thread = std::jthread([raw = impl.get()] { raw->io.run(); });
+  impl->thread = std::jthread([raw = impl.get()] {
+    const RealTime priority;
+    raw->io.run();
+  });
   return std::unique_ptr<IgtlServer>(new IgtlServer(std::move(impl)));
 }
 

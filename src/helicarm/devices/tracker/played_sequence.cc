@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/tracker/played_sequence.h"
 
+#include "helicarm/core/real_time.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/devices/tracker/sequence_stream.h"
 
@@ -10,6 +11,7 @@ PlayedSequence::PlayedSequence(std::vector<SequenceFrame> frames, TrackerListene
     : frames_(std::move(frames)),
       listener_(std::move(listener)),
       thread_([this](const std::stop_token& stop) {
+        const RealTime priority;
         listener_.connected();
         const auto hand_over = [this](const IgtlMessage& message) {
           ++messages_;

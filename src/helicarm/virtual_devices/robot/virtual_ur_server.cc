@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/real_time.h"
 #include "helicarm/virtual_devices/robot/virtual_ur_messages.h"
 
 namespace helicarm::robot {
@@ -43,7 +44,10 @@ Expected<void> VirtualUr::Server::listen() {
     accept(i, wanted[i].second);
   }
   if (!options_.lockstep) tick(std::chrono::steady_clock::now());
-  thread_ = std::thread([this] { io_.run(); });
+  thread_ = std::thread([this] {
+    const RealTime priority;
+    io_.run();
+  });
   return {};
 }
 

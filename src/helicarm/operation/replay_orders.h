@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "helicarm/operation/orders.h"
+#include "helicarm/session/session_log.h"
+
+namespace helicarm::operation {
+
+/// Derives every order of a record, and what came of it, from the records before it.
+class OrderReplay {
+ public:
+  /// Called with the record's origin and what differs.
+  using Differ = std::function<void(const std::string& origin, const std::string& how)>;
+
+  explicit OrderReplay(Differ differ) : differ_(std::move(differ)) {}
+
+  /// The records that concern orders; `result` is the last measurement. Throws BadInput for a malformed
+  /// record.
+  void take(const session::SessionRecord& record, const OperationPlan& plan,
+            const std::optional<pipeline::Result>& result);
+
+  /// The tracker's samples for the verification that the next case holds, once.
+  std::optional<PoseWindow> take_verify_look() { return std::exchange(verify_look_, std::nullopt); }
+  /// Of the registered robot, or of the plan's drill.
+  std::optional<TrackedTool> tool(const OperationPlan& plan) const;
+
+  std::size_t orders = 0, confirmations = 0, outcomes = 0;
+
+ private:
+  struct Planned {
+    robot::RobotOrder order;
+    guidance::Bone bone = guidance::Bone::femur;
+    geometry::RigidTransform bone_from_target;
+  };
+  struct Leaving {
+    std::string digest;  ///< of the order to the tunnel that is left
+    Withdrawal from;
+  };
+  using Record = session::SessionRecord;
+
+  void poses(const Record& record, const std::string& origin);
+  void tour(const Record& record, const std::string& origin);
+  void hand_eye(const Record& record, const OperationPlan& plan, const std::string& origin);
+  void withdraw(const Record& record, const std::string& origin);
+  void order(const Record& record, const OperationPlan& plan, const std::optional<pipeline::Result>& result,
+             const std::string& origin);
+  robot::RobotOrder derived(const std::string& name, const OperationPlan& plan,
+                            const std::optional<pipeline::Result>& result, std::optional<Planned>& planned);
+  void confirmed(const Record& record, const std::string& origin);
+  void carried_out(const Record& record, const std::string& origin);
+  void halted(const Record& record);
+  void navigated(const Record& record, const OperationPlan& plan, const std::string& origin);
+  void outcome(const Record& record, const OperationPlan& plan, const std::optional<pipeline::Result>& result,
+               const std::string& origin);
+  void end(const Record& record, const std::string& origin);
+  void compare(const Json& then, const Json& now, const std::string& origin, const char* what);
+
+  Differ differ_;
+  std::optional<tracker::HandEye> hand_eye_;
+  std::optional<robot::Joints> joints_;        ///< of the order that follows
+  std::deque<geometry::RigidTransform> tour_;  ///< still to be ordered
+  std::vector<PoseWindow> looks_;              ///< at the tool, at each pose of the tour
+  std::optional<PoseWindow> plan_look_, verify_look_;
+  std::optional<Leaving> leaving_;
+  std::vector<PoseWindow> corrections_;     ///< since the last confirmation
+  std::map<std::string, Planned> planned_;  ///< orders to a tunnel, by digest
+  std::map<std::string, std::string> to_,
+      other_;                       ///< by name: digest of the last order to a tunnel, of others
+  std::optional<Json> open_;        ///< a confirmation whose motion has not ended
+  std::optional<Planned> reached_;  ///< by the last order that was carried out
+  std::string unverified_;          ///< tunnel that the tool has reached
+};
+
+/// Names of the first differing fields, for a message.
+std::string differing_fields(const Json& then, const Json& now);
+
+}  // namespace helicarm::operation

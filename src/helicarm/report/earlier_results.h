@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+/// Whatever its exit code, a command leaves nothing of its kind from an earlier run in its folder: call these
+/// before anything can fail. Files of others stay.
+namespace helicarm::report {
+
+/// All files of `run` in this folder, also those of a run with models; overlays by the names of the views in
+/// the result that it holds.
+void forget_results(const std::filesystem::path& folder);
+
+/// All files of `register`, also of a sequence.
+void forget_registration(const std::filesystem::path& folder);
+
+}  // namespace helicarm::report
