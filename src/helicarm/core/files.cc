@@ -58,8 +58,10 @@ class Descriptor {
 /// the program, or a named one where the file system has none (NFS, FUSE).
 class FileAside {
  public:
-  explicit FileAside(const fs::path& path)
+  /// `mode`: less the umask.
+  explicit FileAside(const fs::path& path, mode_t mode = 0666)
       : path_(path),
+        mode_(mode),
         unnamed_(::open(folder_of(path).c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, mode)),
         named_(unnamed_.is_open() && fs::exists(unnamed_.path()) ? -1 : open_named()) {}
   ~FileAside() {
@@ -87,20 +89,19 @@ class FileAside {
   }
 
  private:
-  static constexpr mode_t mode = 0666;  // less the umask
-
   const Descriptor& file() const { return named_.is_open() ? named_ : unnamed_; }
   bool linked_to(const fs::path& name) const {
     return ::linkat(AT_FDCWD, unnamed_.path().c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0;
   }
   int open_named() {
     const fs::path name = name_aside(path_);
-    const int number = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+    const int number = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, mode_);
     if (number >= 0) name_ = name;
     return number;
   }
 
   const fs::path& path_;
+  const mode_t mode_;
   fs::path name_;  ///< of the file beside `path_`, where it has one
   Descriptor unnamed_, named_;
 };
@@ -120,6 +121,12 @@ Expected<void> replaced(FileAside& aside, const fs::path& path) {
   const Descriptor folder(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.is_open()) ::fsync(folder.number());
   return {};
+}
+
+Expected<void> written(FileAside& aside, const fs::path& path, std::string_view bytes) {
+  if (!aside.is_open() || !write_all(aside.number(), bytes))
+    return tl::unexpected<Failure>(cannot_write(path, errno));
+  return replaced(aside, path);
 }
 
 Expected<void> make_folder(const fs::path& folder) {
@@ -168,9 +175,7 @@ Expected<void> write_file(const fs::path& path, std::string_view bytes) {
 
 Expected<void> write_file_in_folder(const fs::path& path, std::string_view bytes) {
   FileAside aside(path);
-  if (!aside.is_open() || !write_all(aside.number(), bytes))
-    return tl::unexpected<Failure>(cannot_write(path, errno));
-  return replaced(aside, path);
+  return written(aside, path, bytes);
 }
 
 Expected<void> make_private_folder(const fs::path& named) {
@@ -195,9 +200,8 @@ Expected<void> make_private_file(const fs::path& path) {
 }
 
 Expected<void> write_private_file(const fs::path& path, std::string_view bytes) {
-  return replace_file(path, [&](const fs::path& aside) {
-    return make_private_file(aside).and_then([&] { return write_bytes(aside, path, bytes); });
-  });
+  FileAside aside(path, 0600);
+  return written(aside, path, bytes);
 }
 
 Expected<void> write_file_with(const fs::path& path, const Write& write) {
