@@ -101,7 +101,7 @@ class Report : public testing::Test {
     asked.name = "implant";
     given.models = {asked};
     RegisterOptions options;
-    options.threads = 1;
+    options.run.threads = 1;
     options.shift_mm = 3;
     options.turn_deg = 3;
     const auto model = *registration::model_from("implant", surface());

@@ -146,9 +146,9 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
   });
   return joined<ReadView>(std::move(views), std::move(images))
       .and_then([](std::vector<ReadView> read) -> OrRefusal<std::vector<ReadView>> {
-        std::vector<const xray::XrayImage*> images;
-        for (const ReadView& view : read) images.push_back(view.xray_image.get());
-        const auto together = check_images_belong_together(images);
+        std::vector<const xray::XrayImage*> of_views;
+        for (const ReadView& view : read) of_views.push_back(view.xray_image.get());
+        const auto together = check_images_belong_together(of_views);
         if (together) return read;
         Refusal refusal{together.error(), {}};
         for (const ReadView& view : read) refusal.views.push_back(reported(view));
