@@ -96,8 +96,9 @@ TEST_F(MeasureCase, EveryOptionReachesTheModels) {
   pipeline::RunOptions fresh;
   fresh.history.emplace();
   calibration::CArmHistory learned;
+  const pipeline::Result acquired = pipeline::run_case(given_.base, fresh).value();
   for (int i = 0; i < 3; ++i)
-    for (calibration::HistoryEntry entry : pipeline::run_case(given_.base, fresh).value().entries) {
+    for (calibration::HistoryEntry entry : acquired.entries) {
       entry.image += std::to_string(i);
       learned.entries.push_back(entry);
     }
