@@ -17,6 +17,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr mode_t readable_by_all = 0666;  // less the umask
+
 using Write = std::function<Expected<void>(const fs::path& aside)>;
 
 fs::path folder_of(const fs::path& path) {
@@ -56,10 +58,10 @@ class Descriptor {
 /// the program, or a named one where the file system has none (NFS, FUSE).
 class FileAside {
  public:
-  explicit FileAside(const fs::path& path)
+  FileAside(const fs::path& path, mode_t mode)
       : path_(path),
         unnamed_(::open(folder_of(path).c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, mode)),
-        named_(unnamed_.is_open() && fs::exists(unnamed_.path()) ? -1 : open_named()) {}
+        named_(unnamed_.is_open() && fs::exists(unnamed_.path()) ? -1 : open_named(mode)) {}
   ~FileAside() {
     if (!name_.empty()) ::unlink(name_.c_str());
   }
@@ -85,13 +87,11 @@ class FileAside {
   }
 
  private:
-  static constexpr mode_t mode = 0666;  // less the umask
-
   const Descriptor& file() const { return named_.is_open() ? named_ : unnamed_; }
   bool linked_to(const fs::path& name) const {
     return ::linkat(AT_FDCWD, unnamed_.path().c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0;
   }
-  int open_named() {
+  int open_named(mode_t mode) {
     const fs::path name = name_aside(path_);
     const int number = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, mode);
     if (number >= 0) name_ = name;
@@ -118,6 +118,14 @@ Expected<void> replaced(FileAside& aside, const fs::path& path) {
   const Descriptor folder(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.is_open()) ::fsync(folder.number());
   return {};
+}
+
+/// Atomic replacement: unnamed file, fsync, link or rename, fsync of the folder.
+Expected<void> replace_file(const fs::path& path, std::string_view bytes, mode_t mode = readable_by_all) {
+  FileAside aside(path, mode);
+  if (!aside.is_open() || !write_all(aside.number(), bytes))
+    return tl::unexpected<Failure>(cannot_write(path, errno));
+  return replaced(aside, path);
 }
 
 Expected<void> make_folder(const fs::path& folder) {
@@ -165,15 +173,12 @@ Expected<void> write_file(const fs::path& path, std::string_view bytes) {
 }
 
 Expected<void> write_file_in_folder(const fs::path& path, std::string_view bytes) {
-  FileAside aside(path);
-  if (!aside.is_open() || !write_all(aside.number(), bytes))
-    return tl::unexpected<Failure>(cannot_write(path, errno));
-  return replaced(aside, path);
+  return replace_file(path, bytes);
 }
 
 Expected<void> write_file_with(const fs::path& path, const Write& write) {
   if (auto made = make_folder(folder_of(path)); !made) return made;
-  FileAside aside(path);
+  FileAside aside(path, readable_by_all);
   if (!aside.is_open()) return tl::unexpected<Failure>(cannot_write(path, errno));
   return write(aside.open_as()).and_then([&] { return replaced(aside, path); });
 }
