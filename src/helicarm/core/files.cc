@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr mode_t readable_by_all = 0666;  // less the umask
+
 using Write = std::function<Expected<void>(const fs::path& aside)>;
 
 fs::path folder_of(const fs::path& path) {
@@ -58,12 +60,10 @@ class Descriptor {
 /// the program, or a named one where the file system has none (NFS, FUSE).
 class FileAside {
  public:
-  /// `mode`: less the umask.
-  explicit FileAside(const fs::path& path, mode_t mode = 0666)
+  FileAside(const fs::path& path, mode_t mode)
       : path_(path),
-        mode_(mode),
         unnamed_(::open(folder_of(path).c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, mode)),
-        named_(unnamed_.is_open() && fs::exists(unnamed_.path()) ? -1 : open_named()) {}
+        named_(unnamed_.is_open() && fs::exists(unnamed_.path()) ? -1 : open_named(mode)) {}
   ~FileAside() {
     if (!name_.empty()) ::unlink(name_.c_str());
   }
@@ -93,15 +93,14 @@ class FileAside {
   bool linked_to(const fs::path& name) const {
     return ::linkat(AT_FDCWD, unnamed_.path().c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0;
   }
-  int open_named() {
+  int open_named(mode_t mode) {
     const fs::path name = name_aside(path_);
-    const int number = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, mode_);
+    const int number = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, mode);
     if (number >= 0) name_ = name;
     return number;
   }
 
   const fs::path& path_;
-  const mode_t mode_;
   fs::path name_;  ///< of the file beside `path_`, where it has one
   Descriptor unnamed_, named_;
 };
@@ -123,7 +122,9 @@ Expected<void> replaced(FileAside& aside, const fs::path& path) {
   return {};
 }
 
-Expected<void> written(FileAside& aside, const fs::path& path, std::string_view bytes) {
+/// Atomic replacement: unnamed file, fsync, link or rename, fsync of the folder.
+Expected<void> replace_file(const fs::path& path, std::string_view bytes, mode_t mode = readable_by_all) {
+  FileAside aside(path, mode);
   if (!aside.is_open() || !write_all(aside.number(), bytes))
     return tl::unexpected<Failure>(cannot_write(path, errno));
   return replaced(aside, path);
@@ -174,8 +175,7 @@ Expected<void> write_file(const fs::path& path, std::string_view bytes) {
 }
 
 Expected<void> write_file_in_folder(const fs::path& path, std::string_view bytes) {
-  FileAside aside(path);
-  return written(aside, path, bytes);
+  return replace_file(path, bytes);
 }
 
 Expected<void> make_private_folder(const fs::path& named) {
@@ -200,13 +200,12 @@ Expected<void> make_private_file(const fs::path& path) {
 }
 
 Expected<void> write_private_file(const fs::path& path, std::string_view bytes) {
-  FileAside aside(path, 0600);
-  return written(aside, path, bytes);
+  return replace_file(path, bytes, 0600);
 }
 
 Expected<void> write_file_with(const fs::path& path, const Write& write) {
   if (auto made = make_folder(folder_of(path)); !made) return made;
-  FileAside aside(path);
+  FileAside aside(path, readable_by_all);
   if (!aside.is_open()) return tl::unexpected<Failure>(cannot_write(path, errno));
   return write(aside.open_as()).and_then([&] { return replaced(aside, path); });
 }

@@ -196,33 +196,33 @@ TEST(ImportOpenCv, JsonIsReadUnderTheUsualNames) {
 }
 
 TEST(ImportOpenCv, LensIsRefusedUnderEveryName) {
-  for (const char* lens : {"\"dist_coeff\": [-0.2, 0.1]",
-                           "\"distortion\": [-0.2]",
-                           "\"distCoeffs\": [[-0.2, 0]]",
-                           "\"D\": [0, 0.1]",
-                           "\"d\": [0.1]",
-                           "\"kc\": [0.1]",
-                           "\"dist_params\": [0.1]",
-                           "\"cam_dist\": [0.1]",
-                           "\"kappa\": 0.1",
-                           "\"k1\": -0.2",
-                           "\"p2\": 1e-4",
-                           "\"K1\": 0.1",
-                           "\"dist\": [0.1]",
-                           "\"distortion\": {\"k1\": 0, \"k2\": 0.1}",
-                           "\"RadialDistortion\": [0.1, 0]",
-                           "\"lens\": {\"radial\": [0.1]}",
-                           "\"intrinsics_extra\": {\"coeffs\": [0.1]}",
-                           "\"xi\": 0.8",
-                           "\"distortion\": \"see lens.txt\"",
-                           "\"distortion_model\": \"equidistant\"",
-                           "\"camera_model\": \"fisheye\", \"D\": [0, 0, 0, 0]",
-                           "\"fisheye_model\": 1",
-                           "\"distortion_coefficients\": {\"rows\": 1, \"cols\": 2, \"data\": [0, 0.1]}"}) {
-    const auto refused = import_text(json_camera(lens));
-    ASSERT_FALSE(refused) << lens;
+  for (const char* key : {"\"dist_coeff\": [-0.2, 0.1]",
+                          "\"distortion\": [-0.2]",
+                          "\"distCoeffs\": [[-0.2, 0]]",
+                          "\"D\": [0, 0.1]",
+                          "\"d\": [0.1]",
+                          "\"kc\": [0.1]",
+                          "\"dist_params\": [0.1]",
+                          "\"cam_dist\": [0.1]",
+                          "\"kappa\": 0.1",
+                          "\"k1\": -0.2",
+                          "\"p2\": 1e-4",
+                          "\"K1\": 0.1",
+                          "\"dist\": [0.1]",
+                          "\"distortion\": {\"k1\": 0, \"k2\": 0.1}",
+                          "\"RadialDistortion\": [0.1, 0]",
+                          "\"lens\": {\"radial\": [0.1]}",
+                          "\"intrinsics_extra\": {\"coeffs\": [0.1]}",
+                          "\"xi\": 0.8",
+                          "\"distortion\": \"see lens.txt\"",
+                          "\"distortion_model\": \"equidistant\"",
+                          "\"camera_model\": \"fisheye\", \"D\": [0, 0, 0, 0]",
+                          "\"fisheye_model\": 1",
+                          "\"distortion_coefficients\": {\"rows\": 1, \"cols\": 2, \"data\": [0, 0.1]}"}) {
+    const auto refused = import_text(json_camera(key));
+    ASSERT_FALSE(refused) << key;
     EXPECT_EQ(refused.error().reason, Reason::unsupported) << refused.error().message;
-    expect_opencv_pixels(import_text(json_camera(lens), {.undistorted = true}));
+    expect_opencv_pixels(import_text(json_camera(key), {.undistorted = true}));
   }
 }
 

@@ -267,12 +267,10 @@ TEST(Measure, RefusesClicksThatDetermineNothing) {
 /// Anterior and posterior margin 100 px apart, a point at 20 %.
 TEST(Measure, PositionOutsideTheLandmarksIsWarnedOfAndTheExchangedClicksAreNamed) {
   const auto warnings = [](double anterior, double posterior, double point) {
-    const auto measured = measure(Kind::tibia_ap,
-                                  {{"anterior", {anterior, 0}, half_px},
-                                   {"posterior", {posterior, 0}, half_px},
-                                   {"FS", {point, 0}, half_px}},
-                                  {});
-    return measured->positions[0].warnings;
+    const std::vector<Click> clicks{{"anterior", {anterior, 0}, half_px},
+                                    {"posterior", {posterior, 0}, half_px},
+                                    {"FS", {point, 0}, half_px}};
+    return measure(Kind::tibia_ap, clicks, {})->positions[0].warnings;
   };
   EXPECT_TRUE(warnings(0, 100, 20).empty());
   EXPECT_TRUE(warnings(0, 100, -0.3).empty());  // within its error
