@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/calibration/distortion_check.h"
 #include "helicarm/calibration/intrinsics_check.h"
 #include "helicarm/rectification/round_field.h"
 
@@ -226,10 +227,14 @@ std::vector<Warning> doubtful_intrinsics(const std::vector<LabelledView>& views,
     size_px.push_back(size_of(views[i]));
   }
   std::vector<Warning> warnings;
-  if (std::ranges::none_of(calibration.warnings, [](const Warning& warning) {
-        return warning.reason == Reason::intrinsics_inconsistent;
-      }))
+  const auto warned_of = [&](Reason reason) {
+    return std::ranges::count(calibration.warnings, reason, &Warning::reason) > 0;
+  };
+  if (!warned_of(Reason::intrinsics_inconsistent))
     warnings = calibration::check_intrinsics(fiducials, common);
+  if (!warned_of(Reason::residual_distortion) && !warned_of(Reason::calibrator_strained))
+    if (auto distorted = calibration::check_distortion(fiducials, common))
+      warnings.push_back(*std::move(distorted));
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!views[i].rectification.map.is_identity() || !rectification::round_field(*views[i].xray_image))
       continue;

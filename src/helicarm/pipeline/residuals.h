@@ -33,9 +33,9 @@ std::vector<Warning> explain_residuals(const std::vector<LabelledView>& views,
                                        const calibration::CommonPrior& common);
 
 /// Warnings about the intrinsics of a calibration whose residuals are small, because the intrinsics absorb
-/// what is wrong: `check_intrinsics`, and `residual_distortion` for a round field, as of an image
-/// intensifier, that neither plate nor map rectifies, unless the fiducials exclude a distortion (a round
-/// collimator).
+/// what is wrong: `check_intrinsics`, `check_distortion`, and `residual_distortion` for a round field, as of
+/// an image intensifier, that neither plate nor map rectifies, unless the fiducials exclude a distortion (a
+/// round collimator).
 std::vector<Warning> doubtful_intrinsics(const std::vector<LabelledView>& views,
                                          const calibration::CalibrationResult& calibration,
                                          const calibration::CommonPrior& common);

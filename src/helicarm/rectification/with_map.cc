@@ -46,6 +46,10 @@ struct SeenPlate {
   Lattice kind;
 };
 
+/// Holes are bright, as noise and trabeculae are: they are a plate if most dots of their size lie on the
+/// lattice.
+constexpr double least_share_of_holes = 0.6;
+
 /// The largest lattice of the dots; nothing if it is too small to be a plate.
 std::optional<SeenPlate> plate_among(const std::vector<detection::Dot>& dots,
                                      const xray::XrayImage& xray_image,
@@ -55,6 +59,9 @@ std::optional<SeenPlate> plate_among(const std::vector<detection::Dot>& dots,
     const auto scale = plate.pitch_mm ? expected_scale(xray_image, plate) : std::nullopt;
     SeenPlate found{seen_lattice(dots, plate, scale), plate.lattice};
     const std::size_t most = largest ? largest->seen.lattice.dots.size() : least - 1;
+    const double share =
+        double(found.seen.lattice.dots.size()) / double(std::max<std::size_t>(1, found.seen.dots.size()));
+    if (plate.kind == DotKind::holes && share < least_share_of_holes) continue;
     if (found.seen.lattice.dots.size() > most) largest = std::move(found);
   }
   return largest;
