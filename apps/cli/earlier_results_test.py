@@ -134,7 +134,8 @@ class EarlierResults(SimulatedCase):
         self.assertEqual(run("predict", self.broken(), "--map", out).returncode, 2)
         self.assertEqual(run("bundle", self.broken(), "--out", out / "bundle.tar.gz").returncode, 2)
         self.assertEqual(run("detect", self.root / "nowhere.dcm", "--out", out / "dots.csv").returncode, 2)
-        self.assertEqual(self.names(out), ["notes.txt", "number.csv", "number.json", "number.svg"])
+        self.assertEqual(run("study", "number", "--draws", 5, "--out", out).returncode, 2)
+        self.assertEqual(self.names(out), ["notes.txt"])
         simulated = self.root / "simulated"
         self.assertEqual(run("simulate", simulated, "--size", 512, "--quiet").returncode, 0)
         self.assertEqual(run("simulate", simulated, "--distance", 45).returncode, 2)

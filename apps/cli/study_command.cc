@@ -204,16 +204,16 @@ const KnownStudy& study_named(const std::string& name) {
 CommandResult study_command(const StudyArguments& arguments, Console& console) {
   return guarded([&] {
     const KnownStudy& study = study_named(arguments.name);
-    only(arguments, study.options);
     const std::filesystem::path& out = arguments.out;
+    const study::Ranks ranks;
+    if (ranks.leads())
+      forget_files(out, {arguments.name + ".csv", arguments.name + ".json", arguments.name + ".svg"});
+    only(arguments, study.options);
     std::error_code error;
     if (std::filesystem::create_directories(out, error); error)
       throw BadInput(Reason::cannot_write, fmt::format("{}: {}", out.string(), error.message()));
-    const study::Ranks ranks;
     if (ranks.count() > 1 && ranks.leads() && !console.quiet)
       console.progress << fmt::format("helicarm: {} ranks\n", ranks.count());
-    if (ranks.leads())
-      forget_files(out, {arguments.name + ".csv", arguments.name + ".json", arguments.name + ".svg"});
     StudyRun run{arguments, console, ranks, {}};
     run.engine.threads = console.threads;
     run.engine.journal = out / (arguments.name + ".partial");

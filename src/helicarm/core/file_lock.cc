@@ -20,7 +20,7 @@ namespace {
 
 using LockClock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds lock_patience{30};
+constexpr std::chrono::seconds lock_patience{60};
 constexpr std::chrono::milliseconds lock_pause{5};
 
 /// Whether this descriptor's file still has this name: its last holder may have removed it.

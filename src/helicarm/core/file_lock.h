@@ -12,7 +12,7 @@ namespace helicarm {
 /// what this one writes: by a lock file beside it, NAME.lock, which is removed afterwards.
 class FileLock {
  public:
-  /// Waits for others up to 30 s. Refuses cannot_write: the folder or an existing file cannot be written, or
+  /// Waits for others up to 60 s. Refuses cannot_write: the folder or an existing file cannot be written, or
   /// another program holds the lock.
   static Expected<FileLock> of(const std::filesystem::path& file);
   ~FileLock();

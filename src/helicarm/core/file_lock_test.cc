@@ -24,7 +24,7 @@ class LockedFile : public testing::Test {
     const FileLock lock = FileLock::of(file).value();
     const int count = std::stoi(read_file(lock.file(), 100).value());
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    EXPECT_TRUE(write_file(lock.file(), std::to_string(count + 1)));
+    std::ofstream(lock.file()) << count + 1;
   }
   void SetUp() override { ASSERT_TRUE(write_file(file_, "0")); }
 

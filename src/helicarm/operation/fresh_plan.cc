@@ -6,6 +6,7 @@
 #include "helicarm/xray/digest.h"
 
 namespace helicarm::operation {
+
 /// Before registration the tool's expected pose is unknown.
 robot::Watch Operation::sees_tool() const {
   return [this]() -> Expected<void> {

@@ -46,7 +46,7 @@ class Replay {
     if (record.kind == "hand_eye") ++report.hand_eyes;
     if (record.kind == "guide") guide(record, origin);
     if (record.kind == "guided") guided(record, origin);
-    orders_.take(record, plan_, result_);
+    orders_.take(record, plan_, result_, newest_);
     report.orders = orders_.orders;
     report.confirmations = orders_.confirmations;
     report.outcomes = orders_.outcomes;
@@ -150,7 +150,7 @@ class Replay {
     for (const auto& [view, image] : views_) {
       ++report.images;
       const std::string file = fmt::format("{}.dcm", view);
-      if (record.content.value("files", Json::object()).value(file, Json()) != image.digest)
+      if (record.content.value("files", Json::object()).value(file, Json()) != Json(image.digest))
         differ(origin, fmt::format("{}/{} is not the recorded image", folder, file));
     }
     const auto derived = guarded([&] { return derived_case(recorded); });
@@ -173,10 +173,12 @@ class Replay {
       if (const auto taken = views_.find(view); taken != views_.end()) images.push_back(taken->second);
     guidance::Poses now;
     std::vector<verification::ToolLine> lines;
-    if (const auto look = orders_.take_verify_look()) {
+    const auto look = orders_.take_verify_look();
+    verifies_ = !recorded.at("tool_lines").empty();
+    if (verifies_) {
+      if (!look) throw BadInput(Reason::bad_value, "the poses of its verification are not recorded");
       now = value_or_throw(poses_now(*look, plan_.tracker));
-      const Json& line = recorded.at("tool_lines");
-      const std::string name = line.empty() ? "" : line.at(0).at("tunnel").get<std::string>();
+      const std::string name = recorded.at("tool_lines").at(0).at("tunnel").get<std::string>();
       const auto tunnel = std::ranges::find(plan_.tunnels, name, &PlannedTunnel::name);
       const auto tool = orders_.tool(plan_);
       if (tunnel == plan_.tunnels.end() || !tool || images.empty())
@@ -194,7 +196,8 @@ class Replay {
     const std::filesystem::path inside = value_or_throw(path_inside(session_, folder));
     const auto run = recompute_case(inside, plan_, cache_);
     if (!run) return differ(origin, run.error().message);
-    result_ = run->result;
+    newest_ = run->result;
+    if (!verifies_) result_ = newest_;
     if (record.content.at("digest") != run->digest)
       differ(origin, fmt::format("{}: the result differs from the recorded one on recomputation", folder));
     const auto then = read_json(inside / "result.json");
@@ -227,7 +230,9 @@ class Replay {
 
   std::filesystem::path session_;
   OperationPlan plan_;
-  std::optional<pipeline::Result> result_;
+  std::optional<pipeline::Result> result_;  ///< of the last measurement
+  std::optional<pipeline::Result> newest_;  ///< also of a verification
+  bool verifies_ = false;                   ///< the last case is that of a verification
   std::optional<FreehandGuide> guide_;
   pipeline::CalibrationCache cache_;
   OrderReplay orders_;

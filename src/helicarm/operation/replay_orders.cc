@@ -24,7 +24,7 @@ const PlannedTunnel& tunnel_of(const OperationPlan& plan, const std::string& nam
   return *tunnel;
 }
 
-std::string text(const session::SessionRecord& record, const char* key) {
+std::string text_at(const session::SessionRecord& record, const char* key) {
   return record.content.at(key).get<std::string>();
 }
 
@@ -47,7 +47,8 @@ void OrderReplay::compare(const Json& then, const Json& now, const std::string& 
 }
 
 void OrderReplay::take(const Record& record, const OperationPlan& plan,
-                       const std::optional<pipeline::Result>& result) {
+                       const std::optional<pipeline::Result>& measured,
+                       const std::optional<pipeline::Result>& newest) {
   const std::string origin = fmt::format("record {}", record.number);
   if (record.kind == "poses") poses(record, origin);
   if (record.kind == "robot") {
@@ -57,12 +58,12 @@ void OrderReplay::take(const Record& record, const OperationPlan& plan,
   if (record.kind == "tour") tour(record, origin);
   if (record.kind == "hand_eye") hand_eye(record, plan, origin);
   if (record.kind == "withdraw") withdraw(record, origin);
-  if (record.kind == "order") order(record, plan, result, origin);
+  if (record.kind == "order") order(record, plan, measured, origin);
   if (record.kind == "confirmed") confirmed(record, origin);
   if (record.kind == "carried_out") carried_out(record, origin);
   if (record.kind == "halted") halted(record);
   if (record.kind == "navigated") navigated(record, plan, origin);
-  if (record.kind == "outcome") outcome(record, plan, result, origin);
+  if (record.kind == "outcome") outcome(record, plan, newest, origin);
   if (record.kind == "end") end(record, origin);
 }
 
@@ -74,7 +75,7 @@ std::optional<TrackedTool> OrderReplay::tool(const OperationPlan& plan) const {
 
 void OrderReplay::poses(const Record& record, const std::string& origin) {
   PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
-  const std::string why = text(record, "why");
+  const std::string why = text_at(record, "why");
   if (why == "hand-eye")
     looks_.push_back(std::move(window));
   else if (why == "correct")
@@ -112,7 +113,7 @@ void OrderReplay::hand_eye(const Record& record, const OperationPlan& plan, cons
 
 void OrderReplay::withdraw(const Record& record, const std::string& origin) {
   JsonReader reader(record.content, origin);
-  leaving_ = Leaving{text(record, "digest"),
+  leaving_ = Leaving{text_at(record, "digest"),
                      {geometry::exact_pose_from(reader, "base_from_tcp", any_place_mm),
                       geometry::exact_pose_from(reader, "base_from_rest", any_place_mm)}};
   plan_look_.reset();
@@ -149,7 +150,7 @@ robot::RobotOrder OrderReplay::derived(const std::string& name, const OperationP
 void OrderReplay::order(const Record& record, const OperationPlan& plan,
                         const std::optional<pipeline::Result>& result, const std::string& origin) {
   ++orders;
-  const std::string name = text(record, "name");
+  const std::string name = text_at(record, "name");
   std::optional<Planned> planned;
   const auto order = guarded([&] { return derived(name, plan, result, planned); });
   joints_.reset();
@@ -165,7 +166,7 @@ void OrderReplay::order(const Record& record, const OperationPlan& plan,
 void OrderReplay::confirmed(const Record& record, const std::string& origin) {
   ++confirmations;
   if (open_) differ_(origin, "a confirmation before the end of the previous motion");
-  const std::string name = text(record, "order"), digest = text(record, "digest");
+  const std::string name = text_at(record, "order"), digest = text_at(record, "digest");
   const auto is_last = [&](const std::map<std::string, std::string>& of) {
     const auto last = of.find(name);
     return last != of.end() && last->second == digest;
@@ -179,18 +180,18 @@ void OrderReplay::confirmed(const Record& record, const std::string& origin) {
 void OrderReplay::carried_out(const Record& record, const std::string& origin) {
   if (!open_ || *open_ != record.content) differ_(origin, "the motion is not that which was confirmed");
   open_.reset();
-  const auto planned = planned_.find(text(record, "digest"));
+  const auto planned = planned_.find(text_at(record, "digest"));
   reached_ = planned == planned_.end() ? std::nullopt : std::optional(planned->second);
 }
 
 void OrderReplay::halted(const Record& record) {
-  const std::string order = text(record, "order");
+  const std::string order = text_at(record, "order");
   if (open_ && open_->at("order") == order) open_.reset();
   if (unverified_ == order) unverified_.clear();
 }
 
 void OrderReplay::navigated(const Record& record, const OperationPlan& plan, const std::string& origin) {
-  const std::string name = text(record, "tunnel");
+  const std::string name = text_at(record, "tunnel");
   unverified_ = name;
   if (!reached_ || reached_->order.name != name || !hand_eye_)
     return differ_(origin, fmt::format("no order to {} was carried out", name));
@@ -205,7 +206,7 @@ void OrderReplay::navigated(const Record& record, const OperationPlan& plan, con
 void OrderReplay::outcome(const Record& record, const OperationPlan& plan,
                           const std::optional<pipeline::Result>& result, const std::string& origin) {
   ++outcomes;
-  const std::string name = text(record, "tunnel");
+  const std::string name = text_at(record, "tunnel");
   if (unverified_ == name) unverified_.clear();
   const auto with = tool(plan);
   if (!result || !with) return differ_(origin, "an outcome without a measurement or a registration");

@@ -21,10 +21,10 @@ class OrderReplay {
 
   explicit OrderReplay(Differ differ) : differ_(std::move(differ)) {}
 
-  /// The records that concern orders; `result` is the last measurement. Throws BadInput for a malformed
-  /// record.
+  /// The records that concern orders; `newest` is `measured`, or the verification after it. Throws BadInput
+  /// for a malformed record.
   void take(const session::SessionRecord& record, const OperationPlan& plan,
-            const std::optional<pipeline::Result>& result);
+            const std::optional<pipeline::Result>& measured, const std::optional<pipeline::Result>& newest);
 
   /// The tracker's samples for the verification that the next case holds, once.
   std::optional<PoseWindow> take_verify_look() { return std::exchange(verify_look_, std::nullopt); }

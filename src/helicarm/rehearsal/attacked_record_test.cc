@@ -113,7 +113,7 @@ TEST_F(AttackedRecord, EveryRemovedFileDiffers) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::recursive_directory_iterator(session_))
     if (entry.is_regular_file() && entry.path().filename() != "session.log" &&
-        entry.path().filename() != ".lock")
+        entry.path().parent_path().filename() != "inbox")
       files.push_back(entry.path());
   EXPECT_GE(files.size(), 3 * 7u);
   for (const fs::path& file : files) {
@@ -122,6 +122,11 @@ TEST_F(AttackedRecord, EveryRemovedFileDiffers) {
     EXPECT_FALSE(replayed().complete()) << file;
     fs::rename(aside, file);
   }
+}
+
+TEST_F(AttackedRecord, RemovedInboxDiffers) {
+  fs::remove_all(session_ / "inbox");
+  expect_differing_files("inbox: the image of AP is missing or was changed");
 }
 
 TEST_F(AttackedRecord, ChangedOutcomeDiffers) {
