@@ -108,6 +108,16 @@ Warning motion_note(const pipeline::CaseModel& asked) {
       {}};
 }
 
+/// What the model's files say in two ways, or hold beyond what they state; an orientation that they do not
+/// state is a note.
+void add_warnings_of_files(const registration::Model& model, registration::Registration& registration) {
+  for (const Warning& warning : model.warnings) {
+    const bool note = warning.reason == Reason::spacing_missing;
+    (note ? registration.notes : registration.warnings).push_back(warning);
+    if (!note) registration.decision = std::max(registration.decision, registration::Decision::warn);
+  }
+}
+
 class Registrar {
  public:
   Registrar(const pipeline::RegistrationCase& given, const RegisterOptions& options,
@@ -145,6 +155,7 @@ class Registrar {
       }
     }
     if (!follows && views.size() > 1) made.registration.notes.push_back(motion_note(asked));
+    if (made.model) add_warnings_of_files(*made.model, made.registration);
     if (asked.plan && made.registration.is_determined())
       carry_plan(value_or_throw(read_plan(*asked.plan)), given_.base, made);
     return made;
