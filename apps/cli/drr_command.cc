@@ -13,6 +13,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/image/png.h"
+#include "helicarm/pipeline/result.h"
 #include "helicarm/volume/drr.h"
 #include "helicarm/volume/read_volume.h"
 
@@ -101,6 +102,7 @@ CommandResult drr_command(const DrrArguments& arguments, Console& console) {
                               {"maximum", greatest},
                               {"source_mm", geometry::json_list(view.source_in_world())},
                               {"projection", geometry::json_rows(view.projection())},
+                              {"warnings", pipeline::json_list_of(volume.warnings)},
                               {"prepare_ms", prepare_ms},
                               {"project_ms", project_ms}})
                   << '\n';

@@ -64,7 +64,11 @@ void add_points(std::vector<JsonReader> entries, Measured& measured) {
                 Eigen::Map<const Eigen::Matrix3d>(entry.matrix("covariance_mm2", 3, 3, numbers).data())};
     if (entry.has("seen") && !rays_miss(entry))
       point.seen = seen_in(entry.object("seen"), name, measured.calibration.views);
-    if (!entry.objects("warnings", false).empty()) point.warnings = entry.raw("warnings");
+    for (JsonReader& warning : entry.objects("warnings", false)) {
+      warning.text("code");
+      warning.optional_text("message", 10'000);
+      point.warnings = entry.raw("warnings");
+    }
     if (!measured.points.emplace(name, std::move(point)).second)
       entry.refuse(Reason::name_clash, "name", fmt::format("there is another point \"{}\"", name));
   }

@@ -49,6 +49,9 @@ void follow(const RegisterArguments& arguments, const case_registration::Registe
   ProgressLine progress(console);
   const auto sequence = value_or_throw(
       case_registration::follow_case(given, range, options, [&](double share) { progress.notify(share); }));
+  if (!console.quiet)
+    for (const Warning& warning : sequence.warnings)
+      console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
   if (sequence.failure) throw BadInput(*sequence.failure);
   value_or_throw(case_registration::write_sequence(sequence, arguments.run.out));
   Json summary = {

@@ -181,6 +181,9 @@ Expected<CaseSequence> follow_case(const pipeline::RegistrationCase& given, cons
       sequence.frames.push_back(std::move(made));
       if (on_frame) on_frame(double(i + 1) / range.count());
     }
+    for (const auto& body : bodies)
+      sequence.warnings.insert(sequence.warnings.end(), body->model.warnings.begin(),
+                               body->model.warnings.end());
     sequence.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     return sequence;
   });

@@ -7,10 +7,9 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/centred_view.h"
-#include "helicarm/core/files.h"
+#include "helicarm/case_registration/tiff_stack.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/import_matrix.h"
-#include "helicarm/image/tiff.h"
 #include "helicarm/pipeline/belong_together.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/volume/read_volume.h"
@@ -68,28 +67,6 @@ image::Image<std::uint8_t> usable_of(const pipeline::LabelledView& view,
   return usable;
 }
 
-volume::Volume tiff_stack(const fs::path& path, const Eigen::Vector3d& voxel_mm, double offset_hu) {
-  const std::string bytes = value_or_throw(read_file(path, volume::max_volume_bytes));
-  const std::string origin = path.filename().string();
-  const int pages = value_or_throw(image::count_tiff_pages(bytes, origin));
-  volume::Volume stack;
-  for (int page = 0; page < pages; ++page) {
-    const image::GreyImage slice = value_or_throw(image::decode_tiff(bytes, page, origin));
-    const Eigen::Vector3i size(slice.pixels.width(), slice.pixels.height(), pages);
-    if (page == 0)
-      stack.voxels.reserve(value_or_throw(volume::voxel_count(size.cast<double>(), origin)));
-    else if (size != stack.size)
-      throw BadInput(Reason::bad_size,
-                     fmt::format("{}: page {} has {} x {} pixels, the first {} x {}", origin, page + 1,
-                                 size.x(), size.y(), stack.size.x(), stack.size.y()));
-    stack.size = size;
-    for (const std::uint16_t value : slice.pixels.pixels())
-      stack.voxels.push_back(static_cast<float>(value + offset_hu));
-  }
-  stack.patient_from_voxel = Eigen::Scaling(voxel_mm);
-  return stack;
-}
-
 bool is_stack(const fs::path& path) {
   std::string extension = path.extension().string();
   std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
@@ -101,7 +78,7 @@ volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& given,
   if (!given.voxel_mm)
     throw BadInput(Reason::bad_value,
                    fmt::format("models: \"{}\": \"voxel_mm\" is missing: a TIFF stack needs it", given.name));
-  return tiff_stack(path, *given.voxel_mm, offset_hu);
+  return value_or_throw(tiff_stack(path, *given.voxel_mm, offset_hu));
 }
 
 bool has_voxels_of(const volume::Volume& volume, const Eigen::Vector3d& voxel_mm) {
@@ -230,9 +207,12 @@ Expected<std::vector<RegistrationView>> with_images(const LoadedViews& loaded,
 
 Expected<std::optional<registration::Model>> load_model(const pipeline::CaseModel& given) {
   return guarded([&]() -> std::optional<registration::Model> {
-    if (given.surface)
-      return value_or_throw(
-          registration::model_from(given.name, value_or_throw(registration::read_surface(*given.surface))));
+    if (given.surface) {
+      registration::SurfaceMesh surface = value_or_throw(registration::read_surface(*given.surface));
+      registration::Model model = value_or_throw(registration::model_from(given.name, surface));
+      model.warnings = std::move(surface.warnings);
+      return model;
+    }
     if (!given.volume) return std::nullopt;
     if (given.voxel_mm && !is_stack(*given.volume))
       throw BadInput(Reason::bad_value,
@@ -246,7 +226,10 @@ Expected<std::optional<registration::Model>> load_model(const pipeline::CaseMode
       mask->patient_from_voxel = volume.patient_from_voxel;
     std::optional<registration::HuWindow> window;
     if (given.window_hu) window = {given.window_hu->x(), given.window_hu->y()};
-    return value_or_throw(registration::model_from(given.name, volume, mask, window));
+    registration::Model model = value_or_throw(registration::model_from(given.name, volume, mask, window));
+    model.warnings = volume.warnings;
+    if (mask) model.warnings.insert(model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
+    return model;
   });
 }
 

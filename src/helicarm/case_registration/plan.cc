@@ -6,11 +6,15 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
+#include "helicarm/volume/declared.h"
 
 namespace helicarm::case_registration {
 namespace {
+
+using Eigen::Vector3d;
 
 constexpr std::size_t most_points = 10000;
 constexpr double farthest_mm = 10000;
@@ -29,32 +33,38 @@ class Markup {
   std::vector<PlanPoint> points() const {
     std::vector<PlanPoint> points;
     if (!json_.is_object() || !json_.contains("controlPoints")) return points;
-    const std::string system = text("coordinateSystem", "LPS");
-    const bool ras = system == "RAS" || system == "0";
-    if (!ras && system != "LPS" && system != "1") refuse(fmt::format("coordinateSystem \"{}\"", system));
-    if (const std::string unit = text("coordinateUnits", "mm"); unit != "mm")
-      throw BadInput(Reason::unsupported,
-                     fmt::format("{}: coordinateUnits \"{}\", must be mm", where_, unit));
+    const Vector3d to_lps =
+        lps_from() * volume::declared_unit(text("coordinateUnits", "mm"), where_ + ": coordinateUnits");
     if (!json_["controlPoints"].is_array()) refuse("\"controlPoints\" is not a list");
     for (const Json& entry : json_["controlPoints"]) {
       const Markup point(entry, where_ + ": controlPoints");
       if (point.text("positionStatus", "defined") != "defined") continue;
-      points.push_back({point.text("label", ""), point.position()});
-      if (ras) points.back().in_model.head<2>() *= -1;
+      points.push_back({point.text("label", ""), point.position().cwiseProduct(to_lps)});
+      if (const Vector3d& at = points.back().in_model; !(at.cwiseAbs().maxCoeff() <= farthest_mm))
+        refuse(fmt::format("\"{}\" at ({:g}, {:g}, {:g}) mm, must lie within {:g} mm", points.back().name,
+                           at.x(), at.y(), at.z(), farthest_mm));
     }
     return points;
   }
 
  private:
-  Eigen::Vector3d position() const {
+  /// Signs of the axes. Slicer writes names, older versions of it numbers.
+  Vector3d lps_from() const {
+    if (!json_.contains("coordinateSystem")) return {1, 1, 1};
+    const Json& value = json_["coordinateSystem"];
+    const std::string system =
+        value.is_number_integer() ? std::to_string(value.get<int>()) : text("coordinateSystem", "");
+    if (system == "0") return {-1, -1, 1};
+    return system == "1" ? Vector3d(1, 1, 1) : volume::declared_space(system, where_ + ": coordinateSystem");
+  }
+  Vector3d position() const {
     if (!json_.is_object() || !json_.contains("position") || !json_["position"].is_array() ||
         json_["position"].size() != 3)
       refuse("\"position\" must be three numbers");
-    Eigen::Vector3d place;
+    Vector3d place;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const Json& value = json_["position"][axis];
-      if (!value.is_number() || !(std::abs(value.get<double>()) <= farthest_mm))
-        refuse(fmt::format("\"position\" must be numbers within {:g} mm", farthest_mm));
+      if (!value.is_number()) refuse("\"position\" must be three numbers");
       place[Eigen::Index(axis)] = value.get<double>();
     }
     return place;
@@ -77,10 +87,21 @@ void add_point(Plan& plan, PlanPoint point, const std::string& where) {
 
 }  // namespace
 
+void refuse_fcsv(const std::filesystem::path& path) {
+  const auto bytes = read_file(path, std::uintmax_t{1} << 20);
+  if (path.extension() == ".fcsv" || (bytes && bytes->starts_with("# Markups fiducial file")))
+    throw BadInput(
+        Reason::unsupported,
+        fmt::format("{}: Slicer's old list of fiducials (.fcsv) is not read: open it in 3D Slicer; "
+                    "save a plan as markups (.mrk.json), landmarks as a CSV of name,x_mm,y_mm,z_mm",
+                    path.filename().string()));
+}
+
 Expected<Plan> read_plan(const std::filesystem::path& path) {
   return guarded([&] {
-    const Json json = value_or_throw(read_json(path));
     const std::string origin = path.filename().string();
+    refuse_fcsv(path);
+    const Json json = value_or_throw(read_json(path));
     if (!json.is_object() || !json.contains("markups") || !json["markups"].is_array())
       throw BadInput(Reason::bad_value,
                      fmt::format("{}: no list \"markups\": not a file of Slicer's markups", origin));

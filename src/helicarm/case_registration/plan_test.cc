@@ -34,6 +34,37 @@ TEST(ReadPlan, ALineIsATunnel) {
   EXPECT_EQ(plan->points[plan->tunnels[0].end].name, "femur_end");
 }
 
+Expected<Plan> plan_with(const std::string& declares) {
+  return plan_of(R"({"markups": [{"type": "Fiducial", )" + declares +
+                 R"(, "controlPoints": [{"label": "entry", "position": [1, 2, 3]}]}]})");
+}
+
+TEST(ReadPlan, UnitsAreConvertedToMillimetres) {
+  EXPECT_EQ(plan_with(R"("coordinateUnits": "cm")")->points[0].in_model, Eigen::Vector3d(10, 20, 30));
+  EXPECT_EQ(plan_with(R"("coordinateUnits": "m", "coordinateSystem": "RAS")")->points[0].in_model,
+            Eigen::Vector3d(-1000, -2000, 3000));
+  const auto unknown = plan_with(R"("coordinateUnits": "voxel")");
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().reason, Reason::unsupported);
+  EXPECT_THAT(unknown.error().message, testing::HasSubstr("coordinateUnits is \"voxel\""));
+}
+
+TEST(ReadPlan, CoordinateSystemsByNameAndNumber) {
+  EXPECT_EQ(plan_with(R"("coordinateSystem": 0)")->points[0].in_model, Eigen::Vector3d(-1, -2, 3));
+  EXPECT_EQ(plan_with(R"("coordinateSystem": "1")")->points[0].in_model, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(plan_with(R"("coordinateSystem": "scanner")").error().reason, Reason::unsupported);
+}
+
+TEST(ReadPlan, AnOldListOfFiducialsIsNamed) {
+  const TemporaryFolder folder;
+  const std::string text = "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n1,2,3\n";
+  ASSERT_TRUE(write_file(folder.path() / "F.fcsv", text));
+  const auto plan = read_plan(folder.path() / "F.fcsv");
+  ASSERT_FALSE(plan);
+  EXPECT_EQ(plan.error().reason, Reason::unsupported);
+  EXPECT_THAT(plan.error().message, testing::HasSubstr(".mrk.json"));
+}
+
 TEST(ReadPlan, APlaceOfTwoNumbersIsRefused) {
   const auto plan = plan_of(R"({"markups": [{"controlPoints": [{"position": [1, 2]}]}]})");
   ASSERT_FALSE(plan);

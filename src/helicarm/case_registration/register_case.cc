@@ -83,6 +83,16 @@ Warning motion_note(const pipeline::CaseModel& asked, double motion_sigma_mm) {
       {{"motion_sigma_mm", motion_sigma_mm}}};
 }
 
+/// What the model's files say in two ways, or hold beyond what they state; an orientation that they do not
+/// state is a note.
+void add_warnings_of_files(const registration::Model& model, registration::Registration& registration) {
+  for (const Warning& warning : model.warnings) {
+    const bool note = warning.reason == Reason::spacing_missing;
+    (note ? registration.notes : registration.warnings).push_back(warning);
+    if (!note) registration.decision = std::max(registration.decision, registration::Decision::warn);
+  }
+}
+
 class Registrar {
  public:
   Registrar(const pipeline::RegistrationCase& given, const RegisterOptions& options,
@@ -129,6 +139,7 @@ class Registrar {
       carry_plan(*plan, given_.base, made);
       limit_error(largest_error(made.points), options_.run.max_error_mm, made.registration);
     }
+    if (made.model) add_warnings_of_files(*made.model, made.registration);
     return made;
   }
 

@@ -56,6 +56,15 @@ class Shadow {
   image::Image<std::uint8_t> cells_;
 };
 
+/// Cells of the shadow's grid, 64 MB; a pose whose shadow is larger shows nothing of the surface.
+constexpr double most_shadow_cells = 1 << 26;
+
+bool has_shadow(const std::vector<Vector2d>& pixels, double cell) {
+  Vector2d low = pixels.front(), high = low;
+  for (const Vector2d& at : pixels) low = low.cwiseMin(at), high = high.cwiseMax(at);
+  return ((high - low) / cell + Vector2d::Constant(6)).prod() < most_shadow_cells;
+}
+
 constexpr double sample_step = 0.5;  // of the profile, raster pixels
 
 /// Attenuation between pixels; nothing where it is not valid.
@@ -128,7 +137,9 @@ std::vector<ContourPoint> apparent_contour(const Surface& surface, const geometr
   std::vector<double> facing(mesh.triangles.size());
   for (std::size_t i = 0; i < facing.size(); ++i)
     facing[i] = surface.normals[i].dot(source - mesh.corners[mesh.triangles[i][0]]);
-  const Shadow shadow(pixels, mesh.triangles, std::max(1.0, spacing_px / 2));
+  const double cell = std::max(1.0, spacing_px / 2);
+  if (!has_shadow(pixels, cell)) return {};
+  const Shadow shadow(pixels, mesh.triangles, cell);
   const Eigen::Matrix3d line_from_normal = view.intrinsics.matrix().inverse().transpose() *
                                            view.camera_from_world.rotation * world_from_model.rotation;
   std::vector<ContourPoint> contour;
@@ -137,9 +148,9 @@ std::vector<ContourPoint> apparent_contour(const Surface& surface, const geometr
     const double a = facing[edge.faces[0]], b = facing[edge.faces[1]];
     if (a * b >= 0) continue;
     const Vector2d pixel = 0.5 * (pixels[edge.corners[0]] + pixels[edge.corners[1]]);
-    const std::pair<int, int> cell(int(std::floor(pixel.x() / spacing_px)),
-                                   int(std::floor(pixel.y() / spacing_px)));
-    if (taken.contains(cell)) continue;
+    const std::pair<int, int> place(int(std::floor(pixel.x() / spacing_px)),
+                                    int(std::floor(pixel.y() / spacing_px)));
+    if (taken.contains(place)) continue;
     // Normal of the plane through the source and the edge.
     const Vector3d normal =
         std::abs(b) * surface.normals[edge.faces[0]] + std::abs(a) * surface.normals[edge.faces[1]];
@@ -148,7 +159,7 @@ std::vector<ContourPoint> apparent_contour(const Surface& surface, const geometr
     across.normalize();
     const double aside = std::max(2.0, 1.5 * spacing_px);
     if (shadow.covers(pixel + aside * across)) continue;
-    taken.emplace(cell, contour.size());
+    taken.emplace(place, contour.size());
     contour.push_back(
         {world_from_model * (0.5 * (mesh.corners[edge.corners[0]] + mesh.corners[edge.corners[1]])), pixel,
          across});

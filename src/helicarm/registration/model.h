@@ -24,6 +24,7 @@ struct Model {
   std::vector<Eigen::Vector3d> samples;  ///< points spread over the body
   double radius_mm = 0;                  ///< rms distance of the samples from the centre
   double resolution_mm = 0;              ///< of the density's voxels
+  std::vector<Warning> warnings = {};    ///< of its files
 };
 
 /// Hounsfield units taken as the body; values above the upper limit count as the limit.

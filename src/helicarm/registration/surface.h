@@ -15,11 +15,18 @@ namespace helicarm::registration {
 /// Largest number of triangles of a surface file.
 inline constexpr std::size_t max_triangles = 5'000'000;
 
-/// Reads STL (binary or text), PLY (text or binary) or VTK XML PolyData (`mesh_from_vtp`), detected by
-/// content. Corners at one place are joined. Fails with missing_file, truncated, bad_size, bad_value,
-/// not_finite, unsupported.
-Expected<phantom::TriangleMesh> read_surface(const std::filesystem::path& path);
-Expected<phantom::TriangleMesh> surface_from(std::string_view bytes, const std::string& origin);
+/// A surface in L, P, S and mm with what was odd in its file.
+struct SurfaceMesh : phantom::TriangleMesh {
+  std::vector<Warning> warnings = {};
+};
+
+/// Reads STL (binary or text), PLY (text or binary) or VTK XML PolyData (`vtp_surface`), detected by content.
+/// A space (RAS, LAS, LPS) and a unit that header, comments or field data state are converted to L, P, S and
+/// mm. Corners at one place, up to rounding, are joined. Warns of surplus_data, irregular_file. Fails with
+/// missing_file, truncated, bad_size, bad_value (a corner over 1 m from the surface's middle), not_finite,
+/// unsupported.
+Expected<SurfaceMesh> read_surface(const std::filesystem::path& path);
+Expected<SurfaceMesh> surface_from(std::string_view bytes, const std::string& origin);
 
 /// A triangle mesh prepared for its apparent contour.
 struct Surface {

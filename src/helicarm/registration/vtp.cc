@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/registration/surface.h"
+#include "helicarm/volume/declared.h"
 #include "helicarm/volume/voxels.h"
 
 namespace helicarm::registration {
@@ -16,7 +17,7 @@ namespace {
 
 using Attributes = std::map<std::string, std::string, std::less<>>;
 
-constexpr std::size_t most_values = 3 * max_triangles;
+constexpr std::size_t most_values = 3 * max_triangles, most_head = 100'000;
 
 struct Tag {
   std::string name;  ///< of an end tag with its slash
@@ -122,20 +123,24 @@ class VtpReader {
   VtpReader(std::string_view bytes, const std::string& origin)
       : bytes_(bytes), origin_(origin), tags_(bytes, origin) {}
 
-  phantom::TriangleMesh read() {
+  SurfaceFile read() {
     find_appended();
+    SurfaceFile file;
+    file.declares = first_comments();
     std::string group;
     for (std::optional<Tag> tag = tags_.next(); tag && tag->name != "AppendedData"; tag = tags_.next()) {
       if (tag->name == "VTKFile") begin_file(tag->attributes);
       if (tag->name == "Piece") begin_piece(tag->attributes);
-      if (tag->name == "Points" || tag->name == "Polys") group = tag->name;
-      if (tag->name == "/Points" || tag->name == "/Polys") group.clear();
-      if (tag->name == "DataArray" && !group.empty())
+      if (tag->name == "Points" || tag->name == "Polys" || tag->name == "FieldData") group = tag->name;
+      if (tag->name == "/Points" || tag->name == "/Polys" || tag->name == "/FieldData") group.clear();
+      if (group == "FieldData") file.declares += field_declaration({tag->attributes, tags_.rest()});
+      if (tag->name == "DataArray" && (group == "Points" || group == "Polys"))
         arrays_[group == "Points" ? "points" : text(tag->attributes, "Name")] = {tag->attributes,
                                                                                  tags_.rest()};
       if (tag->name == "/Piece") end_piece();
     }
-    return std::move(mesh_);
+    file.mesh = std::move(mesh_);
+    return file;
   }
 
  private:
@@ -224,6 +229,53 @@ class VtpReader {
       refuse(Reason::bad_size, fmt::format("more than {} triangles", max_triangles));
   }
 
+  /// Comments before the first piece.
+  std::string first_comments() const {
+    std::string comments;
+    const std::string_view head = bytes_.substr(0, std::min(bytes_.find("<Piece"), most_head));
+    for (std::size_t at = head.find("<!--"); at != std::string_view::npos; at = head.find("<!--", at + 4)) {
+      const std::size_t end = std::min(head.find("-->", at), head.size());
+      comments += std::string(head.substr(at + 4, std::min(end - at - 4, longest_declaration))) + ";";
+    }
+    return comments;
+  }
+
+  /// "NAME=VALUE;" of an array of texts whose name may be that of a space or unit; else nothing.
+  std::string field_declaration(const Array& array) const {
+    const std::string name = text(array.attributes, "Name"), small = volume::small_letters(name);
+    if (text(array.attributes, "type") != "String" || name.size() > longest_declaration ||
+        (small.find("space") == std::string::npos && small.find("coord") == std::string::npos &&
+         small.find("unit") == std::string::npos))
+      return {};
+    std::string value;
+    if (text(array.attributes, "format") == "ascii") {
+      // VTK writes the numbers of the letters, then 0.
+      const std::string_view content = array.content.substr(0, array.content.find('<'));
+      SurfaceWords words(content, origin_);
+      for (std::string_view word = words.next(); !word.empty() && word != "0"; word = words.next()) {
+        const bool number =
+            word.find_first_not_of("0123456789") == std::string_view::npos && word.size() <= 3;
+        value += number ? std::string(1, static_cast<char>(std::stoi(std::string(word)))) : std::string(word);
+      }
+    } else {
+      Stream stream = stream_of(array, name);
+      value = packed_ ? unpacked(stream) : stream.take(header(stream));
+      value = value.substr(0, value.find('\0'));
+    }
+    return name + "=" + value.substr(0, longest_declaration) + ";";
+  }
+
+  /// The bytes of an array that is not text.
+  Stream stream_of(const Array& array, const std::string& name) const {
+    const std::string format = text(array.attributes, "format");
+    if (format == "binary") return {array.content, true, origin_};
+    if (format != "appended") refuse(Reason::unsupported, fmt::format("DataArray format \"{}\"", format));
+    const std::size_t offset = count(array.attributes, "offset", std::size_t{1} << 31);
+    if (offset >= appended_.size())
+      refuse(Reason::truncated, fmt::format("DataArray \"{}\" lies beyond the file", name));
+    return {appended_.substr(offset), !raw_, origin_};
+  }
+
   std::vector<double> values(const char* name, std::size_t wanted) const {
     if (wanted == 0) return {};
     const auto found = arrays_.find(name);
@@ -231,12 +283,7 @@ class VtpReader {
     const auto& [attributes, content] = found->second;
     const std::string format = text(attributes, "format"), type = text(attributes, "type");
     if (format == "ascii") return volume::read_numbers(content.substr(0, content.find('<')), wanted, origin_);
-    if (format == "binary") return decoded(Stream(content, true, origin_), type, wanted);
-    if (format != "appended") refuse(Reason::unsupported, fmt::format("DataArray format \"{}\"", format));
-    const std::size_t offset = count(attributes, "offset", std::size_t{1} << 31);
-    if (offset >= appended_.size())
-      refuse(Reason::truncated, fmt::format("DataArray \"{}\" lies beyond the file", name));
-    return decoded(Stream(appended_.substr(offset), !raw_, origin_), type, wanted);
+    return decoded(stream_of(found->second, name), type, wanted);
   }
 
   std::size_t header(Stream& stream) const {
@@ -319,7 +366,7 @@ bool is_vtk_xml(std::string_view bytes) {
          (bytes.starts_with("<?xml") && bytes.substr(0, 2000).find("<VTKFile") != std::string_view::npos);
 }
 
-phantom::TriangleMesh mesh_from_vtp(std::string_view bytes, const std::string& origin) {
+SurfaceFile vtp_surface(std::string_view bytes, const std::string& origin) {
   return VtpReader(bytes, origin).read();
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/registration/vtp.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include <gtest/gtest.h>
@@ -125,6 +126,47 @@ TEST(Vtp, AppendedRawAndBase64) {
                                           with_size(bytes_of(four_ends))};
   expect_tetrahedron(appended_file(raw, "raw"));
   expect_tetrahedron(appended_file({base64(raw[0]), base64(raw[1]), base64(raw[2])}, "base64"));
+}
+
+std::string with_field(const std::string& bytes, const std::string& array) {
+  const std::string piece = "<PolyData>\n";
+  return std::string(bytes).replace(bytes.find(piece), piece.size(),
+                                    piece + "<FieldData>\n" + array + "</FieldData>\n");
+}
+
+void expect_in_lps(const std::string& bytes) {
+  const auto read = surface_from(bytes, "t.vtp");
+  ASSERT_TRUE(read) << read.error().message;
+  const auto holds = [&](const Eigen::Vector3d& at) {
+    return std::ranges::any_of(read->corners, [&](const auto& corner) { return corner.isApprox(at); });
+  };
+  EXPECT_TRUE(holds({-10, 0, 0}) && holds({0, -10, 0}) && holds({0, 0, 10}));
+}
+
+TEST(Vtp, SpaceOfItsFieldDataAsSlicerWritesIt) {
+  const std::string head = R"(<Array type="String" Name="SPACE" NumberOfTuples="1" format=)";
+  expect_in_lps(with_field(text_file(), head + "\"ascii\">\n82 65 83 0\n</Array>\n"));
+  const std::string binary = base64(with_size(std::string("RAS\0", 4)));
+  const std::string whole =
+      binary_file({base64(with_size(bytes_of(four_corners))), base64(with_size(bytes_of(four_faces))),
+                   base64(with_size(bytes_of(four_ends)))},
+                  "");
+  expect_in_lps(with_field(whole, head + "\"binary\">\n" + binary + "\n</Array>\n"));
+}
+
+TEST(Vtp, SpaceOfAComment) {
+  expect_in_lps(
+      std::string(text_file()).replace(text_file().find("<!-- a > b -->"), 14, "<!-- SPACE=RAS -->"));
+}
+
+TEST(Vtp, UnknownSpaceIsRefused) {
+  const auto read = surface_from(
+      with_field(text_file(),
+                 "<Array type=\"String\" Name=\"SPACE\" format=\"ascii\">\n88 89 90 0\n</Array>\n"),
+      "t.vtp");
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().reason, Reason::unsupported);
+  EXPECT_NE(read.error().message.find("XYZ"), std::string::npos) << read.error().message;
 }
 
 void expect_refused(std::string bytes, const std::string& what, const std::string& by, Reason reason) {

@@ -19,6 +19,8 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::uintmax_t most_slice_bytes = std::uintmax_t{64} << 20;
+constexpr xray::DicomTag rescale_type{0x00281054, "Rescale Type"};
+constexpr std::string_view enhanced_ct = "1.2.840.10008.5.1.4.1.1.2.1";
 constexpr double most_coordinate_mm = 1e5;
 // Positions are decimal text with few digits; the relative limit allows for more rounding in thick slices.
 constexpr double uneven_mm = 0.1;
@@ -61,26 +63,65 @@ Slice slice_of(const xray::DicomOutline& outline) {
   return slice;
 }
 
-/// Slices in the folder by series UID; other files and localizer images are skipped.
-std::map<std::string, std::vector<Slice>> find_series(const std::filesystem::path& folder) {
+/// By its preamble, or without one by its first group, 0002 or 0008.
+bool may_be_dicom(std::string_view bytes) {
+  using namespace std::literals;
+  return (bytes.size() >= 132 && bytes.substr(128, 4) == "DICM") || bytes.starts_with("\2\0\0\0UL"sv) ||
+         bytes.starts_with("\x8\0\5\0CS"sv) || bytes.starts_with("\x8\0\x8\0CS"sv) ||
+         bytes.starts_with("\x8\0\x16\0UI"sv);
+}
+
+/// The slices of a folder by series UID, and what else lies there.
+struct FolderOfSlices {
+  std::map<std::string, std::vector<Slice>> series;
+  std::vector<Failure> unreadable;  ///< of DICOM files
+  std::map<std::string, int> other_classes;
+};
+
+/// Localizer images and files that are not DICOM are skipped.
+FolderOfSlices find_series(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(folder))
     if (entry.is_regular_file()) paths.push_back(entry.path());
   std::ranges::sort(paths);
-  std::map<std::string, std::vector<Slice>> series;
+  FolderOfSlices found;
   for (const auto& path : paths) {
     const auto bytes = read_file(path, most_slice_bytes);
-    if (!bytes || bytes->size() < 132 || bytes->compare(128, 4, "DICM") != 0) continue;
-    const xray::DicomElements elements = value_or_throw(xray::walk_dicom(*bytes, path.string()));
-    if (elements.text(xray::tags::sop_class) != xray::ct_class) continue;
-    if (elements.text(xray::tags::image_type).find("LOCALIZER") != std::string_view::npos) continue;
-    const xray::DicomOutline outline =
-        value_or_throw(xray::check_dicom(*bytes, path.string(), xray::DicomKind::ct));
-    Slice slice = slice_of(outline);
-    slice.path = path;
-    series[std::string(elements.text(xray::tags::series))].push_back(std::move(slice));
+    if (!bytes) found.unreadable.push_back(bytes.error());
+    if (!bytes || !may_be_dicom(*bytes)) continue;
+    const auto read = guarded([&] {
+      const xray::DicomElements elements = value_or_throw(xray::walk_dicom(*bytes, path.string()));
+      if (const auto kind = elements.text(xray::tags::sop_class); kind != xray::ct_class) {
+        ++found.other_classes[std::string(kind)];
+        return;
+      }
+      if (elements.text(xray::tags::image_type).find("LOCALIZER") != std::string_view::npos) return;
+      Slice slice = slice_of(value_or_throw(xray::check_dicom(*bytes, path.string(), xray::DicomKind::ct)));
+      slice.path = path;
+      found.series[std::string(elements.text(xray::tags::series))].push_back(std::move(slice));
+    });
+    if (!read) found.unreadable.push_back(read.error());
   }
-  return series;
+  return found;
+}
+
+std::string no_slice(const FolderOfSlices& found, const std::string& origin) {
+  std::string message = origin + ": the folder contains no DICOM CT slice";
+  for (const auto& [kind, count] : found.other_classes)
+    message += fmt::format(
+        "; {} of SOP class {}", count,
+        kind == enhanced_ct ? "Enhanced CT: convert the file to one file for each slice" : xray::quote(kind));
+  return message;
+}
+
+Warning skipped(const std::vector<Failure>& unreadable) {
+  std::string message =
+      fmt::format("{} file(s) beside the slices cannot be read and are left out: ", unreadable.size());
+  constexpr std::size_t most_named = 3;
+  for (std::size_t i = 0; i < std::min(unreadable.size(), most_named); ++i)
+    message += (i > 0 ? "; " : "") + unreadable[i].message;
+  if (unreadable.size() > most_named) message += "; ...";
+  return {unreadable.front().reason, message, {}, {{"files", double(unreadable.size())}}};
 }
 
 void check_alike(const std::vector<Slice>& slices) {
@@ -124,12 +165,24 @@ Vector3d even_step(const std::vector<Slice>& slices, const std::string& origin) 
   return step;
 }
 
-void decode_slice(const Slice& slice, float* voxels) {
+/// Values that are stated to be something else than Hounsfield units.
+void check_rescale_type(const Slice& slice, const xray::DicomElements& elements,
+                        std::vector<Warning>& warnings) {
+  const std::string_view type = elements.text(rescale_type);
+  if (type.empty() || type == "HU" || type == "US" || !warnings.empty()) return;
+  warnings.push_back({Reason::irregular_file,
+                      fmt::format("{}: Rescale Type (0028,1054) is {}, not HU: the values are taken as "
+                                  "Hounsfield units",
+                                  slice.path.string(), xray::quote(type))});
+}
+
+void decode_slice(const Slice& slice, float* voxels, std::vector<Warning>& warnings) {
   const std::string origin = slice.path.string();
   const std::string bytes = value_or_throw(read_file(slice.path, most_slice_bytes));
   const xray::DicomOutline outline = value_or_throw(xray::check_dicom(bytes, origin, xray::DicomKind::ct));
   if (outline.columns != slice.columns || outline.rows != slice.rows)
     throw BadInput(Reason::bad_size, origin + ": changed while it was read");
+  check_rescale_type(slice, outline.elements, warnings);
   const double slope =
       outline.elements.numbers(xray::tags::rescale_slope, 1, -1e6, 1e6).value_or(std::vector{1.0})[0];
   const double shift =
@@ -139,16 +192,11 @@ void decode_slice(const Slice& slice, float* voxels) {
     *voxels++ = static_cast<float>(slope * static_cast<double>(pixel) + shift);
 }
 
-}  // namespace
-
-Volume read_ct_series(const std::filesystem::path& folder) {
-  const std::string origin = folder.string();
-  auto series = find_series(folder);
-  if (series.empty())
-    throw BadInput(Reason::not_an_image, origin + ": the folder contains no DICOM CT slice");
+std::vector<Slice>& largest_of(FolderOfSlices& found, const std::string& origin,
+                               std::vector<Warning>& warnings) {
+  auto& series = found.series;
   const auto largest =
       std::ranges::max_element(series, {}, [](const auto& entry) { return entry.second.size(); });
-  Volume volume;
   if (series.size() > 1) {
     std::vector<std::size_t> counts;
     for (const auto& entry : series) counts.push_back(entry.second.size());
@@ -156,25 +204,51 @@ Volume read_ct_series(const std::filesystem::path& folder) {
       throw BadInput(Reason::name_clash,
                      fmt::format("{}: {} CT series of {} slices: keep one series in the folder", origin,
                                  series.size(), fmt::join(counts, ", ")));
-    volume.warnings.push_back(
-        {Reason::name_clash, fmt::format("{}: {} CT series of {} slices: the largest is used", origin,
-                                         series.size(), fmt::join(counts, ", "))});
+    warnings.push_back({Reason::name_clash, fmt::format("{}: {} CT series of {} slices: the largest is used",
+                                                        origin, series.size(), fmt::join(counts, ", "))});
   }
-  std::vector<Slice>& slices = largest->second;
+  return largest->second;
+}
+
+Volume volume_of(std::vector<Slice>& slices, const std::string& origin) {
   if (slices.size() < 2)
     throw BadInput(Reason::bad_size, origin + ": only one slice, at least 2 are required");
   check_alike(slices);
   const Vector3d normal = slices[0].normal();
   std::ranges::stable_sort(slices, {}, [&](const Slice& slice) { return normal.dot(slice.corner); });
   const Vector3d step = even_step(slices, origin);
+  Volume volume;
   volume.size = {slices[0].columns, slices[0].rows, static_cast<int>(slices.size())};
   const std::size_t count = value_or_throw(voxel_count(volume.size.cast<double>(), origin));
   volume.patient_from_voxel.linear() << slices[0].axes, step;
   volume.patient_from_voxel.translation() = slices[0].corner;
   volume.voxels.resize(count);
   const std::size_t area = count / slices.size();
-  for (std::size_t i = 0; i < slices.size(); ++i) decode_slice(slices[i], volume.voxels.data() + i * area);
+  for (std::size_t i = 0; i < slices.size(); ++i)
+    decode_slice(slices[i], volume.voxels.data() + i * area, volume.warnings);
   return volume;
+}
+
+}  // namespace
+
+Volume read_ct_series(const std::filesystem::path& folder) {
+  const std::string origin = folder.string();
+  FolderOfSlices found = find_series(folder);
+  // What makes the series incomplete may be the file that cannot be read.
+  if (found.series.empty() && !found.unreadable.empty()) throw BadInput(found.unreadable.front());
+  if (found.series.empty()) throw BadInput(Reason::not_an_image, no_slice(found, origin));
+  std::vector<Warning> warnings;
+  std::vector<Slice>& slices = largest_of(found, origin, warnings);
+  auto volume = guarded([&] { return volume_of(slices, origin); });
+  if (!volume && !found.unreadable.empty()) {
+    Failure failure = found.unreadable.front();
+    failure.message += fmt::format("; without it: {}", volume.error().message);
+    throw BadInput(std::move(failure));
+  }
+  Volume read = value_or_throw(std::move(volume));
+  if (!found.unreadable.empty()) warnings.push_back(skipped(found.unreadable));
+  read.warnings.insert(read.warnings.begin(), warnings.begin(), warnings.end());
+  return read;
 }
 
 }  // namespace helicarm::volume

@@ -74,6 +74,44 @@ TEST_F(CtSeries, LargestOfSeveralSeriesIsUsedWithAWarning) {
   EXPECT_EQ(read().error().reason, Reason::name_clash);
 }
 
+TEST_F(CtSeries, AFileThatCannotBeReadIsLeftOutAndNamed) {
+  for (const double z : {0.0, 1.0, 2.0}) put(slice(z));
+  const std::string cut = slice(3).bytes();
+  ASSERT_TRUE(write_file(folder_ / "broken", cut.substr(0, cut.size() - 9)));
+  const auto volume = read();
+  ASSERT_TRUE(volume.has_value()) << volume.error().message;
+  EXPECT_EQ(volume->size.z(), 3);
+  ASSERT_EQ(volume->warnings.size(), 1u);
+  EXPECT_EQ(volume->warnings[0].reason, Reason::truncated);
+  EXPECT_NE(volume->warnings[0].message.find("broken"), std::string::npos);
+}
+
+TEST_F(CtSeries, AFileThatCannotBeReadIsNamedWhereItsSliceIsMissing) {
+  for (const double z : {0.0, 1.0, 3.0, 4.0}) put(slice(z));
+  const std::string cut = slice(2).bytes();
+  ASSERT_TRUE(write_file(folder_ / "broken", cut.substr(0, cut.size() - 9)));
+  const auto volume = read();
+  ASSERT_FALSE(volume.has_value());
+  EXPECT_EQ(volume.error().reason, Reason::truncated);
+  EXPECT_NE(volume.error().message.find("broken"), std::string::npos);
+  EXPECT_NE(volume.error().message.find("mm apart"), std::string::npos);
+}
+
+TEST_F(CtSeries, ValuesThatAreNotHounsfieldUnitsAreSaid) {
+  for (const double z : {0.0, 1.0, 2.0}) put(slice(z).text(0x00281054, "LO", "OD"));
+  const auto volume = read();
+  ASSERT_TRUE(volume.has_value()) << volume.error().message;
+  ASSERT_EQ(volume->warnings.size(), 1u);
+  EXPECT_EQ(volume->warnings[0].reason, Reason::irregular_file);
+}
+
+TEST_F(CtSeries, EnhancedCtIsNamed) {
+  put(slice(0).text(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.2.1"));
+  const auto volume = read();
+  ASSERT_FALSE(volume.has_value());
+  EXPECT_NE(volume.error().message.find("Enhanced CT"), std::string::npos);
+}
+
 TEST_F(CtSeries, InvalidSlicesAreRefused) {
   EXPECT_EQ(read().error().reason, Reason::not_an_image);
   put(slice(0));

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <map>
+#include <optional>
 
 #include <fmt/format.h>
 
+#include "helicarm/volume/declared.h"
 #include "helicarm/volume/voxels.h"
 #include "helicarm/xray/dicom_elements.h"
 
@@ -38,17 +40,34 @@ class MetaHeader {
   }
 
   bool flag(const std::string& key, bool otherwise) const {
-    const std::string value = text(key, otherwise ? "True" : "False");
-    if (value == "True" || value == "true" || value == "1") return true;
-    if (value == "False" || value == "false" || value == "0") return false;
+    const std::string value = small_letters(text(key, otherwise ? "true" : "false"));
+    if (value == "true" || value == "t" || value == "1") return true;
+    if (value == "false" || value == "f" || value == "0") return false;
     throw BadInput(Reason::bad_value,
                    fmt::format("{} is {}, must be True or False", field(key), xray::quote(value)));
   }
 
-  /// Values of the first key that is present; empty if none is.
+  /// Values under the key, or under one of its other names; empty if none is present. Two that differ are
+  /// refused.
   std::vector<double> numbers(std::initializer_list<const char*> keys, std::size_t count) const {
-    for (const char* key : keys)
-      if (has(key)) return read_numbers(text(key), count, field(key));
+    std::vector<double> found;
+    const char* from = nullptr;
+    for (const char* key : keys) {
+      if (!has(key)) continue;
+      auto values = read_numbers(text(key), count, field(key));
+      if (!from) {
+        from = key;
+        found = std::move(values);
+      } else if (found != values) {
+        throw BadInput(Reason::bad_value, fmt::format("{} is {}, but {} is {}: remove the wrong one",
+                                                      field(key), text(key), from, text(from)));
+      }
+    }
+    return found;
+  }
+  std::string_view sequence_key() const {
+    for (const auto& [key, value] : values_)
+      if (key.starts_with("Seq_Frame")) return key;
     return {};
   }
 
@@ -63,44 +82,77 @@ VoxelFormat format_of(const MetaHeader& header) {
       {"MET_CHAR", Kind::int8},       {"MET_UCHAR", Kind::uint8},       {"MET_SHORT", Kind::int16},
       {"MET_USHORT", Kind::uint16},   {"MET_INT", Kind::int32},         {"MET_UINT", Kind::uint32},
       {"MET_LONG_LONG", Kind::int64}, {"MET_ULONG_LONG", Kind::uint64}, {"MET_FLOAT", Kind::float32},
-      {"MET_DOUBLE", Kind::float64}};
+      {"MET_DOUBLE", Kind::float64},  {"MET_LONG", Kind::int32},        {"MET_ULONG", Kind::uint32}};
   const auto found = kinds.find(header.text("ElementType"));
   if (found == kinds.end())
     throw BadInput(Reason::unsupported,
                    fmt::format("{} is {}, must be MET_CHAR to MET_DOUBLE", header.field("ElementType"),
                                xray::quote(header.text("ElementType"))));
-  return {found->second,
-          header.flag("BinaryDataByteOrderMSB", false) || header.flag("ElementByteOrderMSB", false)};
+  const bool big = header.flag("BinaryDataByteOrderMSB", header.flag("ElementByteOrderMSB", false));
+  if (header.flag("ElementByteOrderMSB", big) != big)
+    throw BadInput(Reason::bad_value, header.field("ElementByteOrderMSB") +
+                                          " differs from BinaryDataByteOrderMSB: remove the wrong one");
+  return {found->second, big};
 }
 
 /// Columns: directions of the axes from their letters, which name the side where each begins ("RAI": L, P,
-/// S).
-Eigen::Matrix3d directions_from_letters(const std::string& letters, const std::string& field) {
+/// S). Nothing for other letters.
+std::optional<Eigen::Matrix3d> directions_from_letters(const std::string& letters) {
   constexpr std::string_view from = "RAILPS";
   Eigen::Matrix3d directions = Eigen::Matrix3d::Zero();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::size_t letter = letters.size() == 3 ? from.find(letters[axis]) : std::string_view::npos;
-    if (letter == std::string_view::npos)
-      throw BadInput(Reason::bad_value,
-                     fmt::format("{} is {}, must be three of R L A P I S", field, xray::quote(letters)));
+    if (letter == std::string_view::npos) return std::nullopt;
     directions(static_cast<int>(letter % 3), static_cast<int>(axis)) = letter < 3 ? 1 : -1;
   }
   return directions;
 }
 
-Eigen::Affine3d place_of(const MetaHeader& header) {
-  const auto spacing = header.numbers({"ElementSpacing", "ElementSize"}, 3);
+/// Letters of the axes that are nearest to the directions.
+std::string letters_of(const Eigen::Matrix3d& directions) {
+  std::string letters;
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::Index along = 0;
+    directions.col(axis).cwiseAbs().maxCoeff(&along);
+    letters += directions(along, axis) > 0 ? "RAI"[along] : "LPS"[along];
+  }
+  return letters;
+}
+
+double millimetres(const MetaHeader& header) {
+  const std::string unit = header.text("DistanceUnits", "?");
+  return unit.empty() || unit.starts_with('?') ? 1 : declared_unit(unit, header.field("DistanceUnits"));
+}
+
+Eigen::Affine3d place_of(const MetaHeader& header, std::vector<Warning>& warnings) {
+  const auto spacing = header.numbers({header.has("ElementSpacing") ? "ElementSpacing" : "ElementSize"}, 3);
   const auto offset = header.numbers({"Offset", "Position", "Origin"}, 3);
   const auto matrix = header.numbers({"TransformMatrix", "Rotation", "Orientation"}, 9);
   Eigen::Affine3d place = Eigen::Affine3d::Identity();
   const std::string letters = header.text("AnatomicalOrientation", "???");
+  const bool lettered = !letters.starts_with('?');
+  const auto directions = directions_from_letters(letters);
   if (!matrix.empty())  // fewer numbers describe fewer axes
     place.linear() = Eigen::Map<const Eigen::Matrix3d>(matrix.data());
-  else if (letters != "???")
-    place.linear() = directions_from_letters(letters, header.field("AnatomicalOrientation"));
+  else if (directions)
+    place.linear() = *directions;
+  else if (lettered)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{} is {}, must be three of R L A P I S",
+                               header.field("AnatomicalOrientation"), xray::quote(letters)));
+  // An oblique axis is at most 55 degrees from its letter.
+  constexpr double least_cosine = 0.5;
+  if (!matrix.empty() && lettered &&
+      (!directions ||
+       (directions->transpose() * place.linear().colwise().normalized()).diagonal().minCoeff() <
+           least_cosine))
+    warnings.push_back({Reason::irregular_file,
+                        fmt::format("{} is {}, but the matrix of the axes is that of {}: the matrix is used",
+                                    header.field("AnatomicalOrientation"), xray::quote(letters),
+                                    letters_of(place.linear()))});
   if (!spacing.empty()) place.linear() *= Vector3d::Map(spacing.data()).asDiagonal();
   if (!offset.empty()) place.translation() = Vector3d::Map(offset.data());
-  return place;
+  return Eigen::Scaling(millimetres(header)) * place;
 }
 
 std::string_view skip_header(std::string_view bytes, const MetaHeader& header, std::size_t needed) {
@@ -113,33 +165,66 @@ std::string_view skip_header(std::string_view bytes, const MetaHeader& header, s
   return bytes.substr(static_cast<std::size_t>(size[0]));
 }
 
+/// Refuses what is not one volume.
+void check_kind(const MetaHeader& header) {
+  constexpr const char* way_out = "export one frame as a volume of its own";
+  if (header.text("ObjectType", "Image") != "Image")
+    throw BadInput(Reason::unsupported, fmt::format("{} is {}, must be Image", header.field("ObjectType"),
+                                                    xray::quote(header.text("ObjectType"))));
+  if (const std::string_view key = header.sequence_key(); !key.empty())
+    throw BadInput(Reason::unsupported, fmt::format("{}: a sequence of images, not a volume; {}",
+                                                    header.field(std::string(key)), way_out));
+  if (header.text("NDims") != "3")
+    throw BadInput(
+        Reason::unsupported,
+        fmt::format("{} is {}, must be 3{}", header.field("NDims"), xray::quote(header.text("NDims")),
+                    header.text("NDims") == "4" ? fmt::format(": a sequence; {}", way_out) : ""));
+  if (header.text("ElementNumberOfChannels", "1") != "1")
+    throw BadInput(Reason::unsupported, header.field("ElementNumberOfChannels") + " must be 1");
+  if (small_letters(header.text("Kinds")).find("list") != std::string::npos)
+    throw BadInput(Reason::unsupported, fmt::format("{} is {}: a sequence; {}", header.field("Kinds"),
+                                                    xray::quote(header.text("Kinds")), way_out));
+  if (!header.flag("BinaryData", true))
+    throw BadInput(Reason::unsupported,
+                   header.field("BinaryData") + " is False: text voxels are not supported");
+}
+
+/// Some programs, such as ITK, do not apply this scale, so that it is said.
+void apply_intensity(Volume& volume, const MetaHeader& header) {
+  const auto slope = header.numbers({"ElementToIntensityFunctionSlope"}, 1);
+  const auto offset = header.numbers({"ElementToIntensityFunctionOffset"}, 1);
+  const double factor = slope.empty() ? 1 : slope[0], shift = offset.empty() ? 0 : offset[0];
+  if (factor == 1 && shift == 0) return;
+  if (factor == 0)
+    throw BadInput(Reason::bad_value, header.field("ElementToIntensityFunctionSlope") + " is 0");
+  for (float& voxel : volume.voxels) voxel = static_cast<float>(factor * static_cast<double>(voxel) + shift);
+  volume.warnings.push_back(
+      {Reason::irregular_file,
+       fmt::format("{} {:g} and Offset {:g} are applied to the voxels; some programs ignore them",
+                   header.field("ElementToIntensityFunctionSlope"), factor, shift)});
+}
+
 }  // namespace
 
 Volume read_metaimage(const std::filesystem::path& path, std::string_view bytes) {
   const std::string origin = path.string();
   std::string_view rest = bytes;
   const MetaHeader header(rest, origin);
-  if (header.text("NDims") != "3")
-    throw BadInput(Reason::unsupported, fmt::format("{} is {}, must be 3", header.field("NDims"),
-                                                    xray::quote(header.text("NDims"))));
-  if (header.text("ElementNumberOfChannels", "1") != "1")
-    throw BadInput(Reason::unsupported, header.field("ElementNumberOfChannels") + " must be 1");
-  if (!header.flag("BinaryData", true))
-    throw BadInput(Reason::unsupported,
-                   header.field("BinaryData") + " is False: text voxels are not supported");
+  check_kind(header);
   const auto size = header.numbers({"DimSize"}, 3);
   if (size.empty()) throw BadInput(Reason::bad_value, header.field("DimSize") + " is missing");
 
   Volume volume;
   const std::size_t count = value_or_throw(voxel_count(Vector3d::Map(size.data()), header.field("DimSize")));
   volume.size = Vector3d::Map(size.data()).cast<int>();
-  volume.patient_from_voxel = place_of(header);
+  volume.patient_from_voxel = place_of(header, volume.warnings);
   const VoxelFormat format = format_of(header);
   const std::string file = header.text("ElementDataFile");
   std::string data;
   if (file == "LIST" || std::ranges::count(file, '%') > 0)
     throw BadInput(Reason::unsupported,
-                   header.field("ElementDataFile") + " is a list of files; one file is supported");
+                   header.field("ElementDataFile") +
+                       " is a list of files; one file is supported: save the volume as one .mha");
   if (file != "LOCAL") {
     data = read_data_file(path, file);
     rest = data;
@@ -147,9 +232,15 @@ Volume read_metaimage(const std::filesystem::path& path, std::string_view bytes)
   const std::size_t needed = count * format.bytes();
   const bool packed = header.flag("CompressedData", false);
   rest = skip_header(rest, header, packed ? rest.size() : needed);
+  std::size_t surplus = 0;
   std::string unpacked;
-  if (packed) rest = unpacked = inflate(rest, needed, origin);
+  if (packed) rest = unpacked = inflate(rest, needed, origin, &surplus);
   volume.voxels = decode_voxels(rest, count, format, origin);
+  if (packed)
+    warn_of_surplus(volume, surplus, needed, origin);
+  else
+    warn_of_surplus(volume, rest.substr(needed), needed, origin);
+  apply_intensity(volume, header);
   return volume;
 }
 

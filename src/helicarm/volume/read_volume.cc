@@ -21,14 +21,41 @@ bool is_nifti(std::string_view bytes) {
          (bytes.size() >= 348 && (bytes.substr(344, 3) == "n+1" || bytes.substr(344, 3) == "ni1"));
 }
 
+/// What a file of another kind is, with the way out; empty if it is not known.
+std::string_view other_kind(std::string_view bytes) {
+  using namespace std::literals;
+  if (bytes.size() > 132 && bytes.substr(128, 4) == "DICM")
+    return "a DICOM file: give the folder of its series";
+  if (bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv) || bytes.starts_with("II+\0"sv))
+    return "a TIFF file: a stack is read as \"volume\" of a model whose \"voxel_mm\" is given";
+  if (bytes.starts_with("\x89PNG") || bytes.starts_with("\xff\xd8\xff")) return "an image, not a volume";
+  if (bytes.starts_with("PK\3\4")) return "a ZIP archive: unpack it, and give the volume or folder within";
+  if (bytes.starts_with("\x89HDF") || bytes.starts_with("CDF"))
+    return "HDF5 or NetCDF (MINC): convert it to NRRD, MetaImage or NIfTI-1";
+  if (bytes.starts_with("BZh") ||
+      bytes.starts_with("\xfd"
+                        "7zXZ") ||
+      bytes.starts_with("\x28\xb5\x2f\xfd"))
+    return "a compressed file: decompress it";
+  if (bytes.starts_with("# vtk") || bytes.substr(0, 2000).find("<VTKFile") != std::string_view::npos)
+    return "a file of VTK: convert it to NRRD, MetaImage or NIfTI-1; a surface is given as \"surface\"";
+  if (bytes.starts_with("solid") || bytes.starts_with("ply"))
+    return "a surface: give it as \"surface\" of the model";
+  if (bytes.size() >= 348 && (bytes.starts_with("\x5c\1\0\0"sv) || bytes.starts_with("\0\0\1\x5c"sv)))
+    return "the header of an Analyze volume: convert it to NIfTI-1";
+  if (bytes.starts_with("\0\0\0\1"sv)) return "a volume of FreeSurfer (MGH): convert it to NIfTI-1";
+  return {};
+}
+
 Volume read_file_of_voxels(const std::filesystem::path& path) {
   const std::string bytes = read_volume_file(path);
   if (bytes.starts_with("NRRD000")) return read_nrrd(path, bytes);
   if (is_nifti(bytes)) return read_nifti(path, bytes);
   if (is_metaimage(bytes)) return read_metaimage(path, bytes);
-  throw BadInput(
-      Reason::not_an_image,
-      fmt::format("{}: neither MetaImage, NRRD, NIfTI-1 nor a folder of DICOM slices", path.string()));
+  const std::string_view kind = other_kind(bytes);
+  throw BadInput(Reason::not_an_image,
+                 fmt::format("{}: {}neither MetaImage, NRRD, NIfTI-1 nor a folder of DICOM slices",
+                             path.string(), kind.empty() ? "" : fmt::format("is {}; ", kind)));
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <memory>
+#include <new>
 
 #include <fmt/format.h>
 #define ZLIB_CONST
@@ -40,6 +40,58 @@ void decode(std::string_view bytes, bool swap, std::vector<float>& voxels, const
 constexpr std::size_t most_from_a_byte = 1032;
 // Limit of an uncompressed file: the voxels after the longest header. zlib counts in 32 bits.
 constexpr std::size_t most_unpacked = max_volume_bytes + 1'000'000;
+
+/// zlib or gzip data, decompressed piece by piece; the members of a gzip file follow one another.
+class Inflater {
+ public:
+  Inflater(std::string_view packed, const std::string& origin) : origin_(origin) {
+    constexpr int zlib_or_gzip = 15 + 32;
+    if (inflateInit2(&stream_, zlib_or_gzip) != Z_OK) throw std::bad_alloc();
+    stream_.next_in = reinterpret_cast<const Bytef*>(packed.data());
+    stream_.avail_in = static_cast<uInt>(packed.size());
+  }
+  ~Inflater() { inflateEnd(&stream_); }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+
+  /// Number of bytes written, less than `size` at the end only.
+  std::size_t take(char* out, std::size_t size) {
+    stream_.next_out = reinterpret_cast<Bytef*>(out);
+    stream_.avail_out = static_cast<uInt>(size);
+    while (stream_.avail_out > 0 && !ended_) {
+      const int state = ::inflate(&stream_, Z_SYNC_FLUSH);
+      if (state == Z_STREAM_END) {
+        next_member();
+      } else if (state == Z_BUF_ERROR || (state == Z_OK && stream_.avail_in == 0 && stream_.avail_out > 0)) {
+        ended_ = true;  // the data are cut
+      } else if (state != Z_OK) {
+        throw BadInput(Reason::bad_value, fmt::format("{}: the compressed voxels are damaged after {} bytes",
+                                                      origin_, before_ + stream_.total_out));
+      }
+    }
+    return size - stream_.avail_out;
+  }
+  /// Bytes behind the last member, without padding.
+  std::size_t trailing() const { return ended_ ? trailing_ : 0; }
+
+ private:
+  void next_member() {
+    const std::string_view rest(reinterpret_cast<const char*>(stream_.next_in), stream_.avail_in);
+    if (rest.starts_with("\x1f\x8b")) {
+      before_ += stream_.total_out;
+      inflateReset(&stream_);
+      return;
+    }
+    ended_ = true;
+    if (rest.find_first_not_of(std::string_view("\0\r\n", 3)) != std::string_view::npos)
+      trailing_ = rest.size();
+  }
+
+  z_stream stream_{};
+  const std::string& origin_;
+  std::size_t before_ = 0, trailing_ = 0;
+  bool ended_ = false;
+};
 
 }  // namespace
 
@@ -103,7 +155,8 @@ std::vector<float> decode_voxels(std::string_view bytes, std::size_t count, cons
   return voxels;
 }
 
-std::string inflate(std::string_view packed, std::size_t size, const std::string& origin) {
+std::string inflate(std::string_view packed, std::size_t size, const std::string& origin,
+                    std::size_t* surplus) {
   const auto short_of = [&](std::size_t found) {
     return BadInput(Reason::truncated, fmt::format("{}: {} compressed bytes hold at most {}, {} are needed",
                                                    origin, packed.size(), found, size));
@@ -112,20 +165,59 @@ std::string inflate(std::string_view packed, std::size_t size, const std::string
     throw BadInput(Reason::bad_size,
                    fmt::format("{}: {} bytes after decompression, limit {}", origin, size, most_unpacked));
   if (size / most_from_a_byte > packed.size()) throw short_of(packed.size() * most_from_a_byte);
-  z_stream stream{};
-  constexpr int zlib_or_gzip = 15 + 32;
-  if (inflateInit2(&stream, zlib_or_gzip) != Z_OK) throw std::bad_alloc();
-  const std::unique_ptr<z_stream, int (*)(z_stream*)> closing(&stream, inflateEnd);
+  Inflater inflater(packed, origin);
   std::string bytes(size, '\0');
-  stream.next_in = reinterpret_cast<const Bytef*>(packed.data());
-  stream.avail_in = static_cast<uInt>(packed.size());
-  stream.next_out = reinterpret_cast<Bytef*>(bytes.data());
-  stream.avail_out = static_cast<uInt>(size);
-  const int state = ::inflate(&stream, Z_SYNC_FLUSH);
-  if (stream.avail_out == 0) return bytes;
-  if (state == Z_OK || state == Z_BUF_ERROR || state == Z_STREAM_END) throw short_of(size - stream.avail_out);
-  throw BadInput(Reason::bad_value, fmt::format("{}: the compressed voxels are damaged after {} of {} bytes",
-                                                origin, size - stream.avail_out, size));
+  const std::size_t found = inflater.take(bytes.data(), size);
+  if (found < size) throw short_of(found);
+  if (!surplus) return bytes;
+  std::string aside(std::size_t{1} << 16, '\0');
+  *surplus = 0;
+  for (std::size_t more = 1; more > 0 && *surplus < most_surplus; *surplus += more)
+    more = inflater.take(aside.data(), aside.size());
+  *surplus += inflater.trailing();
+  return bytes;
+}
+
+std::string inflate_end(std::string_view packed, std::size_t size, const std::string& origin) {
+  if (size > most_unpacked || size / most_from_a_byte > packed.size()) return inflate(packed, size, origin);
+  Inflater inflater(packed, origin);
+  constexpr std::size_t chunk = std::size_t{1} << 20;
+  std::string bytes;
+  for (std::size_t total = 0, more = chunk; more == chunk; total += more) {
+    if (total > most_unpacked)
+      throw BadInput(Reason::bad_size,
+                     fmt::format("{}: over {} bytes after decompression", origin, most_unpacked));
+    // Of what is decompressed only the end is kept.
+    if (bytes.size() > 2 * size + chunk) bytes.erase(0, bytes.size() - size);
+    const std::size_t before = bytes.size();
+    bytes.resize(before + chunk);
+    more = inflater.take(bytes.data() + before, chunk);
+    bytes.resize(before + more);
+  }
+  if (bytes.size() < size)
+    throw BadInput(Reason::truncated, fmt::format("{}: {} compressed bytes hold {}, {} are needed", origin,
+                                                  packed.size(), bytes.size(), size));
+  return bytes.substr(bytes.size() - size);
+}
+
+void warn_of_surplus(Volume& volume, std::size_t surplus, std::size_t needed, const std::string& origin) {
+  if (surplus == 0) return;
+  volume.warnings.push_back(
+      {Reason::surplus_data,
+       fmt::format("{}: {}{} bytes follow the {} bytes of the {} x {} x {} voxels that the header states: "
+                   "check its size, or remove them",
+                   origin, surplus >= most_surplus ? "over " : "", std::min(surplus, most_surplus), needed,
+                   volume.size.x(), volume.size.y(), volume.size.z()),
+       {},
+       {{"surplus_bytes", double(surplus)}, {"voxel_bytes", double(needed)}}});
+}
+
+void warn_of_surplus(Volume& volume, std::string_view behind, std::size_t needed, const std::string& origin) {
+  if (behind != "\n" && behind != "\r\n") warn_of_surplus(volume, behind.size(), needed, origin);
+}
+
+bool differ(double a, double b, double part) {
+  return !(std::abs(a - b) <= part * std::max(std::abs(a), std::abs(b)));
 }
 
 std::vector<double> read_numbers(std::string_view text, std::size_t count, const std::string& origin,

@@ -23,10 +23,23 @@ struct VoxelFormat {
 std::vector<float> decode_voxels(std::string_view bytes, std::size_t count, const VoxelFormat& format,
                                  const std::string& origin);
 
-/// The first `size` bytes of zlib or gzip data; decompression stops there, and memory is bounded by the
-/// deflate ratio. Throws BadInput: truncated, bad_value (damaged), bad_size (above the limit of an
-/// uncompressed file).
-std::string inflate(std::string_view packed, std::size_t size, const std::string& origin);
+/// The first `size` bytes of zlib or gzip data, which may have several members; memory is bounded by the
+/// deflate ratio. `surplus` receives the number of bytes behind them, counted up to `most_surplus`; without
+/// it decompression stops at `size`. Throws BadInput: truncated, bad_value (damaged), bad_size (above the
+/// limit of an uncompressed file).
+std::string inflate(std::string_view packed, std::size_t size, const std::string& origin,
+                    std::size_t* surplus = nullptr);
+inline constexpr std::size_t most_surplus = std::size_t{1} << 24;
+
+/// The last `size` bytes of zlib or gzip data. Fails as `inflate`.
+std::string inflate_end(std::string_view packed, std::size_t size, const std::string& origin);
+
+/// Warns (surplus_data) of bytes behind the voxels, `needed` bytes. A line end there is not counted.
+void warn_of_surplus(Volume& volume, std::size_t surplus, std::size_t needed, const std::string& origin);
+void warn_of_surplus(Volume& volume, std::string_view behind, std::size_t needed, const std::string& origin);
+
+/// Whether two lengths differ by more than the part of the larger.
+bool differ(double a, double b, double part);
 
 /// `count` finite numbers separated by blanks or `separators`. Throws BadInput: bad_value, not_finite.
 std::vector<double> read_numbers(std::string_view text, std::size_t count, const std::string& origin,
