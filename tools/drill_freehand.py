@@ -90,6 +90,7 @@ def drill_mount(program, folder):
         facet = next(f for f in before["tracker"]["facets"] if f["name"] == name)
         tip.write_text(json.dumps({"tip_in_tool": before["tracker"]["pointer"]["tip_in_pointer"]}))
         mount = calibrated(program, virtual, ["tracker", "calibrate-mount", f"127.0.0.1:{port}", "--facet", name, "--tip", tip,
+                                              "--tip-sigma", "0.01",
                                               "--out", out, "--plan", plan], out)
     finally:
         virtual.end()

@@ -78,6 +78,12 @@ void add_calibrate_mount(CLI::App* tracker, Action& action) {
   command->add_option("--facet", a.facet, "Name of the calibrator's marker")->required();
   command->add_option("--pointer", a.pointer, "Name of the pointer's marker")->capture_default_str();
   command->add_option("--tip", a.tip, "The pointer's tip, as `tracker pivot --json` prints it");
+  command
+      ->add_option(
+          "--tip-sigma", a.tip_sigma_mm,
+          "Standard deviation of the tip per axis, mm, if its file has no covariance; without either "
+          "the touches determine the tip")
+      ->check(within(0, 10));
   command->add_option("--tip-radius", a.tip_radius_mm, "Radius of the pointer's tip, mm; counts on balls")
       ->check(within(0, 20))
       ->capture_default_str();

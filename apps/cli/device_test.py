@@ -82,6 +82,7 @@ class Tracker(unittest.TestCase):
         tip, out = self.file.with_name("tip.json"), self.file.with_name("mount.json")
         tip.write_text(json.dumps({"tip_in_tool": [0, -100, 0]}))
         common = ["tracker", "calibrate-mount", "--facet", "Facet", "--pointer", "Pointer", "--tip", tip, "--out", out]
+        common += ["--tip-sigma", "0.05"]
         for name, at in divots.items():
             common += ["--divot", f"{name}={','.join(map(str, at))}"]
         touches = [word for name, at in in_tracker.items() for word in ("--recorded", self.recorded_touch(name, at))]
@@ -98,6 +99,27 @@ class Tracker(unittest.TestCase):
         self.assertEqual(exchanged.returncode, 3)
         self.assertIn("residual_too_large", exchanged.stderr)
         self.assertIn("exchanged", exchanged.stderr)
+
+    def test_tip_without_covariance_is_not_taken_as_exact(self):
+        divots = {"D1": (60, 0, 0), "D2": (0, 45, 0), "D3": (-40, -20, 50), "D4": (0, 5, 80)}
+        tip, out = self.file.with_name("bare_tip.json"), self.file.with_name("bare_mount.json")
+        tip.write_text(json.dumps({"tip_in_tool": [0, -100, 0]}))
+        words = ["tracker", "calibrate-mount", "--facet", "Facet", "--pointer", "Pointer", "--tip", tip, "--out", out]
+        for name, (x, y, z) in divots.items():  # all touches with one direction of the pointer
+            words += ["--divot", f"{name}={x},{y},{z}", "--recorded", self.recorded_touch(name, (x, y, z + 900))]
+        done = run(*words)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("uncertain", done.stderr)
+        self.assertIn("--tip-sigma", done.stderr)
+        self.assertFalse(out.exists())
+        stated = run(*words, "--tip-sigma", "0.4", "--json")
+        self.assertEqual(stated.returncode, 0, stated.stderr)
+        self.assertGreater(json.loads(stated.stdout)["facet"]["sigma_mm"], 0.4)
+        tip.write_text(json.dumps({"tip_in_tool": [0, -100, 0],
+                                   "covariance_mm2": [[0.01 * (i == j) for j in range(6)] for i in range(6)]}))
+        self.assertEqual(run(*words).returncode, 0)
+        both = run(*words, "--tip-sigma", "0.4")
+        self.assertEqual((both.returncode, "omit one" in both.stderr), (2, True), both.stderr)
         few = run(*common, *touches[:4])
         self.assertEqual(few.returncode, 3)
         self.assertIn("poses_too_alike", few.stderr)

@@ -19,6 +19,7 @@
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/plan.h"
 #include "helicarm/phantom/calibrator.h"
+#include "helicarm/pipeline/result.h"
 #include "line_input.h"
 #include "stop_signal.h"
 #include "touch_points.h"
@@ -31,7 +32,7 @@ using Observations = std::vector<tracker::MountObservation>;
 
 struct CalibratedTip {
   Eigen::Vector3d tip_in_pointer;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  std::optional<Eigen::Matrix3d> covariance = {};
 };
 
 /// "NAME=VALUE".
@@ -43,16 +44,31 @@ std::pair<std::string, std::string> split(const std::string& option, const std::
   return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
-CalibratedTip tip_of(const std::filesystem::path& file) {
-  const Json json = value_or_throw(read_json(file));
-  JsonReader reader(json, file.string());
+CalibratedTip tip_of(const MountArguments& arguments) {
+  const Json json = value_or_throw(read_json(arguments.tip));
+  JsonReader reader(json, arguments.tip.string());
   CalibratedTip tip{Eigen::Vector3d(reader.numbers("tip_in_tool", 3, {-1000, 1000}).data())};
   if (reader.has("covariance_mm2")) {
     const auto numbers = reader.matrix("covariance_mm2", 6, 6, {-1000, 1000});
     tip.covariance =
         Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(numbers.data()).topLeftCorner<3, 3>();
+    if (arguments.tip_sigma_mm)
+      throw BadInput(Reason::usage, fmt::format("--tip-sigma: {} states covariance_mm2: omit one of the two",
+                                                arguments.tip.string()));
+  } else if (arguments.tip_sigma_mm) {
+    tip.covariance = *arguments.tip_sigma_mm * *arguments.tip_sigma_mm * Eigen::Matrix3d::Identity();
   }
   return tip;
+}
+
+Warning without_covariance(const MountArguments& arguments, const tracker::MountCalibration& mount) {
+  return {Reason::covariance_missing,
+          fmt::format("{}: covariance_mm2 is missing: the tip is not taken as exact but estimated from the "
+                      "touches, {:.2f} mm from the file's position; `helicarm tracker pivot --json` measures "
+                      "it, --tip-sigma states its standard deviation",
+                      arguments.tip.string(), mount.tip_shift_mm.norm()),
+          {},
+          {{"tip_shift_mm", mount.tip_shift_mm.norm()}}};
 }
 
 std::map<std::string, tracker::MountPlace> places_of(const phantom::Calibrator& calibrator,
@@ -231,13 +247,22 @@ CommandResult calibrate_mount_command(const MountArguments& arguments, Console& 
         throw BadInput(Reason::bad_value, fmt::format("--touch: {} has no \"{}\"", calibrator.name,
                                                       without_control_characters(label)));
     tracker::MountOptions options = arguments.options;
-    const CalibratedTip tip = touches ? tip_of(arguments.tip) : CalibratedTip{Eigen::Vector3d::Zero()};
+    const CalibratedTip tip =
+        touches ? tip_of(arguments)
+                : CalibratedTip{Eigen::Vector3d::Zero(), Eigen::Matrix3d(Eigen::Matrix3d::Zero())};
     options.tip_covariance = tip.covariance;
     Observations observations;
     add_recorded(observations, arguments, tip);
     if (!arguments.touch.empty()) add_touched(observations, arguments, tip, console);
     const auto mount = value_or_throw(tracker::calibrate_mount(places, observations, options));
-    const Json json = mount_json(mount, arguments, calibrator.name);
+    Json json = mount_json(mount, arguments, calibrator.name);
+    json["warnings"] = Json::array();
+    if (!tip.covariance) {
+      const Warning warning = without_covariance(arguments, mount);
+      json["warnings"].push_back(pipeline::to_json(warning));
+      if (!console.quiet)
+        console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
+    }
     value_or_throw(write_file(arguments.out, to_text(json)));
     if (!arguments.plan.empty()) put_into_plan(arguments.plan, json["facet"]);
     if (console.json)

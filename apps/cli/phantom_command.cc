@@ -162,6 +162,12 @@ void notify(const std::vector<Warning>& warnings, Console& console) {
                                     warning.view.empty() ? "" : ": ", warning.message);
 }
 
+void print_notes(const std::vector<Warning>& notes, Console& console) {
+  if (console.quiet) return;
+  for (const Warning& note : notes)
+    console.progress << fmt::format("helicarm: note: {}: {}\n", code(note.reason), note.message);
+}
+
 phantom_calibration::PhantomOptions options_of(const PhantomArguments& arguments, const Console& console) {
   phantom_calibration::PhantomOptions options;
   options.from_scratch = arguments.from_scratch;
@@ -232,6 +238,7 @@ void measure(const PhantomArguments& arguments, Console& console) {
   forget_files(out, {"calibrator.json", "result.json", "report.html"});
   const phantom_calibration::PhantomResult result = measured(arguments, console);
   notify(result.warnings, console);
+  print_notes(result.notes, console);
   value_or_throw(phantom_calibration::write_phantom(result, out));
   if (result.failure) throw BadInput(*result.failure);
   if (console.json)
@@ -255,6 +262,7 @@ void print(const phantom_calibration::PhantomVerification& result, Console& cons
     console.out << fmt::format("\n  {} of {} balls are at the file's positions within {:.3f} mm{}\n",
                                verified, result.balls.size(), result.within_mm,
                                verified < result.balls.size() ? "; the others are not verified" : "");
+  for (const Warning& note : result.notes) console.out << fmt::format("  {}\n", note.message);
 }
 
 void verify(const PhantomArguments& arguments, Console& console) {
@@ -269,6 +277,7 @@ void verify(const PhantomArguments& arguments, Console& console) {
     value_or_throw(
         write_file(*arguments.out / "result.json", to_text(phantom_calibration::to_json(result)) + "\n"));
   notify(result.warnings, console);
+  if (console.json) print_notes(result.notes, console);
   if (console.json && !result.failure) console.out << to_text(phantom_calibration::to_json(result)) << "\n";
   if (!console.json && !console.quiet) print(result, console);
   if (result.failure) throw BadInput(*result.failure);

@@ -45,13 +45,21 @@ class Phantom(SimulatedCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         result = json.loads(done.stdout)
         self.assertEqual((len(result["balls"]), result["scale"]["source"]), (12, "distances"))
+        self.assertEqual([note["code"] for note in result["notes"]], ["scale_unverified"])
+        self.assertAlmostEqual(result["scale"]["over_nominal"]["ratio"], 1, delta=0.01)
         self.assertTrue((folder / "measured/report.html").is_file())
         shutil.copy(folder / "measured/calibrator.json", folder / "measured.json")
         (folder / "measured-case.json").write_text(json.dumps(dict(case, calibrator="measured.json")))
         history = folder / "history.json"
         done = run("phantom", "verify", folder / "measured-case.json", "--history", history)
         self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("the scale of the file is not verified", done.stdout)
         self.assertEqual(len(json.loads(history.read_text())["verifications"]), 1)
+        done = run("phantom", "verify", folder / "measured-case.json", "--json")
+        verified = json.loads(done.stdout)
+        self.assertIs(verified["scale"]["verified"], False)
+        self.assertAlmostEqual(verified["scale"]["file_over_true"], 1, delta=4 * verified["scale"]["relative_sigma"])
+        self.assertEqual([note["code"] for note in verified["notes"]], ["scale_unverified"])
 
     def test_phantom_measure_refuses_what_it_cannot_use(self):
         folder = self.simulated_phantom("phantom-refused")
@@ -70,6 +78,24 @@ class Phantom(SimulatedCase):
         (folder / "scratch.json").write_text(json.dumps(dict(case, calibrator=None, diameters_mm=[4])))
         done = run("phantom", "measure", folder / "scratch.json", "--from-scratch", "--out", out)
         self.assertEqual((done.returncode, "ambiguous_handedness" in done.stderr), (3, True), done.stderr)
+
+    def test_mirrored_nominal_file_and_sizes_that_no_ball_has_are_refused(self):
+        folder = self.simulated_phantom("phantom-mirrored")
+        case = json.loads((folder / "case.json").read_text())
+        mirrored = json.loads((folder / "calibrator.json").read_text())
+        mirrored["targets"] = []
+        for ball in mirrored["balls"]:
+            ball["xyz_mm"][0] *= -1
+        (folder / "mirrored.json").write_text(json.dumps(mirrored))
+        (folder / "mirrored-case.json").write_text(json.dumps(dict(case, calibrator="mirrored.json")))
+        views = [dict(view, mirrored=False) for view in case["views"]]
+        (folder / "sizes.json").write_text(json.dumps(dict(case, calibrator=None, diameters_mm=[4, 5], views=views)))
+        out = folder / "out"
+        for name, options, code in (("mirrored-case.json", (), "ambiguous_handedness"),
+                                    ("sizes.json", ("--from-scratch",), "uncertain")):
+            done = run("phantom", "measure", folder / name, *options, "--out", out)
+            self.assertEqual((done.returncode, code in done.stderr), (3, True), done.stderr)
+            self.assertFalse((out / "calibrator.json").exists())
 
     def test_phantom_check_agrees_as_text_and_as_json(self):
         rules = json.loads(run("phantom", "check", "--json").stdout)["rules"]

@@ -115,6 +115,9 @@ void add_measured_phantom(py::module_& module) {
       .def_readonly("chi2", &PhantomResult::chi2)
       .def_readonly("dof", &PhantomResult::dof)
       .def_property_readonly("warnings", [](const PhantomResult& r) { return warning_list(r.warnings); })
+      .def_property_readonly(
+          "notes", [](const PhantomResult& r) { return warning_list(r.notes); },
+          "Limitations of this kind of measurement, such as a single distance that nothing checks.")
       .def(
           "to_dict", [](const PhantomResult& r) { return python_from(phantom_calibration::to_json(r)); },
           "The content of result.json.")

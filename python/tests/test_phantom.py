@@ -30,6 +30,7 @@ def test_balls_are_measured_to_within_their_covariances(measured):
     sigma = np.sqrt(np.trace(measured.covariance_mm2, axis1=1, axis2=2))
     assert np.linalg.norm(error, axis=1).max() < 4 * sigma.max() < 0.5
     assert measured.scale_source == "distances"
+    assert [note["code"] for note in measured.notes] == ["scale_unverified"]
 
 
 def test_measured_file_serves_a_run(measured, tmp_path):

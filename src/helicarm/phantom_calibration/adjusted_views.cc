@@ -11,6 +11,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/phantom_calibration/correspondence.h"
 #include "helicarm/phantom_calibration/from_scratch.h"
+#include "helicarm/pipeline/calibrator_checks.h"
 #include "helicarm/pipeline/prior.h"
 
 namespace helicarm::phantom_calibration {
@@ -237,6 +238,26 @@ Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>
   }
   warn_of_missing(*r, balls, used, views, from_scratch ? nullptr : &given.calibrator, warnings);
   return found;
+}
+
+Expected<void> check_handedness(const AdjustedViews& found, const pipeline::Case& given,
+                                const std::vector<pipeline::DetectedView>& detected) {
+  for (std::size_t v = 0; v < found.view_of_case.size(); ++v) {
+    const std::size_t i = found.view_of_case[v];
+    if (!pipeline::is_mirrored_without_statement(found.consistent.fit.views[v].intrinsics.fx < 0,
+                                                 *detected[i].xray_image, given.views[i]))
+      return {};
+  }
+  return fail(Reason::ambiguous_handedness,
+              "the balls fit mirrored images only: an axis of the calibrator file has the wrong sign, or "
+              "the images are mirrored, which \"mirrored\" of the views must state",
+              {{"views", double(found.view_of_case.size())}});
+}
+
+std::vector<Warning> handedness_notes(const AdjustedViews& found) {
+  for (const geometry::View& view : found.consistent.fit.views)
+    if (view.intrinsics.fx > 0) return {};
+  return {pipeline::mirrored_as_stated()};
 }
 
 }  // namespace helicarm::phantom_calibration

@@ -37,4 +37,12 @@ Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>
                                        std::size_t least_views, unsigned threads,
                                        std::vector<Warning>& warnings);
 
+/// `ambiguous_handedness` where every image is mirrored and neither the case nor a tag says so: the
+/// calibrator file may be a mirror image.
+Expected<void> check_handedness(const AdjustedViews& found, const pipeline::Case& given,
+                                const std::vector<pipeline::DetectedView>& detected);
+
+/// The note that an explained mirror image of every view calls for.
+std::vector<Warning> handedness_notes(const AdjustedViews& found);
+
 }  // namespace helicarm::phantom_calibration

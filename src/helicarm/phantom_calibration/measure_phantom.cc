@@ -15,7 +15,9 @@
 #include "helicarm/geometry/ray.h"
 #include "helicarm/phantom/ball_covariance.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
+#include "helicarm/phantom_calibration/ball_sizes.h"
 #include "helicarm/phantom_calibration/gauge.h"
+#include "helicarm/phantom_calibration/phantom_scale.h"
 #include "helicarm/phantom_calibration/shown_images.h"
 
 namespace helicarm::phantom_calibration {
@@ -23,15 +25,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double diameter_scale_sigma = 0.03;  // of radii in an image, relative; as LabellingPrior's
 constexpr double least_angle_deg = 15;
 constexpr double least_move_mm = 0.4;
 constexpr double contradiction = 3;  // standard deviations of chi2 beyond which the sigmas are enlarged
-
-double median_of(std::vector<double> values) {
-  std::ranges::nth_element(values, values.begin() + std::ptrdiff_t(values.size() / 2));
-  return values[values.size() / 2];
-}
 
 /// Standard deviations by which chi2 exceeds its degrees of freedom (Wilson and Hilferty 1931).
 double excess_of(double chi2, int dof) {
@@ -86,90 +82,6 @@ double variance_scale_of(const BundleFit& fit, PhantomResult& result) {
   return scale;
 }
 
-/// Factor to mm by the balls' diameters as seen.
-double factor_of_diameters(const AdjustedViews& found) {
-  std::vector<double> factors;
-  for (const auto& view : found.observed)
-    for (std::size_t i = 0; i < view.size(); ++i)
-      if (view[i]) factors.push_back(found.diameters_mm[i] / view[i]->diameter_mm);
-  return median_of(std::move(factors));
-}
-
-Expected<std::size_t> fiducial_named(const FiducialName& name, const AdjustedViews& found) {
-  if (const auto* label = std::get_if<std::string>(&name)) {
-    const auto at = std::ranges::find(found.labels, *label);
-    if (at != found.labels.end()) return std::size_t(at - found.labels.begin());
-    return fail(Reason::bad_value, fmt::format("distance: \"{}\" is not one of the measured balls", *label));
-  }
-  constexpr double reach_px = 20;
-  const auto& place = std::get<Eigen::Vector2d>(name);
-  double nearest = reach_px;
-  std::optional<std::size_t> which;
-  for (std::size_t v = 0; v < found.view_of_case.size(); ++v) {
-    if (found.view_of_case[v] != 0) continue;
-    for (std::size_t i = 0; i < found.observed[v].size(); ++i)
-      if (const auto& seen = found.observed[v][i]; seen && (seen->uv_raw - place).norm() < nearest) {
-        nearest = (seen->uv_raw - place).norm();
-        which = i;
-      }
-  }
-  if (which) return *which;
-  return fail(Reason::bad_value,
-              fmt::format("distance: no ball within {:g} px of {:g},{:g} in the first view", reach_px,
-                          place.x(), place.y()));
-}
-
-Expected<std::vector<CentreDistance>> distances_of(const AdjustedViews& found,
-                                                   const PhantomOptions& options) {
-  std::vector<CentreDistance> distances;
-  for (const HandDistance& given : options.distances) {
-    const auto a = fiducial_named(given.a, found);
-    const auto b = fiducial_named(given.b, found);
-    if (!a) return tl::unexpected<Failure>(a.error());
-    if (!b) return tl::unexpected<Failure>(b.error());
-    const double over = options.outer ? (found.diameters_mm[*a] + found.diameters_mm[*b]) / 2 : 0;
-    if (*a == *b || !(given.mm - over > 0))
-      return fail(Reason::bad_value,
-                  fmt::format("distance: {:g} mm cannot be the distance of two different balls", given.mm));
-    distances.push_back({*a, *b, given.mm - over, options.distance_sigma_mm});
-  }
-  return distances;
-}
-
-/// To mm, with the scale's error.
-Expected<ScaledPoints> scaled(const AdjustedViews& found, const Eigen::MatrixXd& covariance,
-                              const PhantomOptions& options, PhantomResult& result) {
-  const auto& centres = found.consistent.fit.centres;
-  const auto distances = distances_of(found, options);
-  if (!distances) return tl::unexpected<Failure>(distances.error());
-  const double factor = factor_of_diameters(found);
-  auto points = scaled_by(centres, covariance, factor, diameter_scale_sigma);
-  result.pair = best_pair(points.centres, factor * factor * covariance, options.distance_sigma_mm);
-  if (!distances->empty()) {
-    auto by_distances = scaled_by(centres, covariance, *distances, found.labels);
-    if (!by_distances) return by_distances;
-    result.scale = {"distances", by_distances->scale_sigma};
-    const auto& by_hand = by_distances->centres;
-    result.pair.distance_mm = (by_hand[result.pair.a] - by_hand[result.pair.b]).norm();
-    const double ratio =
-        result.pair.distance_mm / (points.centres[result.pair.a] - points.centres[result.pair.b]).norm();
-    const auto checked = check_scale(ratio, std::hypot(diameter_scale_sigma, by_distances->scale_sigma),
-                                     "the diameters of the balls' images", result.warnings);
-    if (!checked) return tl::unexpected<Failure>(checked.error());
-    return by_distances;
-  }
-  result.scale = {"diameters", diameter_scale_sigma};
-  result.warnings.push_back(
-      {Reason::scale_weak,
-       fmt::format("the scale is estimated from the diameters of the balls' images, with a sigma of {:.2g} "
-                   "%: measure {} to {} (about {:.1f} mm) and give this distance",
-                   100 * diameter_scale_sigma, found.labels[result.pair.a], found.labels[result.pair.b],
-                   result.pair.distance_mm),
-       {},
-       {{"relative_sigma", diameter_scale_sigma}}});
-  return points;
-}
-
 /// Carried by a rotation and a translation. The covariance is that after a rigid fit of all points to their
 /// true places: the frame of the nominal file has no error of its own.
 void carry(ScaledPoints& points, const geometry::RigidTransform& by) {
@@ -206,21 +118,28 @@ geometry::RigidTransform principal_frame(const std::vector<Vector3d>& centres,
   return {rotation, -(rotation * mean)};
 }
 
-/// Against the scale of the nominal file, which is wrong by the printer's shrinkage and by the deviations of
-/// the balls.
-Expected<void> check_nominal_scale(const std::vector<Vector3d>& centres, const std::vector<Vector3d>& places,
-                                   const RobustFit& fit, std::vector<Warning>& warnings) {
-  constexpr double shrinkage_sigma = 0.005;
-  Vector3d mean = Vector3d::Zero();
-  for (const Vector3d& place : places) mean += place / double(places.size());
-  double deviation = 0, extent = 0;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    deviation += fit.weights[Eigen::Index(i)] * (fit.a_from_b * centres[i] - places[i]).squaredNorm();
-    extent += fit.weights[Eigen::Index(i)] * (places[i] - mean).squaredNorm();
-  }
-  const double per_axis = std::sqrt(deviation / (3 * fit.weights.sum()));
-  return check_scale(1 / fit.a_from_b.scale, std::hypot(shrinkage_sigma, per_axis / std::sqrt(extent)),
-                     "the nominal file", warnings);
+/// A nominal file that the measured balls fit as a mirror image only, whatever the views state.
+Expected<void> check_not_mirrored(const std::vector<Vector3d>& centres, std::vector<Vector3d> places) {
+  constexpr double clearly_better = 3, least_mm = 1;
+  const auto off_by = [&] {
+    const RobustFit fit = robust_similarity(centres, places, true);
+    std::vector<double> off;
+    for (std::size_t i = 0; i < places.size(); ++i)
+      off.push_back((fit.a_from_b * centres[i] - places[i]).norm());
+    std::ranges::nth_element(off, off.begin() + std::ptrdiff_t(off.size() / 2));
+    return off[off.size() / 2];
+  };
+  const double as_is = off_by();
+  for (Vector3d& place : places) place.x() = -place.x();
+  const double mirrored = off_by();
+  if (as_is < least_mm || as_is < clearly_better * mirrored) return {};
+  return fail(
+      Reason::ambiguous_handedness,
+      fmt::format("the balls are {:.3g} mm (median) from the nominal file's positions, and {:.3g} mm from "
+                  "those of its mirror image: an axis of the calibrator file has the wrong sign, or "
+                  "\"mirrored\" of the views is wrong",
+                  as_is, mirrored),
+      {{"median_mm", as_is}, {"median_mirrored_mm", mirrored}});
 }
 
 Expected<void> set_frame(ScaledPoints& points, const AdjustedViews& found, PhantomResult& result) {
@@ -231,11 +150,9 @@ Expected<void> set_frame(ScaledPoints& points, const AdjustedViews& found, Phant
   std::vector<Vector3d> places;
   for (const std::size_t ball : found.ball_of_nominal)
     places.push_back(result.nominal->balls[ball].centre_in_calibrator);
+  if (auto handed = check_not_mirrored(points.centres, places); !handed) return handed;
   // Weights are found with the scale free, as it may be wrong in the file; the frame is rigid.
   const RobustFit fit = robust_similarity(points.centres, places, true);
-  if (result.scale.source == "distances")
-    if (auto checked = check_nominal_scale(points.centres, places, fit, result.warnings); !checked)
-      return checked;
   carry(points, similarity_between(points.centres, places, fit.weights, false).a_from_b);
   return {};
 }
@@ -312,12 +229,17 @@ void describe_source(const PhantomOptions& options, PhantomResult& result) {
 }
 
 /// Everything after the adjustment; stops at the first refusal.
-Expected<void> conclude(const AdjustedViews& found, const PhantomOptions& options, PhantomResult& result) {
+Expected<void> conclude(AdjustedViews& found, const pipeline::Case& given,
+                        const std::vector<pipeline::DetectedView>& detected, const PhantomOptions& options,
+                        PhantomResult& result) {
   const BundleFit& fit = found.consistent.fit;
   result.rms_px = fit.rms_px;
   result.chi2 = fit.chi2;
   result.dof = fit.dof;
   describe_views(found, options, result);
+  if (result.nominal)
+    if (auto handed = check_handedness(found, given, detected); !handed) return handed;
+  result.notes = handedness_notes(found);
   if (auto apart = check_apart(found); !apart) return apart;
   if (auto unmoved = check_unmoved(found); !unmoved) return unmoved;
   for (const RejectedImage& rejected : found.consistent.rejected)
@@ -328,7 +250,11 @@ Expected<void> conclude(const AdjustedViews& found, const PhantomOptions& option
          found.consistent.problem.views[rejected.view].name,
          {{"off_px", rejected.off_px.norm()}}});
   const double variance_scale = variance_scale_of(fit, result);
-  auto points = scaled(found, variance_scale * fit.covariance_mm2, options, result);
+  if (options.from_scratch)
+    if (auto settled = settle_sizes(found, detected, given, factor_by_hand(found, options), result.warnings);
+        !settled)
+      return settled;
+  auto points = scaled(found, detected, variance_scale * fit.covariance_mm2, options, result);
   if (!points) return tl::unexpected<Failure>(points.error());
   if (auto placed = set_frame(*points, found, result); !placed) return placed;
   result.calibrator.scale_sigma = result.scale.relative_sigma;
@@ -381,15 +307,16 @@ Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const Phant
   stages.threads = options.threads;
   stages.on_stage = options.on_stage;
   stages.on_view = options.on_view;
+  for (Warning& warning : sizes_stated_twice(given)) result.warnings.push_back(std::move(warning));
   const auto detected = pipeline::detected_views(given, stages);
   if (!detected) return refuse(detected.error().failure);
   if (options.on_stage) options.on_stage("adjust");
   const auto begin = std::chrono::steady_clock::now();
-  const auto found =
+  auto found =
       adjusted_views(*detected, given, options.from_scratch ? KnownCentres::none : KnownCentres::nominal,
                      least_views, options.threads, result.warnings);
   if (!found) return refuse(found.error());
-  const auto concluded = conclude(*found, options, result);
+  const auto concluded = conclude(*found, given, *detected, options, result);
   result.solve_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   add_images(*detected, found->view_of_case, options.threads, result);

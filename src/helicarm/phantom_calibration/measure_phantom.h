@@ -57,15 +57,24 @@ struct MeasuredView {
   image::Image<std::uint8_t> shown;  ///< the rectified image for display, of half the size if it is large
 };
 
+/// The measured scale over another one, and the relative error of this ratio.
+struct ScaleAgreement {
+  double ratio = 1;
+  double sigma = 0;
+};
+
 struct PhantomScale {
-  std::string source;  ///< distances or diameters
-  double relative_sigma = 0;
+  std::string source;                                 ///< distances or diameters
+  double relative_sigma = 0;                          ///< with the contradictions that are warned of
+  std::optional<ScaleAgreement> over_diameters = {};  ///< where distances give the scale
+  std::optional<ScaleAgreement> over_nominal = {};
 };
 
 /// What `helicarm phantom measure` finds. With a failure it holds what was known until then.
 struct PhantomResult {
   std::optional<Failure> failure;
   std::vector<Warning> warnings;
+  std::vector<Warning> notes;  ///< limitations that hold for any such measurement
   /// As measured. Its covariances are errors after the best rigid fit of all balls to their true centres.
   phantom::Calibrator calibrator;
   std::optional<phantom::Calibrator> nominal;

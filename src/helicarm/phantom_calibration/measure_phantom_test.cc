@@ -64,12 +64,12 @@ TEST(MeasurePhantom, BallsThatTheFileMisplacesAreMeasured) {
   EXPECT_EQ(result.scale.source, "distances");
 }
 
-PhantomResult measured_from_scratch(const simulation::SimulatedCase& simulated) {
+PhantomResult measured_from_scratch(const simulation::SimulatedCase& simulated,
+                                    std::vector<double> diameters_mm = {4}, PhantomOptions options = {}) {
   PhantomFolder folder(simulated);
   folder.given.calibrator = {};
-  folder.given.diameters_mm = {4};
+  folder.given.diameters_mm = std::move(diameters_mm);
   for (pipeline::CaseView& view : folder.given.views) view.mirrored = false;
-  PhantomOptions options;
   options.from_scratch = true;
   return measured(folder.given, options);
 }
@@ -99,6 +99,74 @@ TEST(MeasurePhantom, OuterDistanceTakenAsThatOfTheCentresIsWarnedOf) {
   const Warning* warning = find_reason(wrong.warnings, Reason::scale_disagrees);
   ASSERT_TRUE(warning);
   EXPECT_NE(warning->message.find("the nominal file"), std::string::npos) << warning->message;
+}
+
+TEST(MeasurePhantom, ContradictedScaleEntersTheScaleSigma) {
+  const PhantomFolder folder(five_views());
+  const PhantomResult wrong = with_distance(folder, 1, false);
+  ASSERT_FALSE(wrong.failure) << wrong.failure->message;
+  EXPECT_GT(wrong.calibrator.scale_sigma, 0.03);  // 4 mm of 110 mm
+  EXPECT_LT(with_distance(folder, 1, true).calibrator.scale_sigma, 0.003);
+}
+
+TEST(MeasurePhantom, OneDistanceIsNotedAsUnchecked) {
+  const PhantomResult result = with_distance(PhantomFolder(five_views()), 1, true);
+  ASSERT_FALSE(result.failure) << result.failure->message;
+  EXPECT_TRUE(find_reason(result.notes, Reason::scale_unverified));
+  ASSERT_TRUE(result.scale.over_diameters && result.scale.over_nominal);
+  EXPECT_NEAR(result.scale.over_diameters->ratio, 1, 3 * result.scale.over_diameters->sigma);
+  EXPECT_NEAR(result.scale.over_nominal->ratio, 1, 0.01);
+}
+
+TEST(MeasurePhantom, DistancesOfTheOtherKindAreNamed) {
+  const PhantomFolder folder(five_views());
+  const auto& balls = folder.given.calibrator.balls;
+  PhantomOptions options;
+  for (const auto& [a, b] : {std::pair(0, 2), {0, 1}}) {
+    const double centres_mm =
+        (balls[std::size_t(a)].centre_in_calibrator - balls[std::size_t(b)].centre_in_calibrator).norm();
+    options.distances.push_back(
+        {balls[std::size_t(a)].label, balls[std::size_t(b)].label, centres_mm + balls[0].diameter_mm});
+  }
+  const PhantomResult wrong = measured(folder.given, options);
+  ASSERT_TRUE(wrong.failure);
+  EXPECT_EQ(wrong.failure->reason, Reason::distances_disagree);
+  EXPECT_NE(wrong.failure->message.find("--distance-is"), std::string::npos) << wrong.failure->message;
+  options.outer = true;
+  const PhantomResult right = measured(folder.given, options);
+  EXPECT_FALSE(right.failure) << right.failure->message;
+  EXPECT_FALSE(find_reason(right.notes, Reason::scale_unverified));
+}
+
+TEST(MeasurePhantom, SimilarDistancesOfTheOtherKindEnterTheScaleSigma) {
+  const PhantomFolder folder(five_views());
+  const auto& balls = folder.given.calibrator.balls;
+  PhantomOptions options;
+  for (const auto& [a, b] : {std::pair(0, 2), {1, 3}}) {
+    const phantom::CalibratorBall &from = balls[std::size_t(a)], &to = balls[std::size_t(b)];
+    options.distances.push_back(
+        {from.label, to.label, (from.centre_in_calibrator - to.centre_in_calibrator).norm() + 4});
+  }
+  const PhantomResult result = measured(folder.given, options);
+  ASSERT_FALSE(result.failure) << result.failure->message;
+  const Warning* warning = find_reason(result.warnings, Reason::scale_disagrees);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(warning->message.find("taken as outer distances"), std::string::npos) << warning->message;
+  EXPECT_GT(result.calibrator.scale_sigma, 0.03);
+}
+
+TEST(MeasurePhantom, MirroredNominalFileIsRefused) {
+  for (const bool stated : {false, true}) {
+    PhantomFolder folder(five_views());
+    for (phantom::CalibratorBall& ball : folder.given.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
+    if (stated)
+      for (pipeline::CaseView& view : folder.given.views) view.mirrored = false;
+    const PhantomResult result = measured(folder.given);
+    ASSERT_TRUE(result.failure);
+    if (!stated) {
+      EXPECT_EQ(result.failure->reason, Reason::ambiguous_handedness) << result.failure->message;
+    }
+  }
 }
 
 TEST(MeasurePhantom, DistanceInAnotherUnitIsRefused) {
@@ -146,6 +214,28 @@ TEST(MeasurePhantom, StagesAreAnnouncedAndAnExceptionBetweenViewsEndsIt) {
   };
   EXPECT_THROW(measure_phantom(folder.given, options), std::runtime_error);
   EXPECT_EQ(stages, (std::vector<std::string>{"read", "rectify"}));
+}
+
+TEST(MeasurePhantom, ListedSizeThatNoBallHasIsNotTakenForTheOthers) {
+  const auto result = measured_from_scratch(five_views(), {4, 5});
+  ASSERT_TRUE(result.failure);
+  EXPECT_EQ(result.failure->reason, Reason::uncertain) << result.failure->message;
+  EXPECT_NE(result.failure->message.find("4, 5 mm"), std::string::npos) << result.failure->message;
+}
+
+TEST(MeasurePhantom, DistanceDecidesWhichListedSizeTheBallsHave) {
+  const auto first = measured_from_scratch(five_views());
+  ASSERT_FALSE(first.failure) << first.failure->message;
+  const auto& pair = first.pair;
+  PhantomOptions options;
+  options.distances = {{first.balls[pair.a].label, first.balls[pair.b].label, pair.distance_mm}};
+  const auto result = measured_from_scratch(five_views(), {4, 5}, options);
+  ASSERT_FALSE(result.failure) << result.failure->message;
+  for (const phantom::CalibratorBall& ball : result.calibrator.balls) EXPECT_EQ(ball.diameter_mm, 4);
+  EXPECT_FALSE(find_reason(result.warnings, Reason::scale_disagrees));
+  const Warning* missing = find_reason(result.warnings, Reason::not_seen);
+  ASSERT_TRUE(missing);
+  EXPECT_NE(missing->message.find("no ball of this size"), std::string::npos) << missing->message;
 }
 
 TEST(MeasurePhantom, FromScratchViewsOfSmallImagesMayBeTwentyDegreesApart) {

@@ -8,6 +8,7 @@
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/label_fiducials.h"
+#include "helicarm/pipeline/calibrator_checks.h"
 #include "helicarm/rectification/intrinsics_prior.h"
 
 namespace helicarm::phantom_calibration {
@@ -130,8 +131,9 @@ std::vector<std::optional<Observed>> observe(const pipeline::DetectedView& detec
           fitted[0].centre_px - fiducials::blob_offset(map, pose, predicted, depth, diameters_mm[ball]);
       const auto uv = map.rectified_from_raw(raw);
       if (!uv) continue;
+      const auto error = pipeline::diameter_error(fitted[0].radius_px, xray_image.acquisition.logarithmic);
       observed[ball] = Observed{raw, *uv, std::hypot(fitted[0].error_px(), sigma_floor_px),
-                                2 * fitted[0].radius_px / px_per_mm};
+                                2 * fitted[0].radius_px / (1 + error.bias) / px_per_mm, error.sigma};
     }
   }
   return observed;

@@ -23,9 +23,10 @@ PreparedView prepared(const pipeline::DetectedView& detected, const std::vector<
 /// The image of a fiducial's centre, measured in the pixels.
 struct Observed {
   Eigen::Vector2d uv_raw;
-  Eigen::Vector2d uv;  ///< rectified
-  double sigma_px;     ///< per axis, without the map's error
-  double diameter_mm;  ///< as seen, at the fiducial's depth
+  Eigen::Vector2d uv;     ///< rectified
+  double sigma_px;        ///< per axis, without the map's error
+  double diameter_mm;     ///< as seen, at the fiducial's depth, less its mean error
+  double diameter_sigma;  ///< relative, common to all fiducials (`pipeline::diameter_error`)
 };
 
 /// Fits every fiducial's image with the appearance of this image's balls: at its candidate, or where the pose

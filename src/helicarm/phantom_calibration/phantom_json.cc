@@ -13,6 +13,10 @@ Json list_of(const Eigen::Ref<const Eigen::VectorXd>& numbers) {
 
 Json optional_number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
+Json agreement_json(const std::optional<ScaleAgreement>& with) {
+  return with ? Json{{"ratio", with->ratio}, {"relative_sigma", with->sigma}} : Json(nullptr);
+}
+
 Json ball_json(const MeasuredBall& ball) {
   Json json = {{"label", ball.label}, {"xyz_mm", list_of(ball.centre)}, {"covariance_mm2", Json::array()}};
   for (Eigen::Index row = 0; row < 3; ++row)
@@ -47,6 +51,7 @@ Json to_json(const PhantomResult& result) {
                {"status", result.failure ? "refused" : "ok"},
                {"failure", result.failure ? pipeline::to_json(*result.failure) : Json(nullptr)},
                {"warnings", Json::array()},
+               {"notes", pipeline::json_list_of(result.notes)},
                {"reprojection_rms_px", result.views.empty() ? Json(nullptr) : Json(result.rms_px)},
                {"chi2", result.views.empty() ? Json(nullptr) : Json(result.chi2)},
                {"dof", result.views.empty() ? Json(nullptr) : Json(result.dof)},
@@ -61,7 +66,10 @@ Json to_json(const PhantomResult& result) {
   for (const MeasuredView& view : result.views) json["views"].push_back(view_json(view, result.balls));
   for (const MeasuredBall& ball : result.balls) json["balls"].push_back(ball_json(ball));
   if (result.balls.empty()) return json;
-  json["scale"] = {{"source", result.scale.source}, {"relative_sigma", result.scale.relative_sigma}};
+  json["scale"] = {{"source", result.scale.source},
+                   {"relative_sigma", result.scale.relative_sigma},
+                   {"over_diameters", agreement_json(result.scale.over_diameters)},
+                   {"over_nominal", agreement_json(result.scale.over_nominal)}};
   json["worth_measuring"] = {{"a", result.balls[result.pair.a].label},
                              {"b", result.balls[result.pair.b].label},
                              {"distance_mm", result.pair.distance_mm},

@@ -83,6 +83,14 @@ std::string warnings(const PhantomResult& result) {
   return html + "</ul>\n";
 }
 
+std::string notes(const PhantomResult& result) {
+  if (result.notes.empty()) return "";
+  std::string html = "<h2>Notes</h2>\n<ul>\n";
+  for (const Warning& note : result.notes)
+    html += fmt::format("<li>{}: {}</li>\n", code(note.reason), report::escaped(note.message));
+  return html + "</ul>\n";
+}
+
 /// A view's image with its balls, whose residuals are arrows, 300 times enlarged.
 std::string view_figure(const MeasuredView& view, const std::vector<MeasuredBall>& balls) {
   constexpr double enlarged = 300;
@@ -274,7 +282,7 @@ double predicted_tre_mm(const std::vector<Vector3d>& balls, double ball_rms_mm, 
 
 std::string phantom_report_html(const PhantomResult& result) {
   return report::page_html("helicarm phantom", "Phantom " + result.calibrator.name,
-                           summary(result) + warnings(result) + nominal_section(result) +
+                           summary(result) + warnings(result) + notes(result) + nominal_section(result) +
                                balls_section(result) + views_section(result),
                            ". Millimetres and pixels.");
 }

@@ -98,23 +98,44 @@ Expected<ScaledPoints> scaled_by(const std::vector<Vector3d>& centres, const Eig
   scaled.covariance_mm2 -= gain_rows * solver.solve(gain_rows.transpose());
   scaled.covariance_mm2 = (scaled.covariance_mm2 + scaled.covariance_mm2.transpose()).eval() / 2;
   scaled.scale_sigma = scale_sigma_of(scaled.centres, scaled.covariance_mm2);
+  scaled.chi2 = chi2;
   return scaled;
 }
 
-Expected<void> check_scale(double ratio, double sigma, const std::string& other,
-                           std::vector<Warning>& warnings) {
-  constexpr double warned_sigmas = 3, refused_sigmas = 10;
-  const double off = std::abs(ratio - 1) / sigma;
-  if (off <= warned_sigmas) return {};
-  const Failure failure{
-      Reason::scale_disagrees,
-      fmt::format("the distances measured by hand make the phantom {:.3g} times as large as {} (sigma {:.2g} "
-                  "%): check their unit and whether they are outer distances, over both balls",
-                  ratio, other, 100 * sigma),
-      {},
-      {{"ratio", ratio}, {"relative_sigma", sigma}}};
-  if (off > refused_sigmas) return tl::unexpected<Failure>(failure);
-  warnings.push_back(failure);
+ScaledPoints with_scale_error(ScaledPoints points, double sigma) {
+  const Eigen::VectorXd offsets = offsets_of(points.centres);
+  points.covariance_mm2 += sigma * sigma * offsets * offsets.transpose();
+  points.scale_sigma = std::hypot(points.scale_sigma, sigma);
+  return points;
+}
+
+bool is_contradiction(const ScaleComparison& c) {
+  constexpr double contradiction = 3, doubtful = 2, clearly_better_chi2 = 4;
+  const double off = std::abs(c.ratio - 1) / c.sigma;
+  if (off > contradiction) return true;
+  if (!c.corrected_ratio || off < doubtful) return false;
+  const double corrected_off = std::abs(*c.corrected_ratio - 1) / c.sigma;
+  return corrected_off < doubtful && off * off - corrected_off * corrected_off > clearly_better_chi2;
+}
+
+Expected<void> check_scale(const ScaleComparison& c, std::vector<Warning>& warnings) {
+  constexpr double refused_sigmas = 10;
+  if (!is_contradiction(c)) return {};
+  Failure failure{Reason::scale_disagrees,
+                  fmt::format("{} make the phantom {:.4g} times as large as {} (sigma {:.2g} %)", c.scale,
+                              c.ratio, c.other, 100 * c.sigma),
+                  {},
+                  {{"ratio", c.ratio}, {"relative_sigma", c.sigma}}};
+  const bool explained = c.corrected_ratio && std::abs(*c.corrected_ratio - 1) < std::abs(c.ratio - 1) / 2;
+  if (explained) {
+    failure.message += fmt::format("; {}: {:.4g} times", c.correction, *c.corrected_ratio);
+    failure.figures["corrected_ratio"] = *c.corrected_ratio;
+  }
+  failure.message +=
+      ": check the distances' unit and kind (outer distances are over both balls), and the "
+      "diameters and coordinates that the case states";
+  if (std::abs(c.ratio - 1) > refused_sigmas * c.sigma) return tl::unexpected<Failure>(failure);
+  warnings.push_back(std::move(failure));
   return {};
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,6 +24,7 @@ struct ScaledPoints {
   std::vector<Eigen::Vector3d> centres;
   Eigen::MatrixXd covariance_mm2;
   double scale_sigma = 0;
+  double chi2 = 0;  ///< of the distances that gave the scale
 };
 
 /// Points whose covariance leaves the scale out (inner constraints), brought to scale `factor`, whose
@@ -38,10 +40,25 @@ Expected<ScaledPoints> scaled_by(const std::vector<Eigen::Vector3d>& centres,
                                  const std::vector<CentreDistance>& distances,
                                  const std::vector<std::string>& labels);
 
-/// Compares the scale by distances with another one, `ratio` times smaller, whose relative error is `sigma`:
-/// `scale_disagrees` beyond ten sigma, a warning beyond three. `other` names it in the message.
-Expected<void> check_scale(double ratio, double sigma, const std::string& other,
-                           std::vector<Warning>& warnings);
+/// With a further relative error of the scale, independent of the others.
+ScaledPoints with_scale_error(ScaledPoints points, double sigma);
+
+/// A scale compared with another one.
+struct ScaleComparison {
+  std::string scale;       ///< what gave the compared scale, for the message
+  std::string other;       ///< what gave the other
+  double ratio = 1;        ///< compared over other
+  double sigma = 0;        ///< relative, of both together
+  std::string correction;  ///< what another reading of the input is, and its ratio: where it agrees better
+  std::optional<double> corrected_ratio = {};
+};
+
+/// Whether it is a contradiction: beyond three sigma, or beyond two where another reading agrees clearly
+/// better.
+bool is_contradiction(const ScaleComparison& comparison);
+
+/// `scale_disagrees` beyond ten sigma, a warning where it is a contradiction.
+Expected<void> check_scale(const ScaleComparison& comparison, std::vector<Warning>& warnings);
 
 struct PairToMeasure {
   std::size_t a = 0, b = 0;

@@ -78,6 +78,50 @@ TEST(Scale, DiametersGiveEveryPointTheirRelativeError) {
   EXPECT_GT(scaled.covariance_mm2(0, 0), std::pow(0.03 * 40, 2));
 }
 
+TEST(Scale, FurtherErrorOfTheScaleIsAddedOnce) {
+  const Unscaled given;
+  const auto scaled = with_scale_error(scaled_by(given.centres, given.covariance, 1.1, 0.03), 0.04);
+  EXPECT_NEAR(scaled.scale_sigma, 0.05, 1e-12);
+  const auto at_once = scaled_by(given.centres, given.covariance, 1.1, 0.05);
+  EXPECT_LT((scaled.covariance_mm2 - at_once.covariance_mm2).norm(), 1e-9);
+}
+
+/// The codes of the warnings, or of the refusal.
+std::vector<Reason> found_by_check(const ScaleComparison& comparison) {
+  std::vector<Warning> warnings;
+  const auto checked = check_scale(comparison, warnings);
+  std::vector<Reason> reasons;
+  for (const Warning& warning : warnings) reasons.push_back(warning.reason);
+  if (!checked) return {};
+  return reasons.empty() ? std::vector{Reason::usage} : reasons;
+}
+
+TEST(Scale, ScalesWithinThreeSigmaAgree) {
+  EXPECT_EQ(found_by_check({"a", "b", 1.025, 0.01, "", {}}), std::vector{Reason::usage});
+}
+
+TEST(Scale, ScalesBeyondThreeSigmaAreWarnedOfAndBeyondTenRefused) {
+  EXPECT_EQ(found_by_check({"a", "b", 0.96, 0.01, "", {}}), std::vector{Reason::scale_disagrees});
+  EXPECT_TRUE(found_by_check({"a", "b", 1.12, 0.01, "", {}}).empty());
+}
+
+TEST(Scale, DoubtfulScaleIsWarnedOfWhereAnotherReadingAgrees) {
+  EXPECT_EQ(found_by_check({"a", "b", 1.025, 0.01, "taken as outer distances", 1.002}),
+            std::vector{Reason::scale_disagrees});
+  EXPECT_EQ(found_by_check({"a", "b", 1.025, 0.01, "taken as outer distances", 0.985}),
+            std::vector{Reason::usage});
+}
+
+TEST(Scale, WarningStatesBothFigures) {
+  std::vector<Warning> warnings;
+  ASSERT_TRUE(check_scale({"the distances", "the diameters", 1.04, 0.012, "taken as outer distances", 1.004},
+                          warnings));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].message.find("1.04 times as large as the diameters"), std::string::npos)
+      << warnings[0].message;
+  EXPECT_NE(warnings[0].message.find("taken as outer distances: 1.004"), std::string::npos);
+}
+
 TEST(Scale, PairWorthMeasuringIsALongOne) {
   const Unscaled given;
   const auto pair = best_pair(given.truth, given.covariance, 0.05);

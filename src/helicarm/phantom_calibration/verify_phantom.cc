@@ -10,7 +10,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
-#include "helicarm/pipeline/calibrator_checks.h"
+#include "helicarm/phantom_calibration/diameter_scale.h"
 #include "helicarm/pipeline/result.h"
 
 namespace helicarm::phantom_calibration {
@@ -220,18 +220,6 @@ bool is_missing(const phantom::CalibratorBall& ball, const std::vector<pipeline:
   return empty >= 2;
 }
 
-/// Whether every image is mirrored, and neither the case nor a tag says so.
-bool looks_mirrored(const AdjustedViews& found, const pipeline::Case& given,
-                    const std::vector<pipeline::DetectedView>& detected) {
-  for (std::size_t v = 0; v < found.view_of_case.size(); ++v) {
-    const std::size_t i = found.view_of_case[v];
-    if (!pipeline::is_mirrored_without_statement(found.consistent.fit.views[v].intrinsics.fx < 0,
-                                                 *detected[i].xray_image, given.views[i]))
-      return false;
-  }
-  return true;
-}
-
 /// A ball of which no two images agree.
 BallState unlocated(const phantom::CalibratorBall& ball, const phantom::Calibrator& file,
                     const std::vector<pipeline::DetectedView>& detected,
@@ -249,6 +237,55 @@ Warning not_verified(const VerifiedBall& ball) {
                   ball.label, *ball.distance_mm),
       {},
       {{"distance_mm", *ball.distance_mm}}};
+}
+
+/// The file's scale, by the diameters of the balls' images and the distance from the source.
+void compare_scale(const AdjustedViews& found, const pipeline::Case& given,
+                   const std::vector<pipeline::DetectedView>& detected, PhantomVerification& result) {
+  constexpr double warned_sigmas = 3, refused_sigmas = 10;  // as a run's
+  const auto evidence_of = [](const DiameterScale& scale) {
+    return pipeline::ScaleEvidence{1 / scale.factor - 1, scale.sigma};
+  };
+  result.scale = evidence_of(diameter_scale(found));
+  if (const auto by_tag = depth_limits(found, detected).by_tag)
+    result.scale = pipeline::combined(result.scale, evidence_of(*by_tag));
+  const double sigma = std::hypot(result.scale.sigma, given.calibrator.scale_sigma);
+  const double excess = std::abs(result.scale.excess);
+  if (excess <= warned_sigmas * sigma) return;
+  Failure disagreement{
+      Reason::scale_disagrees,
+      fmt::format(
+          "the balls' diameters imply that the phantom is {:.1f} % {} than in its file (+-{:.1f} %): check "
+          "coordinates, diameters and pixel size, or measure it again with `helicarm phantom measure`",
+          100 * excess, result.scale.excess > 0 ? "smaller" : "larger", 100 * sigma),
+      {},
+      {{"file_over_true", 1 + result.scale.excess}, {"sigma", sigma}}};
+  if (excess > refused_sigmas * sigma && !result.failure)
+    result.failure = std::move(disagreement);
+  else
+    result.warnings.push_back(std::move(disagreement));
+}
+
+/// A longest distance in the file, to be compared by caliper.
+Warning scale_note(const phantom::Calibrator& file, const pipeline::ScaleEvidence& scale) {
+  std::pair<const phantom::CalibratorBall*, const phantom::CalibratorBall*> pair{&file.balls[0],
+                                                                                 &file.balls[0]};
+  double longest = 0;
+  for (const phantom::CalibratorBall& a : file.balls)
+    for (const phantom::CalibratorBall& b : file.balls)
+      if (const double mm = (a.centre_in_calibrator - b.centre_in_calibrator).norm(); mm > longest)
+        longest = mm, pair = {&a, &b};
+  return {
+      Reason::scale_unverified,
+      fmt::format("the scale of the file is not verified: images show the balls' positions relative to each "
+                  "other, not their absolute distances. By the balls' diameters the file is {:.3f} +- {:.3f} "
+                  "times as large as the phantom, so that an error below {:.2g} % does not show. Compare a "
+                  "distance by caliper: {} to {}, {:.2f} mm between the centres in the file, {:.2f} mm over "
+                  "both balls",
+                  1 + scale.excess, scale.sigma, 300 * scale.sigma, pair.first->label, pair.second->label,
+                  longest, longest + (pair.first->diameter_mm + pair.second->diameter_mm) / 2),
+      {},
+      {{"file_over_true", 1 + scale.excess}, {"sigma", scale.sigma}, {"distance_mm", longest}}};
 }
 
 void describe(const AdjustedViews& found, const pipeline::Case& given,
@@ -326,13 +363,6 @@ Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsign
   if (!detected) return refuse(detected.error().failure);
   const auto found =
       adjusted_views(*detected, given, KnownCentres::file, least_views, threads, result.warnings);
-  if (found && looks_mirrored(*found, given, *detected))
-    return refuse(
-        {Reason::ambiguous_handedness,
-         "the balls fit mirrored images only: an axis of the calibrator file has the wrong sign, or "
-         "the images are mirrored, which \"mirrored\" of the views must state",
-         {},
-         {{"views", double(found->view_of_case.size())}}});
   if (!found) {
     Failure failure = found.error();
     if (failure.reason == Reason::too_few_fiducials)
@@ -342,8 +372,12 @@ Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsign
           "them";
     return refuse(failure);
   }
+  if (const auto handed = check_handedness(*found, given, *detected); !handed) return refuse(handed.error());
   std::erase_if(result.warnings, [](const Warning& w) { return w.reason == Reason::not_seen; });
   describe(*found, given, *detected, threads, result);
+  compare_scale(*found, given, *detected, result);
+  result.notes = handedness_notes(*found);
+  if (!result.balls.empty()) result.notes.push_back(scale_note(given.calibrator, result.scale));
   return result;
 }
 
@@ -352,9 +386,14 @@ Json to_json(const PhantomVerification& v) {
                {"status", v.failure ? "refused" : "ok"},
                {"failure", v.failure ? pipeline::to_json(*v.failure) : Json(nullptr)},
                {"warnings", Json::array()},
+               {"notes", pipeline::json_list_of(v.notes)},
                {"date", v.date},
                {"calibrator", v.calibrator},
                {"within_mm", v.balls.empty() ? Json(nullptr) : Json(v.within_mm)},
+               {"scale",
+                {{"verified", false},
+                 {"file_over_true", v.scale.sigma > 0 ? Json(1 + v.scale.excess) : Json(nullptr)},
+                 {"relative_sigma", v.scale.sigma > 0 ? Json(v.scale.sigma) : Json(nullptr)}}},
                {"reprojection_rms_px", v.balls.empty() ? Json(nullptr) : Json(v.rms_px)},
                {"balls", Json::array()}};
   for (const Warning& warning : v.warnings) json["warnings"].push_back(pipeline::to_json(warning));

@@ -9,6 +9,7 @@
 
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
+#include "helicarm/pipeline/calibrator_checks.h"
 #include "helicarm/pipeline/case.h"
 
 namespace helicarm::phantom_calibration {
@@ -34,16 +35,21 @@ struct VerifiedBall {
 struct PhantomVerification {
   std::optional<Failure> failure;
   std::vector<Warning> warnings;
+  std::vector<Warning> notes;  ///< what is not verified
   std::string date;
   std::string calibrator;  ///< digest of the file's coordinates
   std::vector<VerifiedBall> balls;
   double within_mm = 0;  ///< the largest distance or bound
+  /// What the diameters of the balls' images and Distance Source to Patient show of the file's scale; the
+  /// balls' places do not show it. Sigma 0: nothing.
+  pipeline::ScaleEvidence scale;
   double rms_px = 0;
 };
 
 /// Whether the balls lie as in the case's calibrator file, from two views or more: each ball is intersected
-/// from views that the others calibrate. A refusal (`calibrator_mismatch`, `too_few_views`, ...) is a
-/// result; only unusable input fails.
+/// from views that the others calibrate. The scale is not verified: it is compared with the balls' diameters
+/// as a run does (`scale_disagrees`). A refusal (`calibrator_mismatch`, `too_few_views`, ...) is a result;
+/// only unusable input fails.
 Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsigned threads);
 
 Json to_json(const PhantomVerification& verification);

@@ -93,6 +93,37 @@ TEST(VerifyPhantom, MirroredFileIsRefused) {
   EXPECT_EQ(result->failure->reason, Reason::ambiguous_handedness) << result->failure->message;
 }
 
+/// The file's balls farther apart, as if the phantom were larger.
+void grow(PhantomFolder& folder, double factor) {
+  const Eigen::Vector3d middle = phantom::middle_of(folder.given.calibrator);
+  for (phantom::CalibratorBall& ball : folder.given.calibrator.balls)
+    ball.centre_in_calibrator = middle + factor * (ball.centre_in_calibrator - middle);
+}
+
+TEST(VerifyPhantom, ScaleIsStatedAsNotVerified) {
+  PhantomFolder folder(three_views());
+  grow(folder, 1.02);
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_FALSE(result->failure) << result->failure->message;
+  ASSERT_EQ(result->notes.size(), 1u);
+  EXPECT_EQ(result->notes[0].reason, Reason::scale_unverified);
+  EXPECT_NEAR(1 + result->scale.excess, 1.02, 3 * result->scale.sigma);
+  const Json json = to_json(*result);
+  EXPECT_EQ(json["scale"]["verified"], false);
+  EXPECT_EQ(json["notes"].size(), 1u);
+}
+
+TEST(VerifyPhantom, FileThatTheDiametersContradictIsWarnedOf) {
+  PhantomFolder folder(three_views());
+  grow(folder, 1.07);
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  std::vector<Warning> found = result->warnings;
+  if (result->failure) found.push_back(*result->failure);
+  EXPECT_TRUE(std::ranges::count(found, Reason::scale_disagrees, &Warning::reason) > 0);
+}
+
 TEST(VerifyPhantom, BallOfAnotherSizeIsNamedAsSwapped) {
   PhantomFolder folder(three_views());
   folder.ball("P8").diameter_mm = 6;

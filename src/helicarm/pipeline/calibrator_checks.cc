@@ -13,8 +13,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double diameter_sigma = 0.01;  // common to all diameters: edge model, tolerance
-constexpr double patient_sigma_mm = 60;  // the calibrator is not at the patient's position
 constexpr double warn_sigmas = 3, refuse_sigmas = 10;
 
 std::optional<Failure> check_handedness(const std::vector<LabelledView>& images, const Case& given) {
@@ -72,10 +70,10 @@ std::optional<Failure> check_labels(const CaseCalibration& calibration,
   return std::nullopt;
 }
 
-/// Mean over all used fiducials of ln(measured / expected radius at the fiducial's distance).
-std::optional<double> mean_log_radius(const calibration::CalibrationResult& calibration,
-                                      const phantom::Calibrator& calibrator) {
-  double sum = 0, count = 0;
+/// By the mean over all used fiducials of ln(measured / expected radius at the fiducial's distance).
+ScaleEvidence by_diameters(const calibration::CalibrationResult& calibration,
+                           const std::vector<LabelledView>& images, const phantom::Calibrator& calibrator) {
+  double sum = 0, sigmas = 0, count = 0;
   for (std::size_t i = 0; i < calibration.views.size(); ++i)
     for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
       const fiducials::Fiducial& ball = calibration.fiducials[i][k];
@@ -83,10 +81,14 @@ std::optional<double> mean_log_radius(const calibration::CalibrationResult& cali
       const geometry::View& view = calibration.views[i].view;
       const double expected = 0.5 * calibrator.balls[k].diameter_mm * view.intrinsics.fy /
                               view.depth(calibrator.balls[k].centre_in_calibrator);
-      sum += std::log(ball.radius_px / expected);
+      const DiameterError error =
+          diameter_error(ball.radius_px, images[i].xray_image->acquisition.logarithmic);
+      sum += std::log(ball.radius_px / (1 + error.bias) / expected);
+      sigmas += error.sigma;
       ++count;
     }
-  return count > 0 ? std::optional(sum / count) : std::nullopt;
+  if (count == 0) return {};
+  return {sum / count, sigmas / count};
 }
 
 }  // namespace
@@ -96,21 +98,32 @@ bool is_mirrored_without_statement(bool is_mirrored, const xray::XrayImage& xray
   return is_mirrored && !view.mirrored && !xray_image.acquisition.flip_hint;
 }
 
+DiameterError diameter_error(double radius_px, std::optional<bool> logarithmic) {
+  constexpr double of_diameter = 0.01;  // edge model, tolerance
+  // Fitted to simulated images of 512 and 1024 pixels, whose blur is 0.9 px: docs/method.md.
+  constexpr double blurred_px = 1.43;
+  const double loss = std::pow(blurred_px / radius_px, 3);
+  const double share = logarithmic ? double(*logarithmic) : 0.5;
+  return {-share * loss, std::hypot(of_diameter, loss / 2)};
+}
+
+ScaleEvidence combined(const ScaleEvidence& a, const ScaleEvidence& b) {
+  if (!(a.sigma > 0)) return b;
+  if (!(b.sigma > 0)) return a;
+  const double of_a = 1 / (a.sigma * a.sigma), of_b = 1 / (b.sigma * b.sigma);
+  return {(of_a * a.excess + of_b * b.excess) / (of_a + of_b), 1 / std::sqrt(of_a + of_b)};
+}
+
 ScaleEvidence scale_evidence(const calibration::CalibrationResult& calibration,
                              const std::vector<LabelledView>& images, const phantom::Calibrator& calibrator) {
   if (calibration.joint_covariance.size() == 0) return {};  // `--method paper`: its circles' radii are rough
-  double weight = 0, sum = 0;
-  const auto add = [&](double excess, double sigma) {
-    weight += 1 / (sigma * sigma);
-    sum += excess / (sigma * sigma);
-  };
-  if (const auto radius = mean_log_radius(calibration, calibrator)) add(*radius, diameter_sigma);
+  ScaleEvidence evidence = by_diameters(calibration, images, calibrator);
   for (std::size_t i = 0; i < images.size(); ++i)
     if (const auto& stated = images[i].xray_image->acquisition.source_patient_mm)
-      add(calibration.views[i].view.depth(phantom::middle_of(calibrator)) / *stated - 1,
-          patient_sigma_mm / *stated);
-  if (weight == 0) return {};
-  return {sum / weight, 1 / std::sqrt(weight)};
+      evidence =
+          combined(evidence, {calibration.views[i].view.depth(phantom::middle_of(calibrator)) / *stated - 1,
+                              patient_distance_sigma_mm / *stated});
+  return evidence;
 }
 
 Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
@@ -156,13 +169,17 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
 std::vector<Warning> handedness_notes(const CaseCalibration& calibration) {
   for (const LabelledView& image : calibration.images)
     if (!image.fiducials.mirrored) return {};
+  return {mirrored_as_stated()};
+}
+
+Warning mirrored_as_stated() {
   return {
-      {Reason::ambiguous_handedness,
-       "every image is mirrored, as its tag or the case states. Images do not show whether the statement "
-       "is true: if it is wrong, the calibrator's file is a mirror image of the calibrator, and all points "
-       "are mirrored. Check by a view that is not mirrored, or by a point whose side is known",
-       {},
-       {}}};
+      Reason::ambiguous_handedness,
+      "every image is mirrored, as its tag or the case states. Images do not show whether the statement "
+      "is true: if it is wrong, the calibrator's file is a mirror image of the calibrator, and all points "
+      "are mirrored. Check by a view that is not mirrored, or by a point whose side is known",
+      {},
+      {}};
 }
 
 std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calibration,

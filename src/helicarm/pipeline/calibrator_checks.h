@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "helicarm/pipeline/calibrate_case.h"
@@ -13,6 +14,21 @@ struct ScaleEvidence {
   double excess = 0;  ///< the file's coordinates over the true ones, less 1
   double sigma = 0;   ///< of `excess`; 0: not observable
 };
+
+/// Relative error of the diameters of balls' images with this radius, common to all balls: its mean and
+/// standard deviation. In a logarithmic image the blur, which precedes the logarithm, makes balls appear
+/// smaller; nothing: it is not known whether the image is one.
+struct DiameterError {
+  double bias = 0;
+  double sigma = 0;
+};
+DiameterError diameter_error(double radius_px, std::optional<bool> logarithmic);
+
+/// Of Distance Source to Patient as the distance of the calibrator from the source.
+inline constexpr double patient_distance_sigma_mm = 60;
+
+/// Mean of two independent estimates, or the one that is known.
+ScaleEvidence combined(const ScaleEvidence& a, const ScaleEvidence& b);
 
 /// From the fiducials' measured diameters and Distance Source to Patient (0018,1111).
 ScaleEvidence scale_evidence(const calibration::CalibrationResult& calibration,
@@ -33,6 +49,9 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
 /// Note `ambiguous_handedness` if every image is mirrored: that the calibrator's file is not rests on a tag
 /// or the case alone.
 std::vector<Warning> handedness_notes(const CaseCalibration& calibration);
+
+/// Note `ambiguous_handedness` of images that are all mirrored as stated.
+Warning mirrored_as_stated();
 
 /// Effect of an error of the calibrator's scale, which the images do not constrain: mm per per cent at each
 /// point, and the source distances for a comparison by tape measure. Empty if the file states scale_sigma.

@@ -194,6 +194,7 @@ TEST_F(VirtualDevicesTest, TouchedBallsGiveTheMountWithinItsCovariance) {
   tracker::MountOptions options;
   options.sigma_mm = 0.114;
   options.sigma_deg = 0.03;
+  options.tip_covariance = Eigen::Matrix3d::Zero();
   int covered = 0;
   for (std::uint64_t seed = 0; seed < trials; ++seed) {
     std::vector<tracker::MountObservation> touches;

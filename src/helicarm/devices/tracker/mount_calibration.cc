@@ -25,9 +25,13 @@ using Places = std::map<std::string, MountPlace>;
 using Observations = std::vector<MountObservation>;
 
 constexpr std::size_t least_places = 3;
-constexpr int unknowns = 6;
 /// Rms extent across the line that fits the places best: with less the rotation about it is not determined.
 constexpr double least_extent_mm = 5;
+/// Standard deviation per axis of a tip whose error is not known: it hardly constrains what the touches show.
+constexpr double unknown_tip_mm = 10;
+constexpr const char* tip_advice =
+    "; the pointer's tip has no covariance: measure it by `helicarm tracker pivot --json`, or state "
+    "--tip-sigma";
 
 struct Mount {
   geometry::RigidTransform calibrator_from_facet;
@@ -121,8 +125,10 @@ std::vector<geometry::RigidTransform> starts(const Places& places, const Observa
 Fit fit_from(const geometry::RigidTransform& start, const Places& places, const Observations& observations,
              const MountOptions& options) {
   // An exact tip has the weight of a nanometre.
+  const Matrix3d tip_covariance =
+      options.tip_covariance.value_or(Matrix3d(unknown_tip_mm * unknown_tip_mm * Matrix3d::Identity()));
   const Matrix3d tip_weight =
-      (options.tip_covariance + 1e-12 * Matrix3d::Identity()).llt().solve(Matrix3d::Identity());
+      (tip_covariance + 1e-12 * Matrix3d::Identity()).llt().solve(Matrix3d::Identity());
   const auto linearise = [&](const Mount& mount) {
     geometry::NormalEquations<parameters> equations{Eigen::Matrix<double, parameters, parameters>::Zero(),
                                                     Step::Zero()};
@@ -167,7 +173,16 @@ int equations_of(const Places& places, const Observations& observations) {
   return rows;
 }
 
-void check_layout(const Places& places, const Observations& observations) {
+bool is_tip_unknown(const Observations& observations, const MountOptions& options) {
+  return !options.tip_covariance &&
+         std::ranges::any_of(observations, [](const MountObservation& one) { return !one.by_tip.isZero(); });
+}
+
+int unknowns_of(const Observations& observations, const MountOptions& options) {
+  return is_tip_unknown(observations, options) ? 9 : 6;
+}
+
+void check_layout(const Places& places, const Observations& observations, const MountOptions& options) {
   std::set<std::string> labels;
   for (const MountObservation& one : observations) {
     if (!places.contains(one.label))
@@ -185,13 +200,15 @@ void check_layout(const Places& places, const Observations& observations) {
   }
   const double extent_mm =
       labels.empty() ? 0 : std::sqrt(std::max(0.0, geometry::symmetric_eigen(spread).values[1]));
+  const int unknowns = unknowns_of(observations, options);
   if (labels.size() < least_places || rows <= unknowns || extent_mm < least_extent_mm)
     throw BadInput(
         {Reason::poses_too_alike,
          fmt::format("{} places with {} equations extend {:.3g} mm rms across their line; at least "
                      "{} places, {} equations (a divot gives three, a touch of a ball one) and {:g} "
-                     "mm are required: touch further places",
-                     labels.size(), rows, extent_mm, least_places, unknowns + 1, least_extent_mm),
+                     "mm are required: touch further places{}",
+                     labels.size(), rows, extent_mm, least_places, unknowns + 1, least_extent_mm,
+                     is_tip_unknown(observations, options) ? tip_advice : ""),
          {},
          {{"places", static_cast<double>(labels.size())},
           {"equations", static_cast<double>(rows)},
@@ -213,8 +230,9 @@ Observations without(Observations observations, const std::string& label) {
   return observations;
 }
 
-bool is_consistent(double chi2, const Places& places, const Observations& observations) {
-  const int dof = equations_of(places, observations) - unknowns;
+bool is_consistent(double chi2, const Places& places, const Observations& observations,
+                   const MountOptions& options) {
+  const int dof = equations_of(places, observations) - unknowns_of(observations, options);
   return dof > 0 && chi2 <= chi2_limit(dof);
 }
 
@@ -227,7 +245,7 @@ std::vector<std::pair<std::string, std::string>> consistent_exchanges(const Plac
   for (auto a = means.begin(); a != means.end(); ++a)
     for (auto b = std::next(a); b != means.end(); ++b) {
       const Observations other = exchanged(observations, a->first, b->first);
-      if (is_consistent(fit(places, other, options).chi2, places, other))
+      if (is_consistent(fit(places, other, options).chi2, places, other, options))
         pairs.emplace_back(a->first, b->first);
     }
   return pairs;
@@ -240,9 +258,10 @@ std::optional<std::pair<std::string, double>> displaced(const Places& places,
   std::optional<std::pair<std::string, double>> found;
   for (const auto& [label, mean] : touched_centres(places, observations)) {
     const Observations rest = without(observations, label);
-    if (touched_centres(places, rest).size() < least_places || !is_consistent(0, places, rest)) continue;
+    if (touched_centres(places, rest).size() < least_places || !is_consistent(0, places, rest, options))
+      continue;
     const Fit fitted = fit(places, rest, options);
-    if (!is_consistent(fitted.chi2, places, rest)) continue;
+    if (!is_consistent(fitted.chi2, places, rest, options)) continue;
     if (found) return std::nullopt;
     found = {label,
              (fitted.mount.calibrator_from_facet * mean - places.at(label).centre_in_calibrator).norm()};
@@ -262,7 +281,7 @@ std::string likely_cause(const Places& places, const Observations& observations,
     one.point_in_facet.z() *= -1;
     one.side.z() *= -1;
   }
-  if (is_consistent(fit(places, mirror, options).chi2, places, mirror))
+  if (is_consistent(fit(places, mirror, options).chi2, places, mirror, options))
     return "the places fit a mirror image: the calibrator's file has the wrong handedness";
   return "the calibrator's file, the labels or the pointer's tip do not belong to these touches";
 }
@@ -289,13 +308,13 @@ Expected<MountCalibration> calibrate_mount(const Places& places, std::span<const
                                            const MountOptions& options) {
   return guarded([&] {
     const Observations observations(given.begin(), given.end());
-    check_layout(places, observations);
+    check_layout(places, observations, options);
     const Fit fitted = best_fit(places, observations, options);
     MountCalibration mount{fitted.mount.calibrator_from_facet,
                            {},
                            0,
                            fitted.chi2,
-                           equations_of(places, observations) - unknowns,
+                           equations_of(places, observations) - unknowns_of(observations, options),
                            fitted.mount.tip_shift,
                            {},
                            {},
@@ -307,7 +326,7 @@ Expected<MountCalibration> calibrate_mount(const Places& places, std::span<const
       squares += off * off / static_cast<double>(observations.size());
     }
     mount.fre_mm = std::sqrt(squares);
-    if (!is_consistent(fitted.chi2, places, observations))
+    if (!is_consistent(fitted.chi2, places, observations, options))
       throw BadInput(
           {Reason::residual_too_large,
            fmt::format("the touched places deviate from the calibrator by {:.2f} mm rms (chi2 {:.4g}, "
@@ -339,8 +358,9 @@ Expected<MountCalibration> calibrate_mount(const Places& places, std::span<const
       throw BadInput(
           {Reason::uncertain,
            fmt::format("predicted error {:.2f} mm at \"{}\", limit {:g} mm: touch more places, farther "
-                       "apart",
-                       worst->second, worst->first, options.max_tre_mm),
+                       "apart{}",
+                       worst->second, worst->first, options.max_tre_mm,
+                       is_tip_unknown(observations, options) ? tip_advice : ""),
            {},
            {{"tre_mm", worst->second}, {"limit_mm", options.max_tre_mm}}});
     return mount;

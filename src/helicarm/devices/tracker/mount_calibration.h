@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -35,8 +36,9 @@ struct MountOptions {
   double sigma_mm = 0.12;  ///< error of a reading that averaging does not reduce, per axis
   double sigma_deg = 0.05;
   double seat_mm = 0.1;  ///< of the tip in a divot or on a ball, per axis
-  /// Of the tip in its pointer, common to all touches, mm^2; from `calibrate_pivot`.
-  Eigen::Matrix3d tip_covariance = Eigen::Matrix3d::Zero();
+  /// Of the tip in its pointer, common to all touches, mm^2; from `calibrate_pivot`. Zero: an exact tip.
+  /// Nothing: its error is not known, and the touches alone determine the tip.
+  std::optional<Eigen::Matrix3d> tip_covariance = {};
   double max_tre_mm = 1;  ///< largest predicted error at a place of the calibrator
 };
 
@@ -70,9 +72,11 @@ struct MountCalibration {
 
 /// Pose of the facet in the calibrator by weighted least squares over the touched places, the pointer's tip
 /// estimated along within its covariance. Refuses with figures: fewer than three places, places along one
-/// line or fewer than seven equations (`poses_too_alike`); residuals beyond 99.9 % (`residual_too_large`),
-/// naming the exchanged or the displaced place, or a mirrored layout; a predicted error above the limit
-/// (`uncertain`); an unknown label (`bad_value`).
+/// line or fewer than seven equations (ten if the tip is not known; `poses_too_alike`); residuals beyond 99.9
+/// % (`residual_too_large`), naming the exchanged or the displaced place, or a mirrored layout; a predicted
+/// error above the limit
+/// (`uncertain`), as of touches with one direction of a pointer whose tip has no covariance; an unknown label
+/// (`bad_value`).
 Expected<MountCalibration> calibrate_mount(const std::map<std::string, MountPlace>& places,
                                            std::span<const MountObservation> observations,
                                            const MountOptions& options = {});

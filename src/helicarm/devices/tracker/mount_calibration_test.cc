@@ -47,6 +47,13 @@ MountOptions exact() {
   MountOptions options;
   options.sigma_mm = options.sigma_deg = 0;
   options.seat_mm = 1e-3;
+  options.tip_covariance = Matrix3d::Zero();
+  return options;
+}
+
+MountOptions with_exact_tip() {
+  MountOptions options;
+  options.tip_covariance = Matrix3d::Zero();
   return options;
 }
 
@@ -61,7 +68,9 @@ RigidTransform pointer_at(const MountPlace& place, const Vector3d& true_tip, Ran
 /// `touches` of each place, with errors of the given size.
 std::vector<MountObservation> touched(const std::map<std::string, MountPlace>& places,
                                       const MountOptions& noise, RandomStream& random, int touches = 1) {
-  const Vector3d true_tip = tip + noise.tip_covariance.diagonal().cwiseSqrt().cwiseProduct(normal(random));
+  const Vector3d true_tip =
+      tip +
+      noise.tip_covariance.value_or(Matrix3d::Zero()).diagonal().cwiseSqrt().cwiseProduct(normal(random));
   const RigidTransform facet = noisy(tracker_from_facet, noise, random);  // at rest: one error for all
   std::vector<MountObservation> observations;
   for (const auto& [label, place] : places)
@@ -150,18 +159,19 @@ TEST(MountCalibration, PivotsAboutThreePlacesGiveTheMount) {
     pivot.covariance = 0.01 * Eigen::Matrix<double, 6, 6>::Identity();
     observations.push_back(pivoted_place(label, pivot));
   }
-  const auto mount = calibrate_mount(places(), observations);
+  const auto mount = calibrate_mount(places(), observations, with_exact_tip());
   ASSERT_TRUE(mount) << mount.error().message;
   EXPECT_LT((mount->calibrator_from_facet.translation - calibrator_from_facet.translation).norm(), 1e-6);
   observations.resize(1);
-  EXPECT_EQ(calibrate_mount(places(), observations).error().reason, Reason::poses_too_alike);
+  EXPECT_EQ(calibrate_mount(places(), observations, with_exact_tip()).error().reason,
+            Reason::poses_too_alike);
 }
 
 TEST(MountCalibration, ExchangedPlacesAreNamed) {
   RandomStream random(2, 1);
-  auto observations = touched(places(), MountOptions(), random);
+  auto observations = touched(places(), with_exact_tip(), random);
   std::swap(observations[1].label, observations[3].label);
-  const auto mount = calibrate_mount(places(), observations);
+  const auto mount = calibrate_mount(places(), observations, with_exact_tip());
   ASSERT_FALSE(mount);
   EXPECT_EQ(mount.error().reason, Reason::residual_too_large);
   const std::string& a =
@@ -172,9 +182,9 @@ TEST(MountCalibration, ExchangedPlacesAreNamed) {
 
 TEST(MountCalibration, SlippedTouchIsNamed) {
   RandomStream random(3, 1);
-  auto observations = touched(places(), MountOptions(), random);
+  auto observations = touched(places(), with_exact_tip(), random);
   observations[2].point_in_facet += Vector3d(0, 3, 0);
-  const auto mount = calibrate_mount(places(), observations);
+  const auto mount = calibrate_mount(places(), observations, with_exact_tip());
   ASSERT_FALSE(mount);
   EXPECT_NE(mount.error().message.find("\"" + observations[2].label + "\" was touched"), std::string::npos)
       << mount.error().message;
@@ -184,7 +194,7 @@ TEST(MountCalibration, MirroredCalibratorIsNamed) {
   RandomStream random(4, 1);
   auto mirrored = places();
   for (auto& [label, place] : mirrored) place.centre_in_calibrator.x() *= -1;
-  const auto mount = calibrate_mount(mirrored, touched(places(), MountOptions(), random));
+  const auto mount = calibrate_mount(mirrored, touched(places(), with_exact_tip(), random), with_exact_tip());
   ASSERT_FALSE(mount);
   EXPECT_NE(mount.error().message.find("mirror"), std::string::npos) << mount.error().message;
 }
@@ -194,14 +204,15 @@ TEST(MountCalibration, PlacesAlongALineAreRefused) {
   std::map<std::string, MountPlace> line;
   for (const auto& [label, x] : {std::pair("A", 0.0), {"B", 30.0}, {"C", 60.0}})
     line[label] = {{x, x / 2, 10}, 0};
-  EXPECT_EQ(calibrate_mount(line, touched(line, MountOptions(), random)).error().reason,
+  EXPECT_EQ(calibrate_mount(line, touched(line, with_exact_tip(), random), with_exact_tip()).error().reason,
             Reason::poses_too_alike);
 }
 
 TEST(MountCalibration, OneTouchOfEachBallIsTooFew) {
   RandomStream random(6, 1);
   const auto at = places(2);
-  EXPECT_EQ(calibrate_mount(at, touched(at, MountOptions(), random)).error().reason, Reason::poses_too_alike);
+  EXPECT_EQ(calibrate_mount(at, touched(at, with_exact_tip(), random), with_exact_tip()).error().reason,
+            Reason::poses_too_alike);
 }
 
 TEST(MountCalibration, SymmetricPlacesReportWhatTheyWouldNotShow) {
@@ -209,7 +220,7 @@ TEST(MountCalibration, SymmetricPlacesReportWhatTheyWouldNotShow) {
   std::map<std::string, MountPlace> isosceles;
   for (const auto& [label, at] : {std::pair("A", Vector3d(0, 60, 0)), {"B", {-40, 0, 0}}, {"C", {40, 0, 0}}})
     isosceles[label] = {at, 0};
-  MountOptions options;
+  MountOptions options = with_exact_tip();
   options.max_tre_mm = 5;
   const auto mount = calibrate_mount(isosceles, touched(isosceles, options, random), options);
   ASSERT_TRUE(mount) << mount.error().message;
@@ -219,18 +230,54 @@ TEST(MountCalibration, SymmetricPlacesReportWhatTheyWouldNotShow) {
 
 TEST(MountCalibration, LargePredictedErrorIsRefused) {
   RandomStream random(9, 1);
-  MountOptions options;
+  MountOptions options = with_exact_tip();
   options.sigma_mm = 1;
   const auto mount = calibrate_mount(places(), touched(places(), options, random), options);
   ASSERT_FALSE(mount);
   EXPECT_EQ(mount.error().reason, Reason::uncertain);
 }
 
+/// Touches by a pointer whose tip is 2 mm from where its file has it, held within `tilt` rad of upright.
+std::vector<MountObservation> touched_by_bent_pointer(double tilt, RandomStream& random) {
+  const Vector3d bent = tip + Vector3d(1.2, -1.2, 1.0);
+  std::vector<MountObservation> observations;
+  for (const auto& [label, place] : places())
+    for (int i = 0; i < 6; ++i) {
+      const Matrix3d turn = geometry::rotation_from_vector(tilt * normal(random));
+      const Vector3d at = tracker_from_facet * calibrator_from_facet.inverse() * place.centre_in_calibrator;
+      observations.push_back(touched_place(
+          label, tracker_from_facet,
+          noisy({turn, at + MountOptions().seat_mm * normal(random) - turn * bent}, {}, random), tip));
+    }
+  return observations;
+}
+
+TEST(MountCalibration, TipWithoutCovarianceIsDeterminedByTheTouchesOfATiltedPointer) {
+  constexpr double chi2_95_of_six = 12.592;
+  int covered = 0;
+  for (std::uint64_t trial = 0; trial < 40; ++trial) {
+    RandomStream random(12, 1, trial);
+    const auto mount = calibrate_mount(places(), touched_by_bent_pointer(0.5, random));
+    ASSERT_TRUE(mount) << mount.error().message;
+    EXPECT_LT((mount->tip_shift_mm - Vector3d(1.2, -1.2, 1.0)).norm(), 0.5);
+    covered += squared_error(*mount) <= chi2_95_of_six;
+  }
+  EXPECT_GE(covered, 34);  // three standard deviations below 95 %
+}
+
+TEST(MountCalibration, TipWithoutCovarianceIsNotTakenAsExactWhereTheTouchesDoNotShowIt) {
+  RandomStream random(13, 1);
+  const auto mount = calibrate_mount(places(), touched_by_bent_pointer(0.005, random));
+  ASSERT_FALSE(mount);
+  EXPECT_EQ(mount.error().reason, Reason::uncertain);
+  EXPECT_NE(mount.error().message.find("tracker pivot"), std::string::npos) << mount.error().message;
+}
+
 TEST(MountCalibration, UnknownPlaceIsRefused) {
   RandomStream random(10, 1);
-  auto observations = touched(places(), MountOptions(), random);
+  auto observations = touched(places(), with_exact_tip(), random);
   observations[0].label = "P99";
-  EXPECT_EQ(calibrate_mount(places(), observations).error().reason, Reason::bad_value);
+  EXPECT_EQ(calibrate_mount(places(), observations, with_exact_tip()).error().reason, Reason::bad_value);
 }
 
 }  // namespace
