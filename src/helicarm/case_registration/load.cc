@@ -9,9 +9,9 @@
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/import_matrix.h"
 #include "helicarm/image/tiff.h"
+#include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/volume/read_volume.h"
-#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -118,7 +118,7 @@ LoadedViews views_of_cameras(const pipeline::RegistrationCase& given) {
   LoadedViews loaded;
   for (std::size_t i = 0; i < given.base.views.size(); ++i) {
     const pipeline::CaseView& view = given.base.views[i];
-    const xray::XrayImage image = value_or_throw(xray::read_xray_image(view.image, view.name, view.frame));
+    const xray::XrayImage image = value_or_throw(pipeline::image_of(view));
     const geometry::ImportedMatrix camera = value_or_throw(geometry::import_matrix(given.cameras[i]));
     if (camera.image_size) check_size(view.name, "the camera is for", *camera.image_size, image.pixels);
     loaded.views.push_back(view_of(image, view.name, camera.view));
@@ -172,7 +172,7 @@ Expected<std::vector<RegistrationView>> with_images(const LoadedViews& loaded,
     std::vector<RegistrationView> views = loaded.views;
     for (std::size_t i = 0; i < views.size(); ++i) {
       const pipeline::CaseView& asked = given.base.views[i];
-      const auto image = value_or_throw(xray::read_xray_image(asked.image, asked.name, asked.frame));
+      const auto image = value_or_throw(pipeline::image_of(asked));
       check_size(asked.name, "the sequence's first image has",
                  {views[i].grey.width(), views[i].grey.height()}, image.pixels);
       RegistrationView now = view_of(image, asked.name, views[i].view);
