@@ -27,6 +27,8 @@ void run(std::string_view bytes) {
   for (const pipeline::CaseView& view : read->views) {
     check(names.insert(view.name).second, "names are unique");
     check(view.image.lexically_relative(folder()).begin()->string() != "..", "images lie in the folder");
+    check(view.pixel_mm.value_or(1) > 0 && view.source_detector_mm.value_or(1000) >= 200,
+          "lengths are in range");
     check_pose(view.poses.tracker_from_calibrator);
     check_pose(view.poses.tracker_from_femur);
   }
@@ -43,7 +45,8 @@ std::vector<std::string> seeds() {
       "views": [{"name": "AP", "image": "AP.dcm", "poses": {
                    "tracker_from_calibrator": [[0,-1,0,5],[1,0,0,6],[0,0,1,7]],
                    "tracker_from_femur": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]], "tracker_from_tibia": null}},
-                {"name": "LAT", "image": "LAT.dcm", "frame": 2, "plate_image": "plate.dcm"}],
+                {"name": "LAT", "image": "LAT.dcm", "frame": 2, "plate_image": "plate.dcm", "pixel_mm": 0.2,
+                 "source_detector_mm": 1000}],
       "poses_now": {"tracker_from_femur": null, "tracker_from_tibia": null,
                     "tracker_from_tool": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]},
       "tracker": {"sigma_mm": 0.12, "sigma_deg": 0.05, "samples": "shared"},

@@ -2,6 +2,7 @@
 #include "bundle_command.h"
 #include "command_line.h"
 #include "helicarm/pipeline/run_fields.h"
+#include "helicarm/xray/dicom_acquisition.h"
 #include "new_command.h"
 #include "pick_command.h"
 
@@ -16,10 +17,10 @@ void add_new(CLI::App& app, Action& action) {
       "  helicarm new AP=run.dcm:12 LAT=run.dcm:40 --calibrator c.json --plate plate.json --out my-case");
   auto& a = arguments_of(command, action, new_command);
   command
-      ->add_option(
-          "IMAGE", a.images,
-          "[VIEW=]FILE[:FRAME], two or more: DICOM, PNG or TIFF. Without VIEW the views are AP and LAT "
-          "by their positioner angles, or named as the files")
+      ->add_option("IMAGE", a.images,
+                   "[VIEW=]FILE[:FRAME], two or more: DICOM, PNG, TIFF, JPEG or BMP. Without VIEW the views "
+                   "are AP and LAT "
+                   "by their positioner angles, or named as the files")
       ->required();
   command->add_option("--calibrator", a.calibrator, "calibrator.json, or udcsc");
   command->add_option("--plate", a.plate,
@@ -30,6 +31,14 @@ void add_new(CLI::App& app, Action& action) {
       ->allow_extra_args(false);
   command->add_option("--map", a.maps, "VIEW=FILE: a map.json of rectify; repeatable")
       ->allow_extra_args(false);
+  command
+      ->add_option("--pixel-mm", a.pixel_mm,
+                   "Pixel size in the receiver's plane, mm, of images whose files do not state it")
+      ->check(CLI::Range(xray::min_pixel_mm, xray::max_pixel_mm));
+  command
+      ->add_option("--source-detector-mm", a.source_detector_mm,
+                   "Distance of source and receiver, mm, of images whose files do not state it")
+      ->check(CLI::Range(xray::min_source_detector_mm, xray::max_source_detector_mm));
   command->add_option("--out", a.out, "Folder for the case")->required();
 }
 

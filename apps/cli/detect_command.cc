@@ -10,6 +10,7 @@
 #include "helicarm/detection/find_marks.h"
 #include "helicarm/xray/read_xray_image.h"
 #include "image_files.h"
+#include "image_warnings.h"
 
 namespace helicarm::cli {
 namespace {
@@ -17,6 +18,7 @@ namespace {
 struct Detected {
   std::string image;
   std::vector<detection::Dot> dots;
+  std::vector<Warning> warnings;
 };
 
 Json json_of(const std::vector<detection::Dot>& dots) {
@@ -30,9 +32,12 @@ Json json_of(const std::vector<detection::Dot>& dots) {
 }
 
 Json json_of(const std::vector<Detected>& all) {
-  if (all.size() == 1) return {{"dots", json_of(all[0].dots)}};
+  if (all.size() == 1)
+    return {{"dots", json_of(all[0].dots)}, {"warnings", json_of_warnings(all[0].warnings)}};
   Json list = Json::array();
-  for (const Detected& one : all) list.push_back({{"image", one.image}, {"dots", json_of(one.dots)}});
+  for (const Detected& one : all)
+    list.push_back(
+        {{"image", one.image}, {"dots", json_of(one.dots)}, {"warnings", json_of_warnings(one.warnings)}});
   return {{"images", std::move(list)}};
 }
 
@@ -67,7 +72,8 @@ CommandResult detect_command(const DetectArguments& arguments, Console& console)
     for (std::size_t i = 0; i < files.size(); ++i) {
       const xray::XrayImage image =
           value_or_throw(xray::read_xray_image(files[i], files[i].filename().string(), arguments.frame));
-      all.push_back({files[i].string(), detection::find_marks(image, kind)});
+      print_warnings(image.warnings, console);
+      all.push_back({files[i].string(), detection::find_marks(image, kind), image.warnings});
       if (files.size() > 1 && !console.quiet)
         console.progress << fmt::format("[{}/{}] {}: {} {}\n", i + 1, files.size(), files[i].string(),
                                         all.back().dots.size(), arguments.kind);

@@ -18,7 +18,7 @@ struct DetectArguments {
 };
 
 /// Sub-pixel positions of all dots or wire crossings in X-ray images, raw px. One image is printed as
-/// {"dots"}, several as {"images": [{"image", "dots"}]}.
+/// {"dots", "warnings"}, several as {"images": [{"image", "dots", "warnings"}]}.
 CommandResult detect_command(const DetectArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

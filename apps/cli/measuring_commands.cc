@@ -195,7 +195,8 @@ void add_rectify(CLI::App& app, Action& action) {
                               "  helicarm rectify --map rectified/map.json --points raw.csv --json\n"
                               "  helicarm rectify GRID.dcm --map rectified/map.json --test-grid 20 --json");
   auto& a = arguments_of(command, action, rectify_command);
-  command->add_option("IMAGE", a.images, "DICOM, PNG or TIFF; with --map several, and folders of images");
+  command->add_option("IMAGE", a.images,
+                      "DICOM, PNG, TIFF, JPEG or BMP; with --map several, and folders of images");
   command->add_option("--frame", a.frame, "Number of the image in a multi-frame file, from 1")
       ->check(within(1, 100000));
   command->add_option("--plate", a.plate, "plate.json, or plate48");
@@ -231,7 +232,8 @@ void add_detect(CLI::App& app, Action& action) {
                               "helicarm detect AP.dcm --kind balls --json\n"
                               "  helicarm detect series/ --out dots.csv");
   auto& a = arguments_of(command, action, detect_command);
-  command->add_option("IMAGE", a.images, "DICOM, PNG or TIFF; several, and folders of images")->required();
+  command->add_option("IMAGE", a.images, "DICOM, PNG, TIFF, JPEG or BMP; several, and folders of images")
+      ->required();
   command->add_option("--frame", a.frame, "Number of the image in a multi-frame file, from 1")
       ->check(within(1, 100000));
   command->add_option("--kind", a.kind, "balls, holes or crosses")->type_name("WORD")->capture_default_str();

@@ -86,9 +86,11 @@ void print(const pipeline::NewCase& made, const std::filesystem::path& out, Cons
 
 CommandResult new_command(const NewArguments& arguments, Console& console) {
   return guarded([&] {
-    pipeline::NewCaseOptions options{arguments.calibrator, arguments.plate,
+    pipeline::NewCaseOptions options{arguments.calibrator,
+                                     arguments.plate,
                                      files_by_view(arguments.maps, "--map"),
-                                     files_by_view(arguments.plate_images, "--plate-image")};
+                                     files_by_view(arguments.plate_images, "--plate-image"),
+                                     {arguments.pixel_mm, arguments.source_detector_mm}};
     std::vector<pipeline::InspectedImage> images;
     for (const std::string& word : arguments.images)
       images.push_back(inspected(pipeline::new_image_from(word), console));

@@ -20,6 +20,7 @@
 #include "helicarm/xray/uid.h"
 #include "helicarm/xray/write_dicom.h"
 #include "image_files.h"
+#include "image_warnings.h"
 #include "named_files.h"
 #include "run_command.h"
 
@@ -46,8 +47,17 @@ void write_field(const RectifyArguments& arguments, const rectification::Distort
       write_file(arguments.out / "displacement.nrrd", rectification::displacement_field(map, pixel_mm)));
 }
 
-xray::XrayImage read(const std::filesystem::path& image, const RectifyArguments& arguments) {
-  return value_or_throw(xray::read_xray_image(image, image.filename().string(), arguments.frame));
+xray::XrayImage read(const std::filesystem::path& image, const RectifyArguments& arguments,
+                     Console& console) {
+  xray::XrayImage read =
+      value_or_throw(xray::read_xray_image(image, image.filename().string(), arguments.frame));
+  print_warnings(read.warnings, console);
+  return read;
+}
+
+std::vector<Warning> joined(std::vector<Warning> warnings, const std::vector<Warning>& more) {
+  warnings.insert(warnings.end(), more.begin(), more.end());
+  return warnings;
 }
 
 rectification::DistortionMap map_of(const RectifyArguments& arguments) {
@@ -55,7 +65,7 @@ rectification::DistortionMap map_of(const RectifyArguments& arguments) {
                                                                 arguments.map->filename().string()));
 }
 
-Json figures_of(const rectification::Rectification& r) {
+Json figures_of(const rectification::Rectification& r, const std::vector<Warning>& warnings) {
   return {{"model", r.map.model->name()},
           {"dots_found", r.dots_found},
           {"dots_expected", r.dots_expected ? Json(*r.dots_expected) : Json(nullptr)},
@@ -63,7 +73,8 @@ Json figures_of(const rectification::Rectification& r) {
           {"residual_max_px", r.map.residual_max_px},
           {"held_out_rms_px", r.map.held_out_rms_px},
           {"raw_mean_px", r.raw_mean_px},
-          {"raw_max_px", r.raw_max_px}};
+          {"raw_max_px", r.raw_max_px},
+          {"warnings", json_of_warnings(warnings)}};
 }
 
 /// Fig. 2 a to e.
@@ -79,10 +90,11 @@ void write_stages(const xray::XrayImage& xray_image, const rectification::Rectif
 }
 
 void rectify_image(const RectifyArguments& arguments, Console& console) {
-  const xray::XrayImage xray_image = read(arguments.images.front(), arguments);
+  const xray::XrayImage xray_image = read(arguments.images.front(), arguments, console);
   const rectification::Rectification r = value_or_throw(rectification::rectify(
       xray_image, plate_from(*arguments.plate),
       {value_or_throw(method_named(arguments.method)), {}, arguments.model.value_or("")}));
+  print_warnings(r.warnings, console);
   std::string residuals = "u_px,v_px,residual_px\n";
   for (std::size_t i = 0; i < r.plate_dots.size(); ++i)
     residuals += fmt::format("{},{},{}\n", r.plate_dots[i].centre_px.x(), r.plate_dots[i].centre_px.y(),
@@ -99,7 +111,7 @@ void rectify_image(const RectifyArguments& arguments, Console& console) {
   value_or_throw(write_file(arguments.out / "map.json", to_text(rectification::to_json(r.map)) + "\n"));
   value_or_throw(write_file(arguments.out / "residuals.csv", residuals));
   if (console.json)
-    console.out << to_text(figures_of(r)) << '\n';
+    console.out << to_text(figures_of(r, joined(xray_image.warnings, r.warnings))) << '\n';
   else if (!console.quiet)
     console.out << fmt::format(
         "{}: {} dots, residual {:.3f} px rms, {:.3f} max, cross-validated {:.3f}; written to {}\n",
@@ -115,13 +127,16 @@ void map_images(const RectifyArguments& arguments, Console& console) {
   for (const std::filesystem::path& file : files) names.push_back(file.stem().string());
   names = distinct(names);
   Json written = Json::array();
+  std::vector<Warning> warnings;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    const xray::XrayImage xray_image = read(files[i], arguments);
+    const xray::XrayImage xray_image = read(files[i], arguments, console);
     const auto mapped =
         value_or_throw(rectification::with_map(xray_image, map, {}).map_error([&](Failure failure) {
           failure.message = fmt::format("{}: {}", files[i].filename().string(), failure.message);
           return failure;
         }));
+    warnings = joined(std::move(warnings), joined(xray_image.warnings, mapped.warnings));
+    print_warnings(mapped.warnings, console);
     if (!mapped.map_confirmed && !console.quiet)
       console.progress << fmt::format(
           "helicarm: note: {}: no plate in the image confirms the map; it must be of this C-arm position\n",
@@ -135,7 +150,9 @@ void map_images(const RectifyArguments& arguments, Console& console) {
     if (!console.quiet && !console.json)
       console.out << fmt::format("[{}/{}] {}\n", i + 1, files.size(), to.string());
   }
-  if (console.json) console.out << to_text(Json{{"written", std::move(written)}}) << '\n';
+  if (console.json)
+    console.out << to_text(Json{{"written", std::move(written)}, {"warnings", json_of_warnings(warnings)}})
+                << '\n';
 }
 
 void map_points(const RectifyArguments& arguments, Console& console) {
@@ -170,7 +187,7 @@ Json crossings_of(const rectification::TestGrid& grid) {
 
 void measure_grid(const RectifyArguments& arguments, Console& console) {
   const rectification::DistortionMap map = map_of(arguments);
-  const xray::XrayImage image = read(arguments.images.front(), arguments);
+  const xray::XrayImage image = read(arguments.images.front(), arguments, console);
   const rectification::TestGrid grid =
       value_or_throw(rectification::measure_test_grid(rectification::find_grid(image), map));
   value_or_throw(
@@ -182,7 +199,8 @@ void measure_grid(const RectifyArguments& arguments, Console& console) {
     console.out << to_text(Json{{"raw", json_of(grid.raw)},
                                 {"rectified", json_of(grid.rectified)},
                                 {"n", grid.crosses},
-                                {"crossings", crossings_of(grid)}})
+                                {"crossings", crossings_of(grid)},
+                                {"warnings", json_of_warnings(image.warnings)}})
                 << '\n';
   else
     console.out << fmt::format(

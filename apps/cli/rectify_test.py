@@ -4,9 +4,23 @@
 
 import json
 import shutil
+import struct
 import unittest
+import zlib
 
 from program import SimulatedCase, run
+
+
+def dot_png(size=64):
+    """A grey image of 8 bits with one dark dot."""
+    rows = b"".join(b"\0" + bytes(40 if (u - 30) ** 2 + (v - 30) ** 2 < 20 else 200 for u in range(size))
+                    for v in range(size))
+
+    def chunk(name, content):
+        return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
+
+    header = struct.pack(">IIBBBBB", size, size, 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
 
 
 class Rectify(SimulatedCase):
@@ -73,6 +87,18 @@ class Rectify(SimulatedCase):
         self.assertEqual(refused.returncode, 2)
         self.assertIn("polynomial, radial, kriging", refused.stderr)
         self.assertEqual(run("rectify", image, "--map", out / "map.json", "--model", "radial").returncode, 2)
+
+    def test_warnings_of_an_image_are_printed(self):
+        image = self.root / "detected.png"
+        image.write_bytes(dot_png())
+        done = run("detect", image, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual([warning["code"] for warning in json.loads(done.stdout)["warnings"]], ["spacing_missing"])
+        self.assertIn("helicarm: warning: spacing_missing: detected.png: ", done.stderr)
+        self.assertNotIn("warning", run("detect", image, "--quiet").stderr)
+        out = self.root / "of-warned"
+        done = run("rectify", self.root / "case/AP.dcm", "--plate", self.root / "case/plate.json", "--out", out, "--json")
+        self.assertIsInstance(json.loads(done.stdout)["warnings"], list)
 
     def test_rectify_applies_a_map_to_the_images_of_a_folder(self):
         out, series = self.root / "fitted", self.root / "series"

@@ -22,8 +22,9 @@ std::vector<fs::path> images_in(const fs::path& folder) {
   std::vector<fs::path> images;
   std::error_code unreadable;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, unreadable))
-    if (const fs::path kind = entry.path().extension();
-        kind == ".dcm" || kind == ".png" || kind == ".tif" || kind == ".tiff")
+    if (const fs::path kind = entry.path().extension(); kind == ".dcm" || kind == ".png" || kind == ".tif" ||
+                                                        kind == ".tiff" || kind == ".jpg" ||
+                                                        kind == ".jpeg" || kind == ".bmp")
       images.push_back(entry.path());
   std::ranges::sort(images);
   return images;

@@ -14,8 +14,8 @@
 #include "helicarm/case_registration/start_poses.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
+#include "helicarm/pipeline/view_image.h"
 #include "helicarm/registration/follow.h"
-#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -35,8 +35,7 @@ void check_frames(const pipeline::RegistrationCase& given, const FrameRange& ran
     throw BadInput(Reason::missing_file, fmt::format("{} of {} images do not exist, the first: {}", missing,
                                                      range.count() * int(given.base.views.size()), first));
   const auto last = value_or_throw(pipeline::at_frame(given, range.first + (range.count() - 1) * range.step));
-  for (const pipeline::CaseView& view : last.base.views)
-    value_or_throw(xray::read_xray_image(view.image, view.name, view.frame));
+  for (const pipeline::CaseView& view : last.base.views) value_or_throw(pipeline::image_of(view));
 }
 
 /// A model and who follows it; the follower refers to the model.

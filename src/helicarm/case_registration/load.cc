@@ -11,9 +11,9 @@
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/import_matrix.h"
 #include "helicarm/pipeline/belong_together.h"
+#include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/volume/read_volume.h"
-#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -108,7 +108,7 @@ LoadedViews views_of_cameras(const pipeline::RegistrationCase& given) {
   std::vector<xray::XrayImage> images;
   std::vector<const xray::XrayImage*> together;
   for (const pipeline::CaseView& view : given.base.views)
-    images.push_back(value_or_throw(xray::read_xray_image(view.image, view.name, view.frame)));
+    images.push_back(value_or_throw(pipeline::image_of(view)));
   for (const xray::XrayImage& image : images) together.push_back(&image);
   value_or_throw(pipeline::check_images_belong_together(together));
   for (std::size_t i = 0; i < given.base.views.size(); ++i) {
@@ -191,7 +191,7 @@ Expected<std::vector<RegistrationView>> with_images(const LoadedViews& loaded,
     std::vector<RegistrationView> views = loaded.views;
     for (std::size_t i = 0; i < views.size(); ++i) {
       const pipeline::CaseView& asked = given.base.views[i];
-      const auto image = value_or_throw(xray::read_xray_image(asked.image, asked.name, asked.frame));
+      const auto image = value_or_throw(pipeline::image_of(asked));
       std::string patient = loaded.patient_key;
       take_patient(patient, image);
       check_size(asked.name, "the sequence's first image has",

@@ -2,6 +2,7 @@
 #include "helicarm/detection/blobs.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -32,13 +33,13 @@ float threshold(const cv::Mat& view_image, double sigmas) {
   return std::min(float(sigmas) * typical, 0.25f * *strong);
 }
 
-bool is_peak(const std::vector<cv::Mat>& answers, std::size_t level, int u, int v, float value) {
-  for (std::size_t k = level - 1; k <= level + 1; ++k)
+/// In space and scale; of equal values the first counts.
+bool is_peak(const std::array<cv::Mat, 3>& answers, int u, int v, float value) {
+  for (std::size_t k = 0; k < answers.size(); ++k)
     for (int y = v - 1; y <= v + 1; ++y) {
       const float* row = answers[k].ptr<float>(y);
       for (int x = u - 1; x <= u + 1; ++x)
-        if (row[x] > value ||
-            (row[x] == value && (k < level || (k == level && (y < v || (y == v && x < u))))))
+        if (row[x] > value || (row[x] == value && (k < 1 || (k == 1 && (y < v || (y == v && x < u))))))
           return false;
     }
   return true;
@@ -60,48 +61,51 @@ double offset_of_peak(float before, float here, float after) {
   return bend < 0 ? std::clamp(0.5 * (double(before) - double(after)) / bend, -0.6, 0.6) : 0;
 }
 
-void search_octave(const cv::Mat& base, double step, const BlobOptions& options, std::vector<Dot>& blobs) {
-  std::vector<cv::Mat> blurred(levels_per_octave + 3);
-  cv::GaussianBlur(base, blurred[0], {},
-                   step > 1 ? std::sqrt(first_sigma * first_sigma - 0.25) : first_sigma);
-  for (std::size_t k = 1; k < blurred.size(); ++k) {
-    const double sigma = first_sigma * std::pow(ratio, double(k - 1));
-    cv::GaussianBlur(blurred[k - 1], blurred[k], {}, sigma * std::sqrt(ratio * ratio - 1));
-  }
-  std::vector<cv::Mat> answers(blurred.size() - 1);
-  for (std::size_t k = 0; k < answers.size(); ++k)
-    answers[k] =
-        options.polarity == Polarity::dark ? blurred[k + 1] - blurred[k] : blurred[k] - blurred[k + 1];
-  for (std::size_t k = 1; k + 1 < answers.size(); ++k) {
-    const float limit = threshold(answers[k], options.threshold_sigma);
-    const double sigma = first_sigma * std::pow(ratio, double(k) + 0.5);
-    const double radius = std::numbers::sqrt2 * sigma * step;
-    if (radius < options.min_radius_px / 1.15 || radius > options.max_radius_px * 1.15) continue;
-    for (int v = 1; v + 1 < base.rows; ++v) {
-      const float* row = answers[k].ptr<float>(v);
-      for (int u = 1; u + 1 < base.cols; ++u) {
-        const float value = row[u];
-        if (value <= limit || value < row[u - 1] || value < row[u + 1]) continue;
-        if (!is_peak(answers, k, u, v, value) || !is_round(answers[k], u, v, options.max_elongation))
-          continue;
-        const double du = offset_of_peak(row[u - 1], value, row[u + 1]);
-        const double dv =
-            offset_of_peak(answers[k].at<float>(v - 1, u), value, answers[k].at<float>(v + 1, u));
-        const double dk =
-            offset_of_peak(answers[k - 1].at<float>(v, u), value, answers[k + 1].at<float>(v, u));
-        Dot blob;
-        blob.centre_px = {(u + du + 0.5) * step - 0.5, (v + dv + 0.5) * step - 0.5};
-        blob.radius_px = radius * std::pow(ratio, dk);
-        blob.contrast = double(value);
-        blobs.push_back(blob);
-      }
+/// Peaks of the middle one of three neighbouring levels' answers.
+void search_level(const std::array<cv::Mat, 3>& answers, double radius, double step,
+                  const BlobOptions& options, std::vector<Dot>& blobs) {
+  const cv::Mat& answer = answers[1];
+  const float limit = threshold(answer, options.threshold_sigma);
+  for (int v = 1; v + 1 < answer.rows; ++v) {
+    const float* row = answer.ptr<float>(v);
+    for (int u = 1; u + 1 < answer.cols; ++u) {
+      const float value = row[u];
+      if (value <= limit || value < row[u - 1] || value < row[u + 1]) continue;
+      if (!is_peak(answers, u, v, value) || !is_round(answer, u, v, options.max_elongation)) continue;
+      const double du = offset_of_peak(row[u - 1], value, row[u + 1]);
+      const double dv = offset_of_peak(answer.at<float>(v - 1, u), value, answer.at<float>(v + 1, u));
+      const double dk = offset_of_peak(answers[0].at<float>(v, u), value, answers[2].at<float>(v, u));
+      Dot blob;
+      blob.centre_px = {(u + du + 0.5) * step - 0.5, (v + dv + 0.5) * step - 0.5};
+      blob.radius_px = radius * std::pow(ratio, dk);
+      blob.contrast = double(value);
+      blobs.push_back(blob);
     }
+  }
+}
+
+/// Level by level: of a large image, only the levels in use fit into memory.
+void search_octave(const cv::Mat& base, double step, const BlobOptions& options, std::vector<Dot>& blobs) {
+  cv::Mat blurred, wider;
+  cv::GaussianBlur(base, blurred, {}, step > 1 ? std::sqrt(first_sigma * first_sigma - 0.25) : first_sigma);
+  std::array<cv::Mat, 3> answers;
+  for (int k = 0; k < levels_per_octave + 2; ++k) {
+    const double radius_before = std::numbers::sqrt2 * first_sigma * std::pow(ratio, double(k) - 0.5) * step;
+    if (radius_before > options.max_radius_px * 1.15) break;
+    cv::GaussianBlur(blurred, wider, {},
+                     first_sigma * std::pow(ratio, double(k)) * std::sqrt(ratio * ratio - 1));
+    std::rotate(answers.begin(), answers.begin() + 1, answers.end());
+    const bool dark = options.polarity == Polarity::dark;
+    cv::subtract(dark ? wider : blurred, dark ? blurred : wider, answers[2]);
+    cv::swap(blurred, wider);
+    if (k >= 2 && radius_before >= options.min_radius_px / 1.15)
+      search_level(answers, radius_before, step, options, blobs);
   }
 }
 
 }  // namespace
 
-std::vector<Dot> find_blobs(const image::Image<float>& image, const BlobOptions& options) {
+std::vector<Dot> find_blobs(image::Image<float> image, const BlobOptions& options) {
   std::vector<Dot> blobs;
   cv::Mat base = image::as_mat(image);
   for (double step = 1; base.cols >= 16 && base.rows >= 16; step *= 2) {
@@ -114,6 +118,7 @@ std::vector<Dot> find_blobs(const image::Image<float>& image, const BlobOptions&
     cv::Mat half;
     cv::resize(base, half, {base.cols / 2, base.rows / 2}, 0, 0, cv::INTER_AREA);
     base = half;
+    image = {};  // a quarter is searched from here on
   }
   std::stable_sort(blobs.begin(), blobs.end(),
                    [](const Dot& a, const Dot& b) { return a.contrast > b.contrast; });

@@ -25,6 +25,6 @@ struct BlobOptions {
 /// Approximate centres and radii of round blobs: maxima over position and scale of differences of Gaussians
 /// (Lowe 2004; the response to a disc of radius r peaks at sigma = r / sqrt 2). Strongest first; `contrast`
 /// is the response, sigma is not set.
-std::vector<Dot> find_blobs(const image::Image<float>& image, const BlobOptions& options);
+std::vector<Dot> find_blobs(image::Image<float> image, const BlobOptions& options);
 
 }  // namespace helicarm::detection

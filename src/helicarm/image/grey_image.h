@@ -15,7 +15,8 @@ inline constexpr std::size_t max_image_bytes = std::size_t{64} << 20;
 /// A decoded grey image: values as stored, 0 .. 2^bits - 1.
 struct GreyImage {
   Image<std::uint16_t> pixels;
-  int bits = 8;  ///< 8 or 16
+  int bits = 8;             ///< 8 or 16
+  double pixel_aspect = 1;  ///< height of a pixel to its width, as the file declares it
 };
 
 }  // namespace helicarm::image

@@ -2,14 +2,19 @@
 #include "helicarm/image/grey_window.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 namespace helicarm::image {
 
 GreyWindow usual_window(const Image<float>& grey_image, float lowest) {
+  // Of a large image a million values are enough.
+  constexpr double enough = 1e6;
+  const int step = std::max(1, static_cast<int>(std::sqrt(double(grey_image.pixels().size()) / enough)));
   std::vector<float> values;
-  for (float value : grey_image.pixels())
-    if (value > lowest) values.push_back(value);
+  for (int v = 0; v < grey_image.height(); v += step)
+    for (int u = 0; u < grey_image.width(); u += step)
+      if (const float value = grey_image(u, v); value > lowest) values.push_back(value);
   if (values.empty()) return {lowest, lowest + 1};
   const auto at_share = [&](double share) {
     const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * double(values.size() - 1));

@@ -2,12 +2,16 @@
 #include "helicarm/image/png.h"
 
 #include <algorithm>
+#include <cctype>
 #include <csetjmp>
 #include <cstring>
+#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
 #include <png.h>
+
+#include "helicarm/image/exif.h"
 
 namespace helicarm::image {
 namespace {
@@ -18,6 +22,10 @@ std::string encode(std::uint32_t format, int width, int height, const void* pixe
   image.width = static_cast<png_uint_32>(width);
   image.height = static_cast<png_uint_32>(height);
   image.format = format;
+  // Of images beyond 4 megapixels: sooner, for a somewhat larger file.
+  constexpr std::size_t large = std::size_t{4} << 20;
+  if (static_cast<std::size_t>(width) * static_cast<std::size_t>(height) > large)
+    image.flags = PNG_IMAGE_FLAG_FAST;
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::string bytes(size, '\0');
   if (!png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels, stride, nullptr))
@@ -82,8 +90,49 @@ bool read_row(Reading& reading) {
 
 bool read_end(Reading& reading) {
   if (setjmp(png_jmpbuf(reading.png))) return false;
-  png_read_end(reading.png, nullptr);
+  png_read_end(reading.png, reading.info);
   return true;
+}
+
+/// The bytes of a text that ImageMagick writes: a name, a length, and hexadecimal digits, each on new lines.
+std::string from_raw_profile(std::string_view text) {
+  constexpr int header_lines = 3;
+  for (int line = 0; line < header_lines; ++line) {
+    const std::size_t end = text.find('\n');
+    if (end == text.npos) return {};
+    text.remove_prefix(end + 1);
+  }
+  std::string digits, bytes;
+  for (const char c : text)
+    if (std::isxdigit(static_cast<unsigned char>(c))) digits += c;
+  for (std::size_t i = 0; i + 1 < digits.size(); i += 2)
+    bytes += static_cast<char>(std::stoi(digits.substr(i, 2), nullptr, 16));
+  return bytes;
+}
+
+/// By the chunk eXIf, or by the text that stood for it before. After the end of the file has been read.
+std::optional<int> orientation_of(const Reading& reading) {
+  png_uint_32 size = 0;
+  png_bytep block = nullptr;
+  if (png_get_eXIf_1(reading.png, reading.info, &size, &block) != 0)
+    return exif_orientation({reinterpret_cast<const char*>(block), size});
+  png_textp texts = nullptr;
+  const int count = png_get_text(reading.png, reading.info, &texts, nullptr);
+  for (int i = 0; i < count; ++i) {
+    const std::string_view key = texts[i].key;
+    if (key != "Raw profile type exif" && key != "Raw profile type APP1") continue;
+    const std::size_t length = std::max(texts[i].text_length, texts[i].itxt_length);
+    if (const auto orientation = exif_orientation(from_raw_profile({texts[i].text, length})))
+      return orientation;
+  }
+  return std::nullopt;
+}
+
+double aspect_of(const Reading& reading) {
+  png_uint_32 across = 0, down = 0;  // pixels per unit
+  int unit = 0;
+  png_get_pHYs(reading.png, reading.info, &across, &down, &unit);
+  return across > 0 && down > 0 ? double(across) / double(down) : 1;
 }
 
 }  // namespace
@@ -132,7 +181,8 @@ Expected<GreyImage> decode_png(std::string_view bytes, const std::string& origin
                                                    reading.width, reading.height, max_image_bytes));
     check(start_rows(reading));
 
-    GreyImage grey_image{{static_cast<int>(reading.width), static_cast<int>(reading.height)}, reading.bits};
+    GreyImage grey_image{
+        {static_cast<int>(reading.width), static_cast<int>(reading.height)}, reading.bits, 1};
     reading.row.resize(reading.width * channels * word);
     for (int v = 0; v < grey_image.pixels.height(); ++v) {
       check(read_row(reading));
@@ -146,6 +196,8 @@ Expected<GreyImage> decode_png(std::string_view bytes, const std::string& origin
       }
     }
     check(read_end(reading));
+    check_orientation(orientation_of(reading).value_or(1), origin);
+    grey_image.pixel_aspect = aspect_of(reading);
     return grey_image;
   });
 }

@@ -19,7 +19,8 @@ std::string encode_png(const cv::Mat& rgb);
 bool is_png(std::string_view bytes);
 
 /// 8 or 16-bit grey, or RGB whose three channels are equal. Refuses: truncated, bad_size, bad_value
-/// (damaged), unsupported (palette, alpha, fewer than 8 bits, true colour). `origin` begins each message.
+/// (damaged), unsupported (palette, alpha, fewer than 8 bits, true colour, an EXIF orientation other than 1).
+/// `origin` begins each message.
 Expected<GreyImage> decode_png(std::string_view bytes, const std::string& origin);
 
 }  // namespace helicarm::image

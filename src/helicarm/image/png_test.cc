@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <png.h>
+#include <zlib.h>
 
 #include "helicarm/core/random.h"
 
@@ -63,6 +64,56 @@ TEST(Png, PaletteAndAlphaAreRefused) {
   EXPECT_EQ(reason(encoded(PNG_FORMAT_RGBA, 4)), "unsupported");
   EXPECT_EQ(reason(encoded(PNG_FORMAT_GA, 2)), "unsupported");
   EXPECT_EQ(reason(encoded(PNG_FORMAT_RGB_COLORMAP, 1)), "unsupported");
+}
+
+std::string big_endian(std::size_t value) {
+  return {char(value >> 24), char(value >> 16), char(value >> 8), char(value)};
+}
+
+/// With a chunk behind the header, or before the end.
+std::string with_chunk(std::string png, const std::string& name, const std::string& content,
+                       bool at_end = false) {
+  const std::string body = name + content;
+  const auto sum = crc32(0, reinterpret_cast<const Bytef*>(body.data()), uInt(body.size()));
+  constexpr std::size_t behind_header = 33, end_chunk = 12;
+  return png.insert(at_end ? png.size() - end_chunk : behind_header,
+                    big_endian(content.size()) + body + big_endian(sum));
+}
+
+std::string exif(char orientation) {
+  return std::string("MM\0*\0\0\0\x08\0\1\1\x12\0\3\0\0\0\1\0", 19) + orientation + std::string(6, '\0');
+}
+
+TEST(Png, OrientationsThatTurnTheImageAreRefused) {
+  const std::string png = encode_png(noise<std::uint8_t>(8, 6));
+  for (const bool at_end : {false, true}) {
+    EXPECT_EQ(reason(with_chunk(png, "eXIf", exif(1), at_end)), "ok");
+    for (const char turned : {2, 3, 6, 8})
+      EXPECT_EQ(reason(with_chunk(png, "eXIf", exif(turned), at_end)), "unsupported");
+  }
+}
+
+TEST(Png, OrientationInATextProfileIsRefused) {
+  const auto profile = [](char orientation) {
+    std::string digits;
+    for (const char c : "Exif" + std::string(2, '\0') + exif(orientation))
+      digits += fmt::format("{:02x}", static_cast<unsigned char>(c));
+    return std::string("Raw profile type exif") + '\0' + "\nexif\n      32\n" + digits + "\n";
+  };
+  const std::string png = encode_png(noise<std::uint8_t>(8, 6));
+  EXPECT_EQ(reason(with_chunk(png, "tEXt", profile(1))), "ok");
+  EXPECT_EQ(reason(with_chunk(png, "tEXt", profile(6))), "unsupported");
+}
+
+TEST(Png, DensitiesAreThePixelsAspect) {
+  const std::string png = encode_png(noise<std::uint8_t>(8, 6));
+  const auto aspect = [&](std::size_t across, std::size_t down) {
+    return decode_png(with_chunk(png, "pHYs", big_endian(across) + big_endian(down) + '\1'), "x.png")
+        ->pixel_aspect;
+  };
+  EXPECT_EQ(aspect(2835, 2835), 1);
+  EXPECT_EQ(aspect(1000, 2000), 0.5);
+  EXPECT_EQ(aspect(0, 2000), 1);
 }
 
 TEST(Png, EveryTruncationIsRefused) {

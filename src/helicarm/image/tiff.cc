@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/image/tiff.h"
 
+#include <cmath>
 #include <cstring>
 #include <memory>
 #include <mutex>
@@ -8,6 +9,8 @@
 
 #include <fmt/format.h>
 #include <tiffio.h>
+
+#include "helicarm/image/exif.h"
 
 namespace helicarm::image {
 namespace {
@@ -66,7 +69,9 @@ File open(Source& from, const std::string& origin) {
 struct Layout {
   std::uint32_t width = 0, height = 0;
   std::uint16_t bits = 1, channels = 1, photometric = 0, format = SAMPLEFORMAT_UINT,
-                planes = PLANARCONFIG_CONTIG, compression = COMPRESSION_NONE;
+                planes = PLANARCONFIG_CONTIG, compression = COMPRESSION_NONE,
+                orientation = ORIENTATION_TOPLEFT;
+  double pixel_aspect = 1;
 };
 
 Layout read_layout(TIFF* tiff, const std::string& origin) {
@@ -78,6 +83,11 @@ Layout read_layout(TIFF* tiff, const std::string& origin) {
   TIFFGetFieldDefaulted(tiff, TIFFTAG_SAMPLEFORMAT, &layout.format);
   TIFFGetFieldDefaulted(tiff, TIFFTAG_PLANARCONFIG, &layout.planes);
   TIFFGetFieldDefaulted(tiff, TIFFTAG_COMPRESSION, &layout.compression);
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_ORIENTATION, &layout.orientation);
+  float across = 0, down = 0;  // pixels per unit
+  if (TIFFGetField(tiff, TIFFTAG_XRESOLUTION, &across) && TIFFGetField(tiff, TIFFTAG_YRESOLUTION, &down) &&
+      across > 0 && down > 0 && std::isfinite(across / down))
+    layout.pixel_aspect = double(across) / double(down);
   if (!TIFFGetField(tiff, TIFFTAG_PHOTOMETRIC, &layout.photometric))
     throw BadInput(Reason::bad_value, fmt::format("{}: TIFF without a photometric interpretation", origin));
   return layout;
@@ -100,6 +110,7 @@ void check_layout(const Layout& layout, TIFF* tiff, const std::string& origin) {
              layout.compression == COMPRESSION_PACKBITS || layout.compression == COMPRESSION_ADOBE_DEFLATE ||
              layout.compression == COMPRESSION_DEFLATE,
          "the TIFF's compression must be none, PackBits, LZW or deflate");
+  check_orientation(layout.orientation, origin);
   if (layout.width < 1 || layout.height < 1 || layout.width > max_image_side ||
       layout.height > max_image_side ||
       std::size_t{layout.width} * layout.height * (layout.bits / 8u) > max_image_bytes)
@@ -112,7 +123,9 @@ void check_layout(const Layout& layout, TIFF* tiff, const std::string& origin) {
 
 bool is_tiff(std::string_view bytes) {
   using namespace std::literals;
-  return bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv);
+  // BigTIFF has the version 43 in place of 42.
+  return bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv) || bytes.starts_with("II+\0"sv) ||
+         bytes.starts_with("MM\0+"sv);
 }
 
 Expected<int> count_tiff_pages(std::string_view bytes, const std::string& origin) {
@@ -136,7 +149,8 @@ Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::str
 
     const std::size_t word = layout.bits / 8u;
     const unsigned top = layout.photometric == PHOTOMETRIC_MINISWHITE ? (1u << layout.bits) - 1 : 0;
-    GreyImage grey_image{{static_cast<int>(layout.width), static_cast<int>(layout.height)}, layout.bits};
+    GreyImage grey_image{
+        {static_cast<int>(layout.width), static_cast<int>(layout.height)}, layout.bits, layout.pixel_aspect};
     std::vector<unsigned char> row(
         std::max<std::size_t>(std::size_t{layout.width} * layout.channels * word,
                               static_cast<std::size_t>(TIFFScanlineSize(file.get()))));

@@ -20,12 +20,14 @@ struct Kind {
   int photometric = PHOTOMETRIC_MINISBLACK;
   int compression = COMPRESSION_NONE;
   int format = SAMPLEFORMAT_UINT;
+  int orientation = 0;  ///< 0: no tag
+  const char* mode = "w";
 };
 
 /// 5 x 3 samples of value 10 * column + row in every channel.
 std::string encoded(Kind kind) {
   const fs::path path = fs::temp_directory_path() / ("helicarm_tiff_" + std::to_string(::getpid()) + ".tif");
-  TIFF* tiff = TIFFOpen(path.c_str(), "w");
+  TIFF* tiff = TIFFOpen(path.c_str(), kind.mode);
   TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, 5);
   TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, 3);
   TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, kind.bits);
@@ -34,6 +36,7 @@ std::string encoded(Kind kind) {
   TIFFSetField(tiff, TIFFTAG_COMPRESSION, kind.compression);
   TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, kind.format);
   TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+  if (kind.orientation > 0) TIFFSetField(tiff, TIFFTAG_ORIENTATION, kind.orientation);
   if (kind.photometric == PHOTOMETRIC_PALETTE) {
     std::vector<std::uint16_t> map(256, 0);
     TIFFSetField(tiff, TIFFTAG_COLORMAP, map.data(), map.data(), map.data());
@@ -83,6 +86,21 @@ TEST(Tiff, UnsupportedKindsAreRefused) {
   EXPECT_EQ(reason({.channels = 4, .photometric = PHOTOMETRIC_RGB}), "unsupported");
   EXPECT_EQ(reason({.bits = 32, .format = SAMPLEFORMAT_IEEEFP}), "unsupported");
   EXPECT_EQ(reason({.bits = 16, .format = SAMPLEFORMAT_INT}), "unsupported");
+}
+
+TEST(Tiff, OrientationsThatTurnTheImageAreRefused) {
+  EXPECT_EQ(reason({.orientation = ORIENTATION_TOPLEFT}), "ok");
+  for (int turned = ORIENTATION_TOPRIGHT; turned <= ORIENTATION_LEFTBOT; ++turned)
+    EXPECT_EQ(reason({.orientation = turned}), "unsupported") << turned;
+}
+
+TEST(Tiff, BigTiffIsRead) {
+  for (const char* mode : {"w8l", "w8b"}) {
+    const std::string bytes = encoded({.bits = 8, .mode = mode});
+    ASSERT_TRUE(is_tiff(bytes));
+    EXPECT_EQ(count_tiff_pages(bytes, "x.tif"), 1);
+    EXPECT_EQ(decode_tiff(bytes, 0, "x.tif")->pixels(4, 2), 42);
+  }
 }
 
 TEST(Tiff, MutationsAndTruncationsNeverCrash) {

@@ -4,7 +4,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/stopwatch.h"
 #include "helicarm/xray/digest.h"
-#include "helicarm/xray/read_xray_image.h"
+#include "helicarm/xray/sidecar.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -33,6 +33,8 @@ Expected<std::string> key_of(const Case& given, rectification::Method method) {
     key["views"].push_back({{"name", view.name},
                             {"frame", view.frame.value_or(0)},
                             {"mirrored", view.mirrored ? Json(*view.mirrored) : Json()},
+                            {"pixel_mm", view.pixel_mm.value_or(0)},
+                            {"source_detector_mm", view.source_detector_mm.value_or(0)},
                             {"files", files}});
   }
   return to_text(key);

@@ -11,6 +11,7 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/pipeline/case_json.h"
+#include "helicarm/xray/dicom_acquisition.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -138,6 +139,9 @@ CaseView view_from(JsonReader reader, const fs::path& folder) {
   if (view.plate_image && view.map)
     reader.refuse(Reason::bad_value, "map", "cannot be combined with \"plate_image\"");
   if (!reader.raw("mirrored").is_null()) view.mirrored = reader.boolean("mirrored", false);
+  view.pixel_mm = reader.optional_number("pixel_mm", {xray::min_pixel_mm, xray::max_pixel_mm});
+  view.source_detector_mm = reader.optional_number(
+      "source_detector_mm", {xray::min_source_detector_mm, xray::max_source_detector_mm});
   if (!reader.raw("poses").is_null()) view.poses = poses_from(reader.object("poses"), false);
   reader.finish();
   return view;

@@ -25,6 +25,8 @@ struct CaseView {
   std::optional<std::filesystem::path> plate_image;  ///< a separate acquisition of the plate
   std::optional<std::filesystem::path> map;          ///< a known distortion map
   std::optional<bool> mirrored;                      ///< handedness, if known
+  std::optional<double> pixel_mm = {};               ///< in the receiver's plane, where the file lacks it
+  std::optional<double> source_detector_mm = {};     ///< likewise
   guidance::Poses poses;                             ///< at the acquisition
 };
 

@@ -13,8 +13,8 @@
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/view_image.h"
 #include "helicarm/xray/derived_image.h"
-#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -151,9 +151,9 @@ class Bundler {
     Json& entry = json_["views"][index];
     rename(entry, "name", views_);
     const auto name = entry["name"].get<std::string>();
-    entry["image"] = write_image(view.image, view.frame, name);
+    entry["image"] = write_image(image_of(view), name);
     entry.erase("frame");
-    if (view.plate_image) entry["plate_image"] = write_image(*view.plate_image, {}, name + "_plate");
+    if (view.plate_image) entry["plate_image"] = write_image(plate_image_of(view), name + "_plate");
     if (!view.map) return;
     entry["map"] = name + "_map.json";
     const auto map = read_json(*view.map).and_then(
@@ -164,8 +164,7 @@ class Bundler {
       leave_out(name + "_map.json", map.error());
   }
 
-  std::string write_image(const fs::path& file, std::optional<int> frame, const std::string& name) {
-    const auto image = xray::read_xray_image(file, name, frame);
+  std::string write_image(const Expected<xray::XrayImage>& image, const std::string& name) {
     if (!image) {
       leave_out(name + ".dcm", image.error());
       return name + ".dcm";

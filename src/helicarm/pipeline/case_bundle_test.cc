@@ -8,6 +8,7 @@
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/simulation/write_case.h"
+#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -89,6 +90,16 @@ TEST_F(BundleOfNamedCase, HoldsNothingOfItsModels) {
       }
   const auto packed = std::ranges::find(made.files, "case.json", &ArchivedFile::name);
   EXPECT_EQ(parse_json(packed->bytes, "case.json")->at("picks")[0]["bone"]["name"], "bone1");
+}
+
+TEST_F(BundleOfNamedCase, KeepsWhatAViewStatesOfItsImage) {
+  Json json = *read_json(folder_.path() / "case.json");
+  const auto image = xray::read_xray_image(folder_.path() / "doe_AP.dcm", "AP", {});
+  json["views"][0]["pixel_mm"] = image->acquisition.pixel_mm->x();
+  ASSERT_TRUE(write_file(folder_.path() / "case.json", to_text(json)));
+  const CaseBundle made = bundle({.measure = false});
+  const auto file = std::ranges::find(made.files, "case.json", &ArchivedFile::name);
+  EXPECT_EQ((*parse_json(file->bytes, "case.json"))["views"][0]["pixel_mm"], json["views"][0]["pixel_mm"]);
 }
 
 TEST_F(BundleOfNamedCase, IsTheSameEachTime) {

@@ -48,6 +48,21 @@ class CaseFile : public testing::Test {
   Json json_;
 };
 
+TEST_F(CaseFile, PixelSizeAndSourceDistanceOfAViewAreRead) {
+  json_["views"][1]["pixel_mm"] = 0.21;
+  json_["views"][1]["source_detector_mm"] = 1000;
+  const auto read_back = read();
+  ASSERT_TRUE(read_back.has_value()) << read_back.error().message;
+  EXPECT_FALSE(read_back->views[0].pixel_mm || read_back->views[0].source_detector_mm);
+  EXPECT_EQ(read_back->views[1].pixel_mm, 0.21);
+  EXPECT_EQ(read_back->views[1].source_detector_mm, 1000);
+  json_["views"][1]["pixel_mm"] = 0;
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+  json_["views"][1]["pixel_mm"] = nullptr;
+  json_["views"][1]["source_detector_mm"] = 20;
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+}
+
 TEST_F(CaseFile, NotesAreIgnoredAndMirroredIsRead) {
   json_["notes"] = "left knee of the phantom";
   json_["views"][1]["mirrored"] = true;

@@ -20,11 +20,22 @@ void append(std::vector<Warning>& warnings, const std::vector<Warning>& more, co
   }
 }
 
+bool is_note(const Warning& warning) { return warning.reason == Reason::irregular_file; }
+
+/// Of the images' files: what holds whatever is measured in them.
+std::vector<Warning> notes_of(const std::vector<ViewResult>& views) {
+  std::vector<Warning> notes;
+  for (const ViewResult& view : views)
+    if (view.xray_image) std::ranges::copy_if(view.xray_image->warnings, std::back_inserter(notes), is_note);
+  return notes;
+}
+
 /// Warnings of reading, rectification and labelling.
 std::vector<Warning> warnings_of(const std::vector<ViewResult>& views) {
   std::vector<Warning> warnings;
   for (const ViewResult& view : views) {
     if (view.xray_image) append(warnings, view.xray_image->warnings, view.name);
+    std::erase_if(warnings, is_note);
     if (view.rectification) append(warnings, view.rectification->warnings, view.name);
     if (view.found) append(warnings, view.found->warnings, view.name);
   }
@@ -40,6 +51,7 @@ Result initial_result(const Case& given, const RunOptions& options, std::vector<
   result.tool_lines = given.tool_lines;
   result.warnings = given.warnings;
   append(result.warnings, warnings_of(result.views));
+  append(result.notes, notes_of(result.views));
   append(result.warnings, reused_uids(result.views));
   append(result.warnings, exchanged_views(result.views));
   return result;

@@ -55,7 +55,7 @@ std::string brought_image(NewCase& made, const fs::path& file, const fs::path& f
                           const std::string& name) {
   const std::string ending = file.has_extension() ? file.extension().string() : ".dcm";
   const std::string to = brought(made, file, folder, plain(name) + ending);
-  const auto sidecar = ending == ".dcm" ? std::nullopt : xray::sidecar_of(file);
+  const auto sidecar = ending == ".dcm" ? xray::full_sidecar_of(file) : xray::sidecar_of(file);
   if (sidecar && !lies_in(file, folder)) made.copies.push_back({*sidecar, to + ".json"});
   return to;
 }
@@ -168,6 +168,8 @@ void set_views(NewCase& made, const std::vector<InspectedImage>& images, const N
   for (const InspectedImage& image : images) {
     Json view = {{"name", image.view}, {"image", brought_image(made, image.file, folder, image.view)}};
     if (image.frame) view["frame"] = *image.frame;
+    if (options.stated.pixel_mm) view["pixel_mm"] = *options.stated.pixel_mm;
+    if (options.stated.source_detector_mm) view["source_detector_mm"] = *options.stated.source_detector_mm;
     for (const auto& [name, file] : options.plate_images)
       if (name == image.view) view["plate_image"] = brought_image(made, file, folder, image.view + "_plate");
     for (const auto& [name, file] : options.maps)
@@ -270,6 +272,8 @@ Expected<NewCase> new_case(std::vector<InspectedImage> images, const NewCaseOpti
                            const fs::path& folder) {
   return guarded([&] {
     name_views(images);
+    for (InspectedImage& image : images)
+      value_or_throw(xray::state_geometry(image.xray_image, options.stated, image.view));
     check_images(images);
     NewCase made;
     for (const InspectedImage& image : images) made.findings.push_back(description_of(image));

@@ -9,6 +9,7 @@
 
 #include "helicarm/core/json.h"
 #include "helicarm/rectification/round_field.h"
+#include "helicarm/xray/sidecar.h"
 #include "helicarm/xray/xray_image.h"
 
 namespace helicarm::pipeline {
@@ -50,6 +51,7 @@ struct NewCaseOptions {
   std::optional<std::string> plate = {};                                 ///< a built-in, a file, or "none"
   std::vector<std::pair<std::string, std::filesystem::path>> maps = {};  ///< view, map.json
   std::vector<std::pair<std::string, std::filesystem::path>> plate_images = {};  ///< view, image of the plate
+  xray::StatedGeometry stated = {};  ///< of every view, where the images do not state it
 };
 
 /// case.json, the files to be copied beside it, and what the user should know.
@@ -65,7 +67,8 @@ struct NewCase {
 
 /// A case in `folder`. Images that lie in the folder are named where they are, others are copied unchanged,
 /// with their patient data. Refuses `usage` (fewer than two images, no calibrator, no decision on the plate),
-/// `name_clash` (a view's name), and images that `read_views` refuses; fails as the readers of its files.
+/// `name_clash` (a view's name), `bad_value` (an image contradicts what is stated of it), and images that
+/// `read_views` refuses; fails as the readers of its files.
 Expected<NewCase> new_case(std::vector<InspectedImage> images, const NewCaseOptions& options,
                            const std::filesystem::path& folder);
 

@@ -72,6 +72,34 @@ TEST_F(NewCaseOf, FilesInItsFolderNamesThemWhereTheyAre) {
   EXPECT_EQ(made_case->json["views"][1]["image"], "im2.dcm");
 }
 
+TEST_F(NewCaseOf, StatedPixelSizeStandsInItsViewsUnlessAnImageContradictsIt) {
+  simulate(simulation::CaseKind::flat);
+  std::vector<InspectedImage> bare = images();
+  for (InspectedImage& image : bare) image.xray_image.acquisition.pixel_mm.reset();
+  const auto made_case =
+      new_case(bare, {.calibrator = "udcsc", .stated = {.pixel_mm = 0.25, .source_detector_mm = {}}}, made());
+  ASSERT_TRUE(made_case) << made_case.error().message;
+  for (const Json& view : made_case->json["views"]) {
+    EXPECT_EQ(view["pixel_mm"], 0.25);
+    EXPECT_FALSE(view.contains("source_detector_mm"));
+  }
+  const Failure refused =
+      new_case(bare, {.calibrator = "udcsc", .stated = {.pixel_mm = {}, .source_detector_mm = 500}}, made())
+          .error();
+  EXPECT_EQ(refused.reason, Reason::bad_value);
+  EXPECT_THAT(refused.message, testing::HasSubstr("source_detector_mm"));
+}
+
+TEST_F(NewCaseOf, SidecarOfADicomFileIsCopiedWithIt) {
+  simulate(simulation::CaseKind::flat);
+  ASSERT_TRUE(write_file(files() / "im1.dcm.json", R"({"pixel_mm": null})"));
+  const auto made_case = new_case(images(), {.calibrator = "udcsc"}, made());
+  ASSERT_TRUE(made_case) << made_case.error().message;
+  EXPECT_TRUE(std::ranges::any_of(made_case->copies, [](const NewCase::Copy& copy) {
+    return copy.from.filename() == "im1.dcm.json" && copy.to.string().ends_with(".dcm.json");
+  }));
+}
+
 TEST_F(NewCaseOf, WithoutCalibratorIsRefusedByTheOptionsName) {
   simulate(simulation::CaseKind::flat);
   const Failure failure = new_case(images(), {}, made()).error();

@@ -172,6 +172,10 @@ TEST_F(SimulatedNavigation, OtherImageOrCalibratorIsCalibratedAgain) {
   std::swap(given_.views[0].image, given_.views[1].image);
   ASSERT_TRUE(cache.run(given_, {}));
   EXPECT_EQ(cache.calibrations(), 3);
+  given_.views[0].source_detector_mm = 1;  // of another C-arm: refused, not taken from the cache
+  const auto contradicted = cache.run(given_, {});
+  EXPECT_TRUE(!contradicted || contradicted->failure);
+  EXPECT_EQ(cache.calibrations(), 4);
 }
 
 TEST_F(SimulatedNavigation, KnownHandednessIsTheOnlyOneTried) {

@@ -6,8 +6,8 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/parallel.h"
 #include "helicarm/pipeline/belong_together.h"
+#include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/intrinsics_prior.h"
-#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -49,7 +49,7 @@ Expected<rectification::DistortionMap> map_of(const xray::XrayImage& xray_image,
       return rectification::distortion_map_from_json(json, from.map->filename().string());
     });
   if (from.plate_image)
-    return xray::read_xray_image(*from.plate_image, from.name, std::nullopt)
+    return plate_image_of(from)
         .and_then([&](const xray::XrayImage& apart) {
           return rectification::rectify(apart, *plate, {method, {}});
         })
@@ -139,8 +139,7 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
   std::vector<NamedView> views;
   for (const CaseView& view : given.views) views.push_back({view.name});
   auto images = of_each(views.size(), options, [&](std::size_t i) {
-    const CaseView& from = given.views[i];
-    return xray::read_xray_image(from.image, from.name, from.frame).map([](xray::XrayImage xray_image) {
+    return image_of(given.views[i]).map([](xray::XrayImage xray_image) {
       return std::make_shared<const xray::XrayImage>(std::move(xray_image));
     });
   });

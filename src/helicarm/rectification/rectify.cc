@@ -236,14 +236,19 @@ image::Image<float> resample(const xray::XrayImage& xray_image, const Distortion
       const Vector2d raw = map.raw_from_rectified(Vector2d(i * step, j * step));
       coarse.at<cv::Vec2f>(j, i) = {float(raw.x()), float(raw.y())};
     }
-  const cv::Matx23f enlarge(1.f / step, 0, 0, 0, 1.f / step, 0);
-  cv::Mat places;
-  cv::warpAffine(coarse, places, enlarge, {width, height}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
-                 cv::BORDER_REPLICATE);
   image::Image<float> rectified(width, height);
-  cv::Mat target = image::as_mat(rectified);
-  cv::remap(image::as_mat(xray_image.pixels), target, places, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT,
-            double(xray_image.lowest));
+  // In strips: the places of all pixels take twice the memory of the image.
+  constexpr int strip = 32 * step;
+  cv::Mat places;
+  for (int top = 0; top < height; top += strip) {
+    const int rows = std::min(strip, height - top);
+    const cv::Matx23f enlarge(1.f / step, 0, 0, 0, 1.f / step, float(top) / step);
+    cv::warpAffine(coarse, places, enlarge, {width, rows}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
+                   cv::BORDER_REPLICATE);
+    cv::Mat target = image::as_mat(rectified).rowRange(top, top + rows);
+    cv::remap(image::as_mat(xray_image.pixels), target, places, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT,
+              double(xray_image.lowest));
+  }
   return rectified;
 }
 

@@ -116,8 +116,10 @@ std::string view_figure(const pipeline::Result& result, std::size_t index) {
   if (!view.xray_image) return {};
   const image::Image<std::uint8_t> view_image = rectified_image(view);
   Drawing drawing(unit_of(view));
-  drawing.put(R"(<image x="-0.5" y="-0.5" width="{}" height="{}" href="data:image/png;base64,{}"/>)",
-              view_image.width(), view_image.height(), base64(image::encode_png(view_image)));
+  constexpr int most_shown_px = 2048;  // larger ones would make a report of tens of megabytes
+  drawing.put(
+      R"(<image x="-0.5" y="-0.5" width="{}" height="{}" preserveAspectRatio="none" href="data:image/png;base64,{}"/>)",
+      view_image.width(), view_image.height(), base64(image::encode_png(at_most(view_image, most_shown_px))));
   const ViewMarks marks = marks_of(result, index);
   draw_dots(drawing, marks);
   draw_balls(drawing, marks, view_image.height());

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/xray/dicom_acquisition.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "helicarm/xray/dicom_tags.h"
@@ -16,14 +19,45 @@ std::optional<double> one(const DicomElements& elements, DicomTag tag, double lo
   return value ? std::optional(value->front()) : std::nullopt;
 }
 
+/// Writers put 0 where they do not know a length. No other number is written without a digit of 1 to 9.
+bool is_zero(const DicomElements& elements, DicomTag tag) {
+  const std::string_view text = elements.text(tag);
+  return text.find('0') != text.npos && text.find_first_not_of("0.+-\\ ") == text.npos;
+}
+
+/// Warns where the declared ratio of a pixel's height to its width contradicts the spacing.
+void compare_aspect(const DicomElements& elements, const std::optional<std::vector<double>>& spacing,
+                    std::vector<Warning>& warnings) {
+  constexpr double tolerance = 0.01;
+  if (is_zero(elements, tags::pixel_aspect_ratio)) return;
+  const auto ratio = elements.numbers(tags::pixel_aspect_ratio, 2, 1e-6, 1e6);
+  if (!ratio) return;
+  const double stated = (*ratio)[0] / (*ratio)[1], measured = spacing ? (*spacing)[0] / (*spacing)[1] : 1;
+  if (std::abs(stated / measured - 1) <= tolerance) return;
+  warnings.push_back(
+      {Reason::tag_disagrees,
+       fmt::format(
+           "{}: Pixel Aspect Ratio (0028,0034) is {}, but {}", elements.origin,
+           quote(elements.text(tags::pixel_aspect_ratio)),
+           spacing ? fmt::format("Imager Pixel Spacing (0018,1164) {}, which is used",
+                                 quote(elements.text(tags::imager_pixel_spacing)))
+                   : "the pixels are taken as square: the file gives no Imager Pixel Spacing (0018,1164)"),
+       {},
+       {{"stated_ratio", stated}, {"used_ratio", measured}}});
+}
+
 /// (row spacing, column spacing) in the file, (x, y) here.
 std::optional<Eigen::Vector2d> spacing(const DicomElements& elements, std::vector<Warning>& warnings) {
-  const auto imager = elements.numbers(tags::imager_pixel_spacing, 2, min_pixel_mm, max_pixel_mm);
+  const bool zero = is_zero(elements, tags::imager_pixel_spacing);
+  const auto imager =
+      zero ? std::nullopt : elements.numbers(tags::imager_pixel_spacing, 2, min_pixel_mm, max_pixel_mm);
   const std::string_view calibrated = elements.text(tags::pixel_spacing);
+  compare_aspect(elements, imager, warnings);
   if (!imager) {
     warnings.push_back(
         {Reason::spacing_missing,
-         calibrated.empty()
+         zero ? fmt::format("{}: Imager Pixel Spacing (0018,1164) is 0", elements.origin)
+         : calibrated.empty()
              ? fmt::format("{}: the file gives no Imager Pixel Spacing (0018,1164)", elements.origin)
              : fmt::format("{}: no Imager Pixel Spacing (0018,1164); Pixel Spacing (0028,0030) {} is "
                            "not used, its plane is unknown",
@@ -37,6 +71,31 @@ std::optional<Eigen::Vector2d> spacing(const DicomElements& elements, std::vecto
                      "(0028,0030) {}",
                      elements.origin, quote(calibrated))});
   return Eigen::Vector2d((*imager)[1], (*imager)[0]);
+}
+
+/// PS3.3 C.8.7.5.1.3: one increment is the change from frame to frame, several are the frames' offsets from
+/// the first angle.
+std::optional<double> angle_of(const DicomElements& elements, DicomTag angle, DicomTag increment, int frame,
+                               int frames, std::vector<Warning>& warnings) {
+  const auto first = one(elements, angle, -360, 360);
+  const std::size_t count = elements.count(increment);
+  if (!first || frames == 1 || count == 0) return first;
+  const auto unused = [&](std::string_view why) {
+    warnings.push_back(
+        {Reason::tag_disagrees, fmt::format("{}: {} ({:04X},{:04X}) {}", elements.origin, increment.name,
+                                            increment.number >> 16, increment.number & 0xFFFF, why)});
+  };
+  const std::vector<double> increments = *elements.numbers(increment, count, -720, 720);
+  if (count != 1 && count != static_cast<std::size_t>(frames)) {
+    unused(fmt::format("has {} values for {} frames: the angle of this frame is not known", count, frames));
+    return std::nullopt;
+  }
+  if (elements.text(tags::positioner_motion) == "STATIC" &&
+      std::ranges::any_of(increments, [](double value) { return value != 0; })) {
+    unused("states a motion, Positioner Motion (0018,1500) STATIC: the increments are not used");
+    return first;
+  }
+  return *first + (count == 1 ? frame * increments[0] : increments[static_cast<std::size_t>(frame)]);
 }
 
 bool flipped(const DicomElements& elements) {
@@ -68,18 +127,21 @@ std::map<std::uint32_t, std::string> technique(const DicomElements& elements) {
 
 }  // namespace
 
-Expected<AcquisitionRead> read_acquisition(const DicomElements& elements) {
+Expected<AcquisitionRead> read_acquisition(const DicomElements& elements, int frame, int frames) {
   return guarded([&] {
     AcquisitionRead read;
     Acquisition& a = read.acquisition;
     a.pixel_mm = spacing(elements, read.warnings);
-    a.source_detector_mm =
-        one(elements, tags::source_detector, min_source_detector_mm, max_source_detector_mm);
+    if (!is_zero(elements, tags::source_detector))
+      a.source_detector_mm =
+          one(elements, tags::source_detector, min_source_detector_mm, max_source_detector_mm);
     // Only a check: a value that cannot be (0 is common) is the same as none.
     a.source_patient_mm = one(elements, tags::source_patient, -1e6, 1e6);
     if (a.source_patient_mm && !(*a.source_patient_mm >= min_source_patient_mm)) a.source_patient_mm.reset();
-    a.primary_angle_deg = one(elements, tags::primary_angle, -360, 360);
-    a.secondary_angle_deg = one(elements, tags::secondary_angle, -360, 360);
+    a.primary_angle_deg =
+        angle_of(elements, tags::primary_angle, tags::primary_increment, frame, frames, read.warnings);
+    a.secondary_angle_deg =
+        angle_of(elements, tags::secondary_angle, tags::secondary_increment, frame, frames, read.warnings);
     a.acquired = acquisition_time(elements);
     if (lossy(elements))
       read.warnings.push_back(

@@ -18,9 +18,10 @@ struct AcquisitionRead {
   std::vector<Warning> warnings;
 };
 
-/// Acquisition parameters from the tags. An absent or empty value stays absent; an implausible one is
-/// bad_value. Pixel Spacing is never used: its plane is unknown.
-Expected<AcquisitionRead> read_acquisition(const DicomElements& elements);
+/// Acquisition parameters of a frame (0-based) from the tags. A value that is absent, empty or 0 stays
+/// absent; an implausible one is bad_value. Pixel Spacing is never used: its plane is unknown. A positioner
+/// angle is the run's first plus the frame's increment (PS3.3 C.8.7.5.1.3).
+Expected<AcquisitionRead> read_acquisition(const DicomElements& elements, int frame, int frames);
 
 /// Direction of the grey values according to the tags.
 struct Polarity {

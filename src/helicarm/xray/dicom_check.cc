@@ -50,6 +50,10 @@ void check_kind(const DicomElements& elements, DicomKind kind) {
   if (!elements.find(tags::pixel_data)) elements.refuse(Reason::bad_value, tags::pixel_data, "is missing");
 }
 
+void warn(DicomOutline& outline, Reason reason, std::string message) {
+  outline.warnings.push_back({reason, std::move(message), {}, {}});
+}
+
 int whole(const DicomElements& elements, DicomTag tag, int low, int high, Reason reason = Reason::bad_value) {
   const auto value = elements.word(tag, "US");
   if (!value) elements.refuse(Reason::bad_value, tag, "is missing");
@@ -76,8 +80,27 @@ void check_bits(DicomOutline& outline) {
     elements.refuse(Reason::bad_value, tags::bits_allocated,
                     fmt::format("is {}, must be 8 or 16", outline.bits_allocated));
   outline.bits_stored = whole(elements, tags::bits_stored, 8, outline.bits_allocated);
-  whole(elements, tags::high_bit, outline.bits_stored - 1, outline.bits_stored - 1);
+  const int high_bit = whole(elements, tags::high_bit, outline.bits_stored - 1, outline.bits_allocated - 1);
+  outline.lowest_bit = high_bit + 1 - outline.bits_stored;
+  if (outline.lowest_bit > 0)
+    warn(outline, Reason::irregular_file,
+         fmt::format(
+             "{}: High Bit (0028,0102) is {}, Bits Stored (0028,0101) {}: the values are taken from bits "
+             "{} to {}, or from 0 to {} if all above these are 0",
+             elements.origin, high_bit, outline.bits_stored, outline.lowest_bit, high_bit,
+             outline.bits_stored - 1));
   outline.is_signed = whole(elements, tags::pixel_representation, 0, 1) == 1;
+}
+
+void check_fragments(DicomOutline& outline) {
+  const auto [frames, images] = fragments_of_frames(outline.elements, outline.frames);
+  outline.frame_fragments = frames;
+  if (images > frames.size())
+    warn(outline, Reason::surplus_data,
+         fmt::format(
+             "{}: Pixel Data (7FE0,0010) holds {} compressed images, Number of Frames (0028,0008) says {}: "
+             "the rest is not read",
+             outline.elements.origin, images, outline.frames));
 }
 
 void check_size(DicomOutline& outline) {
@@ -94,7 +117,7 @@ void check_size(DicomOutline& outline) {
   if (frame_bytes > max_frame_bytes)
     throw BadInput(Reason::bad_size, fmt::format("{}: {} bytes a frame, limit {}", elements.origin,
                                                  frame_bytes, max_frame_bytes));
-  if (outline.encapsulated()) return;
+  if (outline.encapsulated()) return check_fragments(outline);
   outline.pixel_data = elements.find(tags::pixel_data)->value;
   const std::size_t needed = frame_bytes * static_cast<std::size_t>(outline.frames);
   if (outline.pixel_data.size() < needed)
@@ -102,6 +125,14 @@ void check_size(DicomOutline& outline) {
         Reason::truncated, tags::pixel_data,
         fmt::format("has {} bytes, {} x {} pixels in {} frame(s) need {}", outline.pixel_data.size(),
                     outline.columns, outline.rows, outline.frames, needed));
+  // An odd number of bytes is padded by one.
+  if (const std::size_t surplus = outline.pixel_data.size() - needed; surplus > needed % 2)
+    warn(outline, Reason::surplus_data,
+         fmt::format(
+             "{}: Pixel Data (7FE0,0010) has {} bytes, {} x {} pixels of {} bits in {} frame(s) need {}: the "
+             "rest is not read; check Rows, Columns, Bits Allocated and Number of Frames",
+             elements.origin, outline.pixel_data.size(), outline.columns, outline.rows,
+             outline.bits_allocated, outline.frames, needed));
 }
 
 }  // namespace
@@ -115,6 +146,9 @@ Expected<DicomOutline> check_dicom(std::string_view bytes, const std::string& or
     DicomOutline outline;
     outline.elements = value_or_throw(walk_dicom(bytes, origin));
     check_kind(outline.elements, kind);
+    if (!outline.elements.irregular.empty())
+      warn(outline, Reason::irregular_file,
+           outline.elements.irregular + ": the file breaks a rule of DICOM and was read all the same");
     check_photometric(outline);
     check_bits(outline);
     check_size(outline);

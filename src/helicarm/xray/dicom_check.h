@@ -3,8 +3,10 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "helicarm/xray/dicom_elements.h"
+#include "helicarm/xray/frame_fragments.h"
 
 namespace helicarm::xray {
 
@@ -16,9 +18,12 @@ struct DicomOutline {
   int frames = 1;
   int bits_allocated = 16;  ///< 8 or 16
   int bits_stored = 16;     ///< 8 .. bits_allocated
+  int lowest_bit = 0;       ///< of the stored bits, as High Bit states
   bool is_signed = false;
   bool monochrome1 = false;
-  std::string_view pixel_data;  ///< all frames, for the native transfer syntaxes
+  std::string_view pixel_data;                  ///< all frames, for the native transfer syntaxes
+  std::vector<FrameFragments> frame_fragments;  ///< of each frame, for the others
+  std::vector<Warning> warnings;                ///< irregular_file, surplus_data
 
   bool encapsulated() const { return !elements.fragments.empty(); }
 };

@@ -69,11 +69,16 @@ std::optional<std::vector<double>> DicomElements::numbers(DicomTag tag, std::siz
                      count == 1 ? "one number" : fmt::format("{} numbers", count), low, high));
 }
 
+std::size_t DicomElements::count(DicomTag tag) const {
+  const std::string_view all = text(tag);
+  return all.empty() ? 0 : 1 + static_cast<std::size_t>(std::ranges::count(all, '\\'));
+}
+
 std::optional<std::uint16_t> DicomElements::word(DicomTag tag, std::string_view vr) const {
   const DicomElement* element = find(tag);
   if (!element) return std::nullopt;
   const std::string_view given(element->vr.data(), 2);
-  if (given != "  " && given != vr)
+  if (given != "  " && given != "UN" && given != vr)
     refuse(Reason::bad_value, tag, fmt::format("has the VR {}, must be {}", given, vr));
   if (element->value.size() != 2)
     refuse(Reason::bad_value, tag, fmt::format("has {} bytes, must have 2", element->value.size()));

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/xray/bytes.h"
 #include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/jpeg.h"
 #include "helicarm/xray/jpeg_2000.h"
@@ -14,30 +13,10 @@
 namespace helicarm::xray {
 namespace {
 
-std::string joined(const std::vector<std::string_view>& fragments, std::size_t first, std::size_t last) {
-  std::string bytes;
-  for (std::size_t i = first; i < last; ++i) bytes += fragments[i];
-  return bytes;
-}
-
-/// Compressed bytes of one frame: by index if each frame is one fragment, else by the offset table (PS3.5
-/// A.4).
 std::string frame_bytes(const DicomOutline& outline, std::size_t frame) {
-  const auto& fragments = outline.elements.fragments;
-  const auto frames = static_cast<std::size_t>(outline.frames);
-  if (frames == 1) return joined(fragments, 1, fragments.size());
-  if (fragments.size() - 1 == frames) return std::string(fragments[frame + 1]);
-  const std::string_view offsets = fragments.front();
-  if (offsets.size() != 4 * frames)
-    outline.elements.refuse(Reason::bad_value, tags::pixel_data,
-                            fmt::format("has {} fragments for {} frames and no table of their offsets",
-                                        fragments.size() - 1, frames));
-  const std::size_t begin = number_at(offsets, 4 * frame);
-  const std::size_t end = frame + 1 < frames ? number_at(offsets, 4 * frame + 4) : std::size_t(-1);
+  const FrameFragments& of = outline.frame_fragments[frame];
   std::string bytes;
-  std::size_t at = 0;
-  for (std::size_t i = 1; i < fragments.size(); at += 8 + fragments[i++].size())
-    if (at >= begin && at < end) bytes += fragments[i];
+  for (std::size_t i = of.first; i < of.last; ++i) bytes += outline.elements.fragments[i];
   return bytes;
 }
 
@@ -61,9 +40,25 @@ std::string decompressed(const DicomOutline& outline, int frame) {
   }
 }
 
+/// Some writers state a High Bit that the values do not reach: then nothing is set above the lowest bits.
+template <class Word>
+int lowest_bit_of(const DicomOutline& outline, std::string_view bytes) {
+  if (outline.lowest_bit == 0) return 0;
+  unsigned used = 0;
+  for (std::size_t at = 0; at + sizeof(Word) <= bytes.size(); at += sizeof(Word)) {
+    Word word;
+    std::memcpy(&word, bytes.data() + at, sizeof word);
+    used |= word;
+  }
+  const bool none_above = used >> outline.bits_stored == 0;
+  const bool some_below = (used & ((1u << outline.lowest_bit) - 1)) != 0;
+  return none_above && some_below ? 0 : outline.lowest_bit;
+}
+
 template <class Word>
 image::Image<float> stored_values(const DicomOutline& outline, std::string_view bytes) {
   image::Image<float> image(outline.columns, outline.rows);
+  const int shift = lowest_bit_of<Word>(outline, bytes);
   const int mask = (1 << outline.bits_stored) - 1;
   const int sign = outline.is_signed ? 1 << (outline.bits_stored - 1) : 0;
   const char* from = bytes.data();
@@ -71,7 +66,7 @@ image::Image<float> stored_values(const DicomOutline& outline, std::string_view 
     Word word;
     std::memcpy(&word, from, sizeof word);
     from += sizeof word;
-    pixel = static_cast<float>(((word & mask) ^ sign) - sign);
+    pixel = static_cast<float>(((word >> shift & mask) ^ sign) - sign);
   }
   return image;
 }

@@ -24,6 +24,9 @@ inline constexpr DicomTag source_patient{0x00181111, "Distance Source to Patient
 inline constexpr DicomTag imager_pixel_spacing{0x00181164, "Imager Pixel Spacing"};
 inline constexpr DicomTag primary_angle{0x00181510, "Positioner Primary Angle"};
 inline constexpr DicomTag secondary_angle{0x00181511, "Positioner Secondary Angle"};
+inline constexpr DicomTag positioner_motion{0x00181500, "Positioner Motion"};
+inline constexpr DicomTag primary_increment{0x00181520, "Positioner Primary Angle Increment"};
+inline constexpr DicomTag secondary_increment{0x00181521, "Positioner Secondary Angle Increment"};
 inline constexpr DicomTag field_rotation{0x00187032, "Field of View Rotation"};
 inline constexpr DicomTag field_flip{0x00187034, "Field of View Horizontal Flip"};
 inline constexpr DicomTag study{0x0020000D, "Study Instance UID"};
@@ -37,6 +40,7 @@ inline constexpr DicomTag frames{0x00280008, "Number of Frames"};
 inline constexpr DicomTag rows{0x00280010, "Rows"};
 inline constexpr DicomTag columns{0x00280011, "Columns"};
 inline constexpr DicomTag pixel_spacing{0x00280030, "Pixel Spacing"};
+inline constexpr DicomTag pixel_aspect_ratio{0x00280034, "Pixel Aspect Ratio"};
 inline constexpr DicomTag bits_allocated{0x00280100, "Bits Allocated"};
 inline constexpr DicomTag bits_stored{0x00280101, "Bits Stored"};
 inline constexpr DicomTag high_bit{0x00280102, "High Bit"};

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cctype>
 
 #include <fmt/format.h>
 
+#include "helicarm/xray/bytes.h"
 #include "helicarm/xray/dicom_elements.h"
 #include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/plain_bytes.h"
@@ -27,6 +29,15 @@ bool listed(std::string_view vrs, std::string_view vr) {
   return false;
 }
 
+bool is_capital(char c) { return c >= 'A' && c <= 'Z'; }
+
+/// Whether an element's header at `at` has a known VR.
+bool has_vr(std::string_view bytes, std::size_t at) {
+  if (bytes.size() < 6 || at > bytes.size() - 6) return false;
+  const std::string_view vr = bytes.substr(at + 4, 2);
+  return listed(short_vrs, vr) || listed(long_vrs, vr);
+}
+
 struct Header {
   std::uint32_t tag;
   std::array<char, 2> vr;
@@ -34,18 +45,23 @@ struct Header {
   std::string_view vr_text() const { return {vr.data(), 2}; }
 };
 
+/// By the rules of PS3.5; of a file that breaks one of them (`irregular`) by looser ones, which are those of
+/// DCMTK. Lengths, nesting and counts are bounded alike.
 class Walker {
  public:
-  Walker(std::string_view bytes, DicomElements& into) : bytes_(bytes), into_(&into) {}
+  Walker(std::string_view bytes, DicomElements& into)
+      : bytes_(bytes), into_(&into), loose_(!into.irregular.empty()) {}
 
   void file() {
-    at_ = meta();
+    at_ = loose_ ? loose_meta() : meta();
+    if (loose_) detect_syntax();
     const TransferSyntax& syntax = chosen_syntax();
     encapsulated_ = syntax.coding != Coding::native;
     if (syntax.deflated) inflate();
     big_endian_ = syntax.big_endian;
     into_->elements.clear();
-    elements(bytes_.size(), false, syntax.explicit_vr, 0);
+    elements(bytes_.size(), false, explicit_vr_.value_or(syntax.explicit_vr), 0);
+    if (loose_) put_in_order();
     if (into_->find(tags::pixel_data) && encapsulated_ && into_->fragments.empty())
       into_->refuse(Reason::bad_value, tags::pixel_data,
                     "is not encapsulated, but the transfer syntax says so");
@@ -63,6 +79,7 @@ class Walker {
       into_ = &items.emplace_back(about);
       const bool delimited = next.length == undefined;
       elements(delimited ? bytes_.size() : at_ + next.length, delimited, explicit_vr, 0);
+      if (loose_) put_in_order();
     }
     return items;
   }
@@ -105,12 +122,18 @@ class Walker {
       } else if (listed(long_vrs, header.vr_text())) {
         number(2, end);
         header.length = number(4, end);
+      } else if (loose_) {
+        // Two capitals may be a VR of a later edition, which has the long form; others have the short one.
+        const bool long_form = std::ranges::all_of(header.vr, is_capital);
+        if (long_form) number(2, end);
+        header.length = number(long_form ? 4 : 2, end);
+        header.vr = {'U', 'N'};
       } else {
         refuse(Reason::bad_value, fmt::format("({:04X},{:04X}) has the unknown VR {}", header.tag >> 16,
                                               header.tag & 0xFFFF, quote(header.vr_text())));
       }
     }
-    if (header.length != undefined && header.length % 2 != 0)
+    if (!loose_ && header.length != undefined && header.length % 2 != 0)
       refuse(Reason::bad_value, fmt::format("({:04X},{:04X}) has the odd length {}", header.tag >> 16,
                                             header.tag & 0xFFFF, header.length));
     return header;
@@ -123,7 +146,7 @@ class Walker {
   }
 
   void keep(const Header& header, std::string_view value) {
-    if (!into_->elements.empty() && header.tag <= into_->elements.back().tag)
+    if (!loose_ && !into_->elements.empty() && header.tag <= into_->elements.back().tag)
       refuse(Reason::bad_value, fmt::format("({:04X},{:04X}) is given twice or out of order",
                                             header.tag >> 16, header.tag & 0xFFFF));
     if (into_->elements.size() == max_elements)
@@ -152,6 +175,44 @@ class Walker {
     return end;
   }
 
+  /// A meta group of any form, or none.
+  std::size_t loose_meta() {
+    at_ = bytes_.size() > meta_start && bytes_.substr(128, 4) == "DICM" ? meta_start
+          : bytes_.starts_with("DICM")                                  ? 4
+                                                                        : 0;
+    while (bytes_.size() - at_ >= 8 && bytes_.substr(at_, 2) == std::string_view("\2\0", 2)) {
+      const Header next = header(has_vr(bytes_, at_), bytes_.size());
+      keep(next, value(next.length, bytes_.size()));
+    }
+    put_in_order();
+    check_uids({tags::transfer_syntax.number});
+    into_->transfer_syntax = uid(into_->find(tags::transfer_syntax));
+    return at_;
+  }
+
+  /// The data set's first element shows whether it states VRs; the meta group may be missing or wrong.
+  void detect_syntax() {
+    const TransferSyntax* stated = transfer_syntax(into_->transfer_syntax);
+    if (stated && (stated->coding != Coding::native || stated->deflated)) return;
+    if (stated && stated->big_endian)
+      refuse(Reason::unsupported, "a big-endian file that breaks the rules of DICOM");
+    if (!stated && !into_->transfer_syntax.empty()) return;
+    explicit_vr_ = has_vr(bytes_, at_);
+    into_->transfer_syntax = *explicit_vr_ ? "1.2.840.10008.1.2.1" : "1.2.840.10008.1.2";
+  }
+
+  /// In ascending order; of an element that is given twice with one value, one.
+  void put_in_order() {
+    std::vector<DicomElement>& elements = into_->elements;
+    std::ranges::stable_sort(elements, {}, &DicomElement::tag);
+    for (std::size_t i = 1; i < elements.size(); ++i)
+      if (elements[i].tag == elements[i - 1].tag && elements[i].value != elements[i - 1].value)
+        refuse(Reason::bad_value, fmt::format("({:04X},{:04X}) is given twice, with different values",
+                                              elements[i].tag >> 16, elements[i].tag & 0xFFFF));
+    const auto again = std::ranges::unique(elements, {}, &DicomElement::tag);
+    elements.erase(again.begin(), again.end());
+  }
+
   static std::string_view uid(const DicomElement* element) {
     if (!element) return {};
     std::string_view text = element->value;
@@ -175,9 +236,9 @@ class Walker {
     if (!syntax)
       into_->refuse(
           Reason::unsupported, tags::transfer_syntax,
-          fmt::format("is {}; read are uncompressed, deflated, RLE, JPEG (processes 1, 2, 4 and 14), "
-                      "JPEG-LS and JPEG 2000",
-                      uid));
+          fmt::format("is {}{}; read are uncompressed, deflated, RLE, JPEG (processes 1, 2, 4 and 14), "
+                      "JPEG-LS and JPEG 2000: convert the file, for example with gdcmconv --raw IN OUT",
+                      uid, name_of_other_syntax(uid)));
     return *syntax;
   }
 
@@ -191,6 +252,7 @@ class Walker {
   /// Elements up to `end` or, if `delimited`, up to the item's delimiter.
   void elements(std::size_t end, bool delimited, bool explicit_vr, int depth) {
     while (at_ < end) {
+      if (loose_ && depth == 0 && bytes_.find_first_not_of('\0', at_) == bytes_.npos) return;  // padding
       const Header next = header(explicit_vr, end);
       if (delimited && next.tag == item_end) return;
       if (next.tag >> 16 <= 2 || next.tag >> 16 == 0xFFFE)
@@ -253,22 +315,49 @@ class Walker {
   std::string_view bytes_;
   DicomElements* into_;
   std::size_t at_ = 0;
+  bool loose_;
   bool encapsulated_ = false;
   bool big_endian_ = false;
+  std::optional<bool> explicit_vr_;  ///< as seen, where it was looked for
 };
 
-DicomElements walked(std::string_view bytes, const std::string& origin) {
+DicomElements walked(std::string_view bytes, const std::string& origin, const std::string& irregular = {}) {
   DicomElements found;
   found.origin = origin;
+  found.irregular = irregular;
   Walker(bytes, found).file();
   return found;
 }
 
+/// By the rules, or else loosely. A file that cannot be read loosely either fails by the rule it broke first.
+DicomElements walked_or_loosely(std::string_view bytes, const std::string& origin) {
+  const auto by_the_rules = guarded([&] { return walked(bytes, origin); });
+  if (by_the_rules) return *by_the_rules;
+  const Failure& broken = by_the_rules.error();
+  const bool without_preamble = broken.reason == Reason::not_an_image;
+  if (!looks_like_dicom(bytes) || (!without_preamble && broken.reason != Reason::bad_value))
+    throw BadInput(broken);
+  const auto loosely = guarded([&] {
+    return walked(bytes, origin, without_preamble ? origin + ": there is no preamble" : broken.message);
+  });
+  if (loosely) return *loosely;
+  throw BadInput(without_preamble ? loosely.error() : broken);
+}
+
 }  // namespace
+
+bool looks_like_dicom(std::string_view bytes) {
+  using namespace std::literals;
+  if (bytes.size() > meta_start && bytes.substr(128, 4) == "DICM") return true;
+  if (bytes.starts_with("DICM")) bytes.remove_prefix(4);
+  const bool begins = bytes.starts_with("\2\0"sv) || bytes.starts_with("\x08\0"sv);
+  return begins && bytes.size() >= 8 &&
+         (has_vr(bytes, 0) || number_at(bytes, 4) <= bytes.size() - 8);  // VR, or a length that can be
+}
 
 Expected<DicomElements> walk_dicom(std::string_view bytes, const std::string& origin) {
   return guarded([&] {
-    DicomElements found = walked(bytes, origin);
+    DicomElements found = walked_or_loosely(bytes, origin);
     if (!transfer_syntax(found.transfer_syntax)->big_endian) return found;
     const auto converted =
         std::make_shared<const std::string>(value_or_throw(as_little_endian(bytes, origin)));
@@ -284,6 +373,7 @@ std::vector<DicomElements> sequence_items(const DicomElements& of, DicomTag sequ
   DicomElements about;
   about.origin = of.origin;
   about.transfer_syntax = of.transfer_syntax;
+  about.irregular = of.irregular;
   return Walker(element->value, about).items(transfer_syntax(of.transfer_syntax)->explicit_vr);
 }
 

@@ -70,7 +70,9 @@ Expected<std::string> decode_jpeg_2000(std::string_view codestream, int width, i
   };
   Source source{codestream};
   const Stream stream = stream_of(source);
-  const std::unique_ptr<opj_codec_t, Closer<opj_destroy_codec>> codec(opj_create_decompress(OPJ_CODEC_J2K));
+  const bool in_boxes = codestream.starts_with(std::string_view("\0\0\0\x0CjP  ", 8));
+  const std::unique_ptr<opj_codec_t, Closer<opj_destroy_codec>> codec(
+      opj_create_decompress(in_boxes ? OPJ_CODEC_JP2 : OPJ_CODEC_J2K));
   opj_dparameters_t parameters;
   opj_set_default_decoder_parameters(&parameters);
   opj_image_t* opened = nullptr;

@@ -55,7 +55,7 @@ Expected<XrayImage> read_dicom(std::string_view bytes, const std::string& origin
     DicomOutline outline = value_or_throw(check_dicom(bytes, origin));
     const int index = value_or_throw(choose_frame(origin, outline.frames, frame));
     outline.elements = frame_elements(outline.elements, index);
-    auto [acquisition, warnings] = value_or_throw(read_acquisition(outline.elements));
+    auto [acquisition, warnings] = value_or_throw(read_acquisition(outline.elements, index, outline.frames));
     const Polarity polarity = value_or_throw(read_polarity(outline));
 
     XrayImage xray_image;
@@ -65,7 +65,8 @@ Expected<XrayImage> read_dicom(std::string_view bytes, const std::string& origin
     xray_image.highest = outline.bits_stored == 16 && !outline.is_signed ? highest_grey(xray_image.pixels)
                                                                          : xray_image.lowest + levels - 1;
     xray_image.acquisition = std::move(acquisition);
-    xray_image.warnings = std::move(warnings);
+    xray_image.warnings = outline.warnings;
+    std::ranges::move(warnings, std::back_inserter(xray_image.warnings));
     if (polarity.invert) invert(xray_image);
     if (!polarity.certain) make_metal_dark(xray_image, origin);
     xray_image.acquisition.instance_key = image_key(xray_image.pixels);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/xray/read_dicom.h"
 
+#include <array>
+
 #include <gtest/gtest.h>
 
 #include "helicarm/core/random.h"
@@ -76,7 +78,7 @@ TEST(ReadDicom, SignedValuesAndStrayHighBits) {
 }
 
 TEST(ReadDicom, ImplausibleSpacingAndDistanceAreRefused) {
-  for (const char* spacing : {"0\\0", "-0.3\\-0.3", "NaN\\NaN", "1e400\\1e400", "0,30\\0,30", "0.3",
+  for (const char* spacing : {"0\\0.3", "-0.3\\-0.3", "NaN\\NaN", "1e400\\1e400", "0,30\\0,30", "0.3",
                               "0.2\\0.2\\0.2", "inf\\0.3", "0.3\\", "5\\5", "0.3 0.3"}) {
     const auto xray_image = read(DicomBuilder().text(0x00181164, "DS", spacing));
     ASSERT_FALSE(xray_image) << spacing;
@@ -84,7 +86,7 @@ TEST(ReadDicom, ImplausibleSpacingAndDistanceAreRefused) {
     EXPECT_NE(xray_image.error().message.find("(0018,1164)"), std::string::npos)
         << xray_image.error().message;
   }
-  for (const char* distance : {"0", "1", "1e9", "-1000", "nan"})
+  for (const char* distance : {"1", "1e9", "-1000", "nan"})
     EXPECT_EQ(reason(DicomBuilder().text(0x00181110, "DS", distance)), "bad_value") << distance;
 }
 
@@ -95,6 +97,65 @@ TEST(ReadDicom, AbsentSpacingStaysAbsent) {
   EXPECT_FALSE(xray_image->acquisition.pixel_mm);
   EXPECT_FALSE(xray_image->acquisition.source_detector_mm);
   EXPECT_TRUE(warned(*xray_image, Reason::spacing_missing));
+}
+
+TEST(ReadDicom, ZeroSpacingAndDistanceAreAbsent) {
+  for (const char* zero : {"0", "0.0", "+0.000"}) {
+    const auto xray_image = read(
+        DicomBuilder().text(0x00181110, "DS", zero).text(0x00181164, "DS", std::string(zero) + "\\" + zero));
+    ASSERT_TRUE(xray_image) << xray_image.error().message;
+    EXPECT_FALSE(xray_image->acquisition.source_detector_mm);
+    EXPECT_FALSE(xray_image->acquisition.pixel_mm);
+    EXPECT_TRUE(warned(*xray_image, Reason::spacing_missing));
+  }
+}
+
+TEST(ReadDicom, AspectRatioThatContradictsTheSpacingIsReported) {
+  const auto ratio = [](const char* value) { return DicomBuilder().text(0x00280034, "IS", value); };
+  EXPECT_FALSE(warned(*read(ratio("3\\2")), Reason::tag_disagrees));
+  EXPECT_FALSE(warned(*read(ratio("")), Reason::tag_disagrees));
+  EXPECT_TRUE(warned(*read(ratio("1\\1")), Reason::tag_disagrees));
+  EXPECT_TRUE(warned(*read(ratio("4\\3").erase(0x00181164)), Reason::tag_disagrees));
+  EXPECT_FALSE(warned(*read(ratio("1\\1").erase(0x00181164)), Reason::tag_disagrees));
+}
+
+/// Three frames of a run that starts at -10 and 5 degrees.
+DicomBuilder run_of_frames(const char* primary, const char* secondary) {
+  return DicomBuilder()
+      .text(0x00280008, "IS", "3")
+      .pixels(std::vector<std::uint16_t>(144, 7))
+      .text(0x00181510, "DS", "-10")
+      .text(0x00181511, "DS", "5")
+      .text(0x00181520, "DS", primary)
+      .text(0x00181521, "DS", secondary);
+}
+
+TEST(ReadDicom, IncrementsOfARunAreOffsetsOfItsFrames) {
+  const DicomBuilder run = run_of_frames("0\\50\\100", "0\\-1\\2.5");
+  const std::array primary{-10.0, 40.0, 90.0}, secondary{5.0, 4.0, 7.5};
+  for (int frame = 1; frame <= 3; ++frame) {
+    const auto image = read(run, frame);
+    ASSERT_TRUE(image) << image.error().message;
+    EXPECT_EQ(image->acquisition.primary_angle_deg, primary[std::size_t(frame - 1)]);
+    EXPECT_EQ(image->acquisition.secondary_angle_deg, secondary[std::size_t(frame - 1)]);
+    EXPECT_FALSE(warned(*image, Reason::tag_disagrees));
+  }
+}
+
+TEST(ReadDicom, OneIncrementIsTheStepFromFrameToFrame) {
+  EXPECT_EQ(read(run_of_frames("1.5", "0"), 1)->acquisition.primary_angle_deg, -10);
+  EXPECT_EQ(read(run_of_frames("1.5", "0"), 3)->acquisition.primary_angle_deg, -7);
+  EXPECT_EQ(read(run_of_frames("1.5", "0"), 3)->acquisition.secondary_angle_deg, 5);
+}
+
+TEST(ReadDicom, IncrementsThatContradictTheFramesAreReported) {
+  const auto other_count = read(run_of_frames("0\\50", "0"), 2);
+  EXPECT_FALSE(other_count->acquisition.primary_angle_deg);
+  EXPECT_TRUE(warned(*other_count, Reason::tag_disagrees));
+  const auto at_rest = read(run_of_frames("0\\50\\100", "0").text(0x00181500, "CS", "STATIC"), 2);
+  EXPECT_EQ(at_rest->acquisition.primary_angle_deg, -10);
+  EXPECT_TRUE(warned(*at_rest, Reason::tag_disagrees));
+  EXPECT_EQ(reason(run_of_frames("0\\x\\100", "0"), 2), "bad_value");
 }
 
 TEST(ReadDicom, ImagerSpacingTakesPrecedenceOverADifferingPixelSpacing) {

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/xray/read_xray_image.h"
 
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/core/json.h"
-#include "helicarm/geometry/import_matrix.h"
+#include "helicarm/image/bmp.h"
 #include "helicarm/image/png.h"
 #include "helicarm/image/tiff.h"
-#include "helicarm/xray/dicom_acquisition.h"
 #include "helicarm/xray/dicom_check.h"
+#include "helicarm/xray/foreign_file.h"
+#include "helicarm/xray/jpeg.h"
 #include "helicarm/xray/read_dicom.h"
 
 namespace helicarm::xray {
@@ -17,87 +19,103 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Acquisition read_sidecar(const fs::path& path) {
-  const Json json = value_or_throw(read_json(path));
-  if (geometry::holds_camera(json))
-    throw BadInput(
-        Reason::unsupported,
-        fmt::format("{}: lies where an image's \"pixel_mm\" and \"source_detector_mm\" are expected, "
-                    "and holds a camera: rename it, e.g. {}_camera.json",
-                    path.filename().string(), path.stem().string()));
-  JsonReader reader(json, path.filename().string());
-  Acquisition acquisition;
-  if (const auto pixel_mm = reader.optional_number("pixel_mm", {min_pixel_mm, max_pixel_mm}))
-    acquisition.pixel_mm = Eigen::Vector2d::Constant(*pixel_mm);
-  acquisition.source_detector_mm =
-      reader.optional_number("source_detector_mm", {min_source_detector_mm, max_source_detector_mm});
-  reader.finish();
-  return acquisition;
+constexpr double square_tolerance = 0.01;
+
+/// Of a file that states no pixel size of its own.
+std::string why_no_spacing(const fs::path& path) {
+  const std::string origin = path.filename().string();
+  if (const auto sidecar = sidecar_of(path))
+    return fmt::format("{}: \"pixel_mm\" is not given", sidecar->filename().string());
+  const auto other = other_json_of(path);
+  return fmt::format(
+      "{}: no sidecar {}.json with \"pixel_mm\" and \"source_detector_mm\"{}", origin, path.stem().string(),
+      other ? fmt::format("; {} beside it is another kind of file", other->filename().string()) : "");
 }
 
-XrayImage xray_image_of_png(const image::GreyImage& grey_image, const fs::path& path) {
+XrayImage xray_image_of(const image::GreyImage& grey_image, const fs::path& path) {
   XrayImage xray_image;
-  const auto sidecar = sidecar_of(path);
-  if (sidecar) xray_image.acquisition = read_sidecar(*sidecar);
   xray_image.pixels = image::Image<float>(grey_image.pixels.width(), grey_image.pixels.height());
   std::ranges::copy(grey_image.pixels.pixels(), xray_image.pixels.pixels().begin());
   xray_image.highest = grey_image.bits == 8 ? 255 : highest_grey(xray_image.pixels);
   const std::string origin = path.filename().string();
-  if (!xray_image.acquisition.pixel_mm)
+  xray_image.warnings.push_back({Reason::spacing_missing, why_no_spacing(path)});
+  if (std::abs(grey_image.pixel_aspect - 1) > square_tolerance)
     xray_image.warnings.push_back(
-        {Reason::spacing_missing,
-         sidecar ? fmt::format("{}: \"pixel_mm\" is not given", sidecar->filename().string())
-                 : fmt::format("{}: no sidecar {}.json with \"pixel_mm\" and \"source_detector_mm\"", origin,
-                               path.stem().string())});
+        {Reason::tag_disagrees,
+         fmt::format("{}: by its resolutions a pixel is {:.4g} times as high as wide; it is taken as square: "
+                     "resample the image if that is right",
+                     origin, grey_image.pixel_aspect),
+         {},
+         {{"aspect", grey_image.pixel_aspect}}});
   make_metal_dark(xray_image, origin);
   xray_image.acquisition.instance_key = image_key(xray_image.pixels);
   return xray_image;
 }
 
-bool is_dicom(std::string_view bytes) { return bytes.size() >= 132 && bytes.compare(128, 4, "DICM") == 0; }
+enum class FileKind { dicom, png, tiff, jpeg, bmp };
 
-BadInput not_an_image(std::string_view bytes, const std::string& origin) {
-  return {Reason::not_an_image,
-          fmt::format("{}: {}, neither DICOM with a preamble nor PNG nor TIFF", origin,
-                      bytes.empty() ? "zero bytes" : fmt::format("{} bytes", bytes.size()))};
+FileKind file_kind(std::string_view bytes, const std::string& origin) {
+  const bool has_preamble = bytes.size() >= 132 && bytes.compare(128, 4, "DICM") == 0;
+  if (has_preamble) return FileKind::dicom;
+  if (image::is_png(bytes)) return FileKind::png;
+  if (image::is_tiff(bytes)) return FileKind::tiff;
+  if (is_jpeg_file(bytes)) return FileKind::jpeg;
+  if (image::is_bmp(bytes)) return FileKind::bmp;
+  if (looks_like_dicom(bytes)) return FileKind::dicom;
+  const auto foreign = foreign_file(bytes);
+  throw BadInput(Reason::not_an_image,
+                 foreign ? fmt::format("{}: {}", origin, *foreign)
+                         : fmt::format("{}: {}, not DICOM, PNG, TIFF, JPEG or BMP", origin,
+                                       bytes.empty() ? "zero bytes" : fmt::format("{} bytes", bytes.size())));
+}
+
+int frames_of(std::string_view bytes, FileKind kind, const std::string& origin) {
+  if (kind == FileKind::dicom) return value_or_throw(check_dicom(bytes, origin)).frames;
+  if (kind == FileKind::tiff) return value_or_throw(image::count_tiff_pages(bytes, origin));
+  return 1;
+}
+
+image::GreyImage grey_image_of(std::string_view bytes, FileKind kind, int page, const std::string& origin) {
+  switch (kind) {
+    case FileKind::png:
+      return value_or_throw(image::decode_png(bytes, origin));
+    case FileKind::tiff:
+      return value_or_throw(image::decode_tiff(bytes, page, origin));
+    case FileKind::jpeg:
+      return value_or_throw(decode_jpeg_file(bytes, origin));
+    default:
+      return value_or_throw(image::decode_bmp(bytes, origin));
+  }
 }
 
 XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
   const std::string bytes = value_or_throw(read_file(path, max_image_file_bytes));
   const std::string origin = path.filename().string();
-  if (is_dicom(bytes)) return value_or_throw(read_dicom(bytes, origin, frame));
-  if (image::is_png(bytes)) {
-    value_or_throw(choose_frame(origin, 1, frame));
-    return xray_image_of_png(value_or_throw(image::decode_png(bytes, origin)), path);
+  const FileKind kind = file_kind(bytes, origin);
+  XrayImage xray_image;
+  if (kind == FileKind::dicom) {
+    xray_image = value_or_throw(read_dicom(bytes, origin, frame));
+  } else {
+    const int page = value_or_throw(choose_frame(origin, frames_of(bytes, kind, origin), frame));
+    xray_image = xray_image_of(grey_image_of(bytes, kind, page, origin), path);
+    if (kind == FileKind::jpeg)
+      xray_image.warnings.push_back(
+          {Reason::lossy_image, fmt::format("{}: JPEG compresses an image with loss", origin)});
   }
-  if (image::is_tiff(bytes)) {
-    const int pages = value_or_throw(image::count_tiff_pages(bytes, origin));
-    const int page = value_or_throw(choose_frame(origin, pages, frame));
-    return xray_image_of_png(value_or_throw(image::decode_tiff(bytes, page, origin)), path);
-  }
-  throw not_an_image(bytes, origin);
+  // NAME.json beside a DICOM file may be of its case.
+  if (const auto sidecar = kind == FileKind::dicom ? full_sidecar_of(path) : sidecar_of(path))
+    value_or_throw(
+        state_geometry(xray_image, value_or_throw(read_sidecar(*sidecar)), sidecar->filename().string()));
+  return xray_image;
 }
 
 }  // namespace
-
-std::optional<fs::path> sidecar_of(const fs::path& image) {
-  fs::path full = image;
-  full += ".json";
-  fs::path plain = image;
-  plain.replace_extension(".json");
-  for (const fs::path& sidecar : {full, plain})
-    if (fs::exists(sidecar)) return sidecar;
-  return std::nullopt;
-}
 
 Expected<int> count_frames(const fs::path& path) {
   return guarded([&] {
     const std::string bytes = value_or_throw(read_file(path, max_image_file_bytes));
     const std::string origin = path.filename().string();
-    if (is_dicom(bytes)) return value_or_throw(check_dicom(bytes, origin)).frames;
-    if (image::is_png(bytes)) return 1;
-    if (image::is_tiff(bytes)) return value_or_throw(image::count_tiff_pages(bytes, origin));
-    throw not_an_image(bytes, origin);
+    return frames_of(bytes, file_kind(bytes, origin), origin);
   });
 }
 

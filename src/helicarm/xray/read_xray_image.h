@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "helicarm/xray/sidecar.h"
 #include "helicarm/xray/xray_image.h"
 
 namespace helicarm::xray {
@@ -13,19 +14,16 @@ namespace helicarm::xray {
 /// Limit for an image file.
 inline constexpr std::uintmax_t max_image_file_bytes = 256u << 20;
 
-/// Reads a DICOM, PNG or TIFF X-ray image; the format is detected by content. `frame` is 1-based and needed
-/// only if the file has several. PNG and TIFF may have a sidecar NAME.json (or NAME.png.json) with `pixel_mm`
-/// and `source_detector_mm`, either of which may be null; without `pixel_mm` the image has the warning
-/// spacing_missing. Pixels stay as stored, neither flipped nor rotated.
-/// Failures name file and view; codes: missing_file, not_an_image, truncated, bad_size, bad_value,
-/// unsupported, and those of the sidecar's JSON. Thread-safe.
+/// Reads a DICOM, PNG, TIFF, JPEG or BMP X-ray image; the format is detected by content. `frame` is 1-based
+/// and needed only if the file has several. `pixel_mm` and `source_detector_mm` may stand in a sidecar
+/// (`sidecar_of`), either as null; what the file itself states must agree with it. Without a pixel size the
+/// image has the warning spacing_missing, of a JPEG file lossy_image. Pixels stay as stored, neither flipped
+/// nor rotated. Failures name file and view; codes: missing_file, not_an_image, truncated, bad_size,
+/// bad_value, unsupported, and those of the sidecar's JSON. Thread-safe.
 Expected<XrayImage> read_xray_image(const std::filesystem::path& path, const std::string& view_name,
                                     std::optional<int> frame);
 
 /// Frames or pages of an image file; fails as `read_xray_image`.
 Expected<int> count_frames(const std::filesystem::path& path);
-
-/// The sidecar beside a PNG or TIFF, where there is one.
-std::optional<std::filesystem::path> sidecar_of(const std::filesystem::path& image);
 
 }  // namespace helicarm::xray

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <string_view>
+#include <utility>
 
 namespace helicarm::xray {
 
@@ -39,6 +40,30 @@ inline constexpr std::array transfer_syntaxes = {
 inline const TransferSyntax* transfer_syntax(std::string_view uid) {
   const auto found = std::ranges::find(transfer_syntaxes, uid, &TransferSyntax::uid);
   return found == transfer_syntaxes.end() ? nullptr : &*found;
+}
+
+/// Of one that is not read, for a message: " (MPEG-4)"; empty where it has no common name.
+inline std::string_view name_of_other_syntax(std::string_view uid) {
+  constexpr std::string_view family = "1.2.840.10008.1.2.4.";
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 10> names = {
+      {{"92", " (JPEG 2000 part 2)"},
+       {"93", " (JPEG 2000 part 2)"},
+       {"94", " (JPIP)"},
+       {"95", " (JPIP)"},
+       {"100", " (MPEG-2)"},
+       {"101", " (MPEG-2)"},
+       {"201", " (High-Throughput JPEG 2000)"},
+       {"202", " (High-Throughput JPEG 2000)"},
+       {"203", " (High-Throughput JPEG 2000)"},
+       {"55", " (progressive JPEG)"}}};
+  if (!uid.starts_with(family)) return "";
+  uid.remove_prefix(family.size());
+  for (const auto& [number, name] : names)
+    if (uid == number) return name;
+  if (uid.starts_with("102") || uid.starts_with("103") || uid.starts_with("104") || uid.starts_with("105") ||
+      uid.starts_with("106"))
+    return " (MPEG-4)";
+  return uid.starts_with("107") || uid.starts_with("108") ? " (HEVC)" : "";
 }
 
 }  // namespace helicarm::xray

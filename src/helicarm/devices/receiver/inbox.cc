@@ -38,9 +38,14 @@ void remove_parts(const fs::path& folder) {
   }
 }
 
-/// Checks the structure of every frame and decodes the first.
-void check_image(std::string_view file, const std::string& origin) {
-  value_or_throw(xray::read_dicom(file, origin, 1));
+/// Checks the structure of every frame and decodes the first. What the file breaks or holds too much, as
+/// warnings.
+std::vector<Warning> check_image(std::string_view file, const std::string& origin) {
+  std::vector<Warning> warnings = value_or_throw(xray::read_dicom(file, origin, 1)).warnings;
+  std::erase_if(warnings, [](const Warning& warning) {
+    return warning.reason != Reason::irregular_file && warning.reason != Reason::surplus_data;
+  });
+  return warnings;
 }
 
 std::string meta_element(std::uint16_t number, std::string_view vr, std::string value) {
@@ -100,11 +105,11 @@ void Inbox::check_folder(const std::string& origin) const {
 
 Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin) {
   return guarded([&] {
-    check_image(file, origin);
+    std::vector<Warning> warnings = check_image(file, origin);
     const std::string uid(value_or_throw(xray::walk_dicom(file, origin)).text(xray::tags::sop_instance));
     if (!dicom::is_uid(uid))
       throw BadInput(Reason::bad_value, fmt::format("{}: SOP Instance UID is not valid", origin));
-    Arrival arrival{{}, xray::digest(file), false, {}};
+    Arrival arrival{{}, xray::digest(file), false, std::move(warnings)};
     const std::lock_guard naming(naming_);
     check_folder(origin);
     for (int version = 1; version <= most_versions; ++version) {

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace helicarm::xray {
+
+/// What a file is that is not read as an image, with the way out, by its first bytes: "a GIF image; save it
+/// as PNG". Nothing if it is not known.
+std::optional<std::string> foreign_file(std::string_view bytes);
+
+}  // namespace helicarm::xray

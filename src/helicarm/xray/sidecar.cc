@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/xray/sidecar.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/json.h"
+#include "helicarm/xray/dicom_acquisition.h"
+
+namespace helicarm::xray {
+namespace fs = std::filesystem;
+
+namespace {
+
+fs::path full_name(const fs::path& image) {
+  fs::path name = image;
+  return name += ".json";
+}
+
+fs::path short_name(const fs::path& image) {
+  fs::path name = image;
+  return name.replace_extension(".json");
+}
+
+/// A sidecar holds numbers alone. An object with lists, objects or a format, and without a sidecar's keys, is
+/// the file of another program or another part of this one. What cannot be read is left to be refused.
+bool is_other_json(const fs::path& path) {
+  const auto json = read_json(path);
+  if (!json || !json->is_object() || json->contains("pixel_mm") || json->contains("source_detector_mm"))
+    return false;
+  return json->contains("format") ||
+         std::ranges::any_of(*json, [](const Json& value) { return value.is_structured(); });
+}
+
+void check_agreement(double own, double stated, const char* key, const std::string& image,
+                     const std::string& origin) {
+  constexpr double tolerance = 0.01;
+  const double difference = std::abs(stated / own - 1);
+  if (difference <= tolerance) return;
+  throw BadInput(
+      {Reason::bad_value,
+       fmt::format("{}: \"{}\" is {:g}, the image{} itself states {:g}: they differ by {:.3g} %, limit 1 %; "
+                   "correct it, or leave it out",
+                   origin, key, stated, image, own, 100 * difference),
+       {},
+       {{"stated_mm", stated}, {"file_mm", own}}});
+}
+
+}  // namespace
+
+std::optional<fs::path> full_sidecar_of(const fs::path& image) {
+  const fs::path name = full_name(image);
+  return fs::exists(name) && !is_other_json(name) ? std::optional(name) : std::nullopt;
+}
+
+std::optional<fs::path> sidecar_of(const fs::path& image) {
+  if (const auto full = full_sidecar_of(image)) return full;
+  const fs::path name = short_name(image);
+  return name != image && fs::exists(name) && !is_other_json(name) ? std::optional(name) : std::nullopt;
+}
+
+std::optional<fs::path> other_json_of(const fs::path& image) {
+  for (const fs::path& name : {full_name(image), short_name(image)})
+    if (name != image && fs::exists(name) && is_other_json(name)) return name;
+  return std::nullopt;
+}
+
+Expected<StatedGeometry> read_sidecar(const fs::path& path) {
+  return guarded([&] {
+    const Json json = value_or_throw(read_json(path));
+    JsonReader reader(json, path.filename().string());
+    StatedGeometry stated;
+    stated.pixel_mm = reader.optional_number("pixel_mm", {min_pixel_mm, max_pixel_mm});
+    stated.source_detector_mm =
+        reader.optional_number("source_detector_mm", {min_source_detector_mm, max_source_detector_mm});
+    reader.finish();
+    return stated;
+  });
+}
+
+Expected<void> state_geometry(XrayImage& xray_image, const StatedGeometry& stated,
+                              const std::string& origin) {
+  return guarded([&] {
+    Acquisition& acquisition = xray_image.acquisition;
+    const std::string image = xray_image.name.empty() ? "" : fmt::format(" of {}", xray_image.name);
+    if (stated.pixel_mm && acquisition.pixel_mm) {
+      check_agreement(acquisition.pixel_mm->x(), *stated.pixel_mm, "pixel_mm", image, origin);
+      check_agreement(acquisition.pixel_mm->y(), *stated.pixel_mm, "pixel_mm", image, origin);
+    } else if (stated.pixel_mm) {
+      acquisition.pixel_mm = Eigen::Vector2d::Constant(*stated.pixel_mm);
+      std::erase_if(xray_image.warnings,
+                    [](const Warning& warning) { return warning.reason == Reason::spacing_missing; });
+    }
+    if (stated.source_detector_mm && acquisition.source_detector_mm)
+      check_agreement(*acquisition.source_detector_mm, *stated.source_detector_mm, "source_detector_mm",
+                      image, origin);
+    else if (stated.source_detector_mm)
+      acquisition.source_detector_mm = stated.source_detector_mm;
+  });
+}
+
+}  // namespace helicarm::xray

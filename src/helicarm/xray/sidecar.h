@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "helicarm/xray/xray_image.h"
+
+namespace helicarm::xray {
+
+/// What a user states of an image beside the file: in a sidecar, or in a view of a case.
+struct StatedGeometry {
+  std::optional<double> pixel_mm = {};  ///< in the receiver's plane
+  std::optional<double> source_detector_mm = {};
+};
+
+/// The sidecar beside an image, where there is one: NAME.png.json or NAME.json. A JSON file of another kind,
+/// such as a camera, is none.
+std::optional<std::filesystem::path> sidecar_of(const std::filesystem::path& image);
+
+/// The one of the image's whole name, NAME.dcm.json: a DICOM file has no other.
+std::optional<std::filesystem::path> full_sidecar_of(const std::filesystem::path& image);
+
+/// A JSON file beside the image that has a sidecar's name and is none, for a message.
+std::optional<std::filesystem::path> other_json_of(const std::filesystem::path& image);
+
+/// Fails with the codes of JSON, or bad_value.
+Expected<StatedGeometry> read_sidecar(const std::filesystem::path& path);
+
+/// Gives the image what its file does not state; `origin` names who states it. A pixel size takes the warning
+/// spacing_missing away. Refuses bad_value where the file's own value differs by more than 1 %.
+Expected<void> state_geometry(XrayImage& xray_image, const StatedGeometry& stated, const std::string& origin);
+
+}  // namespace helicarm::xray
