@@ -28,8 +28,8 @@ struct Plan {
 };
 
 /// Reads 3D Slicer's markups (.mrk.json): point lists give points, lines give tunnels with points NAME_start
-/// and NAME_end; a line without a name is called as the file. RAS and LAS are converted to LPS, other units of
-/// length to mm. Fails with missing_file, bad_json, not_finite, bad_value, unsupported, name_clash.
+/// and NAME_end; a line without a name is called as the file. RAS and LAS are converted to LPS, other units
+/// of length to mm. Fails with missing_file, bad_json, not_finite, bad_value, unsupported, name_clash.
 Expected<Plan> read_plan(const std::filesystem::path& path);
 
 /// Throws BadInput (unsupported) for Slicer's old list of fiducials (.fcsv), which is not JSON.

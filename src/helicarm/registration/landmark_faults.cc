@@ -90,7 +90,7 @@ std::vector<Order> other_orders(std::size_t n) {
   return all;
 }
 
-/// Whether an order moves names only between places that its own residuals tell apart.
+/// Whether an order moves names only between places that its own residuals distinguish.
 bool is_distinct(const Places& places, const Order& order, double fre) {
   for (std::size_t i = 0; i < order.size(); ++i)
     if (order[i] != i && (places.world[i] - places.world[order[i]]).norm() < better * fre) return false;

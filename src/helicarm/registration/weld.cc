@@ -42,7 +42,7 @@ class Welder {
     return {std::int64_t(std::floor(place.x() / cell_)), std::int64_t(std::floor(place.y() / cell_)),
             std::int64_t(std::floor(place.z() / cell_))};
   }
-  /// Cells that share a key are told apart by the distance.
+  /// Cells that share a key are distinguished by the distance.
   static std::uint64_t key(const Cell& cell) {
     return std::uint64_t(cell[0]) * 73856093U ^ std::uint64_t(cell[1]) * 19349663U << 20 ^
            std::uint64_t(cell[2]) * 83492791U << 40;

@@ -21,7 +21,7 @@ struct EncapsulatedFrames {
 
 /// The fragments of every frame of encapsulated Pixel Data (PS3.5 A.4). Where frames are not one fragment
 /// each: by the table of their offsets, else by where compressed images begin. Empty fragments hold nothing.
-/// Throws BadInput: truncated (fewer images than frames), bad_value (the frames cannot be told apart).
+/// Throws BadInput: truncated (fewer images than frames), bad_value (the frames cannot be distinguished).
 EncapsulatedFrames fragments_of_frames(const DicomElements& elements, int frames);
 
 }  // namespace helicarm::xray
