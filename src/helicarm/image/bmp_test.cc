@@ -14,7 +14,7 @@ std::string number(std::int64_t value, int size) {
   return bytes;
 }
 
-struct Kind {
+struct BmpKind {
   int bits = 8;
   bool from_top = false;
   int compression = 0;
@@ -22,7 +22,7 @@ struct Kind {
 };
 
 /// 5 x 3 pixels of value 10 * column + row.
-std::string encoded(Kind kind) {
+std::string encoded_bmp(BmpKind kind) {
   const int row_bytes = (5 * kind.bits + 31) / 32 * 4, palette = kind.bits == 8 ? 256 : 0;
   const int pixels_at = 14 + 40 + 4 * palette;
   std::string bytes = "BM" + number(pixels_at + 3 * row_bytes, 4) + number(0, 4) + number(pixels_at, 4) +
@@ -44,7 +44,7 @@ std::string encoded(Kind kind) {
   return bytes;
 }
 
-std::string_view reason(const std::string& bytes) {
+std::string_view reason_of_bmp(const std::string& bytes) {
   const auto read = decode_bmp(bytes, "x.bmp");
   return read ? "ok" : code(read.error().reason);
 }
@@ -52,7 +52,7 @@ std::string_view reason(const std::string& bytes) {
 TEST(Bmp, GreyIsReadFromEitherEnd) {
   for (const int bits : {8, 24, 32})
     for (const bool from_top : {false, true}) {
-      const std::string bytes = encoded({bits, from_top});
+      const std::string bytes = encoded_bmp({bits, from_top});
       ASSERT_TRUE(is_bmp(bytes));
       const auto read = decode_bmp(bytes, "x.bmp");
       ASSERT_TRUE(read) << read.error().message;
@@ -64,29 +64,29 @@ TEST(Bmp, GreyIsReadFromEitherEnd) {
 
 TEST(Bmp, ColourAndOtherKindsAreRefused) {
   for (const int bits : {8, 24, 32})
-    EXPECT_EQ(reason(encoded({.bits = bits, .tint = 9})), "unsupported") << bits;
-  EXPECT_EQ(reason(encoded({.compression = 1})), "unsupported");
-  EXPECT_EQ(reason(encoded({.bits = 16})), "unsupported");
+    EXPECT_EQ(reason_of_bmp(encoded_bmp({.bits = bits, .tint = 9})), "unsupported") << bits;
+  EXPECT_EQ(reason_of_bmp(encoded_bmp({.compression = 1})), "unsupported");
+  EXPECT_EQ(reason_of_bmp(encoded_bmp({.bits = 16})), "unsupported");
 }
 
 TEST(Bmp, EveryTruncationIsRefused) {
-  const std::string whole = encoded({});
+  const std::string whole = encoded_bmp({});
   for (std::size_t size = 0; size < whole.size(); ++size)
-    EXPECT_EQ(reason(whole.substr(0, size)), "truncated") << size;
+    EXPECT_EQ(reason_of_bmp(whole.substr(0, size)), "truncated") << size;
 }
 
 TEST(Bmp, HugeSizeIsRefused) {
-  std::string bytes = encoded({});
+  std::string bytes = encoded_bmp({});
   bytes.replace(18, 8, number(0x7FFFFFFF7FFFFFFF, 8));
-  EXPECT_EQ(reason(bytes), "bad_size");
+  EXPECT_EQ(reason_of_bmp(bytes), "bad_size");
   bytes.replace(22, 4, number(0x80000000, 4));
-  EXPECT_EQ(reason(bytes), "bad_size");
+  EXPECT_EQ(reason_of_bmp(bytes), "bad_size");
 }
 
 TEST(Bmp, MutationsNeverCrash) {
   RandomStream random(4, 1);
   for (const int bits : {8, 24}) {
-    const std::string whole = encoded({bits});
+    const std::string whole = encoded_bmp({bits});
     for (int trial = 0; trial < 2000; ++trial) {
       std::string bytes = whole;
       bytes[2 + random.index(60)] = static_cast<char>(random.bits());

@@ -45,8 +45,9 @@ std::string_view reason(const std::string& file) {
 }
 
 TEST(IrregularDicom, RegularFileHasNoNote) {
-  for (const Warning& warning : read_dicom(plain(), "x.dcm", {})->warnings)
-    EXPECT_NE(warning.reason, Reason::irregular_file);
+  const auto read = read_dicom(plain(), "x.dcm", {});
+  ASSERT_TRUE(read);
+  for (const Warning& warning : read->warnings) EXPECT_NE(warning.reason, Reason::irregular_file);
 }
 
 TEST(IrregularDicom, WithoutPreamble) {
