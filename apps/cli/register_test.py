@@ -94,7 +94,9 @@ class Register(SimulatedCase):
         truth = json.loads((folder / "truth.json").read_text())
         case = json.loads((folder / "case.json").read_text())
         case["picks"], places = [], {}
-        for target, (x, y, z) in list(truth["targets_in_calibrator"].items())[:targets]:
+        for target, (x, y, z) in truth["targets_in_calibrator"].items():
+            if targets and target not in targets:
+                continue
             places[f"p{target}"] = [x - 100, y, z]
             for view in truth["views"]:
                 raw = next(t["raw"] for t in view["targets"] if t["name"] == target)
@@ -127,7 +129,7 @@ class Register(SimulatedCase):
         self.assertIn(f'"{first}" and "{second}" exchanged', done.stderr)
 
     def test_three_landmarks_have_no_handedness(self):
-        folder, case, places = self.landmark_case("three", 3)
+        folder, case, places = self.landmark_case("three", ("T2", "T4", "T5"))
         done, model = self.registered(folder, case, places)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("ambiguous_handedness", [note["code"] for note in model["notes"]])
@@ -144,9 +146,8 @@ class Register(SimulatedCase):
         case["poses_now"] = {"tracker_from_tool": marker}
         done, model = self.registered(folder, case, places, "--max-error", 20)
         self.assertEqual(done.returncode, 0, done.stderr)
-        errors = [point["error_95_mm"] for point in model["points"]]
-        limit = 1.05 * max([*errors, 0.5])
-        done, model = self.registered(folder, case, places, "--max-error", limit)
+        self.assertLess(max(point["error_95_mm"] for point in model["points"]), 1.9)
+        done, model = self.registered(folder, case, places, "--max-error", 1.9)
         self.assertEqual(done.returncode, 3, done.stderr)
         self.assertEqual(model["failure"]["code"], "uncertain")
         self.assertIn("in the tool's frame", done.stderr)

@@ -19,9 +19,10 @@ class CasePlans : public testing::Test {
     const auto at = [](const char* label, double z) {
       return Json{{"label", label}, {"position", {1, 2, z}}};
     };
-    const Json plan = {{"markups",
-                        {{{"type", "Line"}, {"name", line}, {"controlPoints", {at("1", 0), at("2", 30)}}},
-                         {{"type", "Fiducial"}, {"controlPoints", {at(point, 5)}}}}}};
+    const Json ends = Json::array({at("1", 0), at("2", 30)}), points = Json::array({at(point, 5)});
+    const Json tunnel = {{"type", "Line"}, {"name", line}, {"controlPoints", ends}};
+    const Json list = {{"type", "Fiducial"}, {"controlPoints", points}};
+    const Json plan = {{"markups", Json::array({tunnel, list})}};
     pipeline::CaseModel model;
     model.name = name;
     model.plan = folder_.path() / (std::string(name) + ".mrk.json");

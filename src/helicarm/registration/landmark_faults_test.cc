@@ -93,7 +93,7 @@ std::optional<LandmarkFault> contradiction_at(double shift_mm) {
   const auto landmarks = four_landmarks(0.05, 0.06);
   auto pose = faulty_pose;
   pose.translation.x() += shift_mm;
-  return contradiction(landmarks, *register_landmarks(landmarks), pose, 0.01 * RigidCovariance::Identity(),
+  return contradiction(landmarks, *register_landmarks(landmarks), pose, 1e-4 * RigidCovariance::Identity(),
                        pose.translation);
 }
 
