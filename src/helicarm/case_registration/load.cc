@@ -10,7 +10,6 @@
 #include "helicarm/case_registration/tiff_stack.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/import_matrix.h"
-#include "helicarm/pipeline/belong_together.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/volume/read_volume.h"
@@ -105,15 +104,9 @@ void take_patient(std::string& known, const xray::XrayImage& image) {
 
 LoadedViews views_of_cameras(const pipeline::RegistrationCase& given) {
   LoadedViews loaded;
-  std::vector<xray::XrayImage> images;
-  std::vector<const xray::XrayImage*> together;
-  for (const pipeline::CaseView& view : given.base.views)
-    images.push_back(value_or_throw(pipeline::image_of(view)));
-  for (const xray::XrayImage& image : images) together.push_back(&image);
-  value_or_throw(pipeline::check_images_belong_together(together));
   for (std::size_t i = 0; i < given.base.views.size(); ++i) {
     const pipeline::CaseView& view = given.base.views[i];
-    xray::XrayImage& image = images[i];
+    const xray::XrayImage image = value_or_throw(pipeline::image_of(view));
     take_patient(loaded.patient_key, image);
     const geometry::ImportedMatrix camera = value_or_throw(geometry::import_matrix(given.cameras[i]));
     if (camera.image_size) check_size(view.name, "the camera is for", *camera.image_size, image.pixels);

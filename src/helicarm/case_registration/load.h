@@ -25,8 +25,8 @@ struct LoadedViews {
 
 /// The views of a case: calibrated by the program, then fiducials, plate dots and check targets are masked,
 /// or with cameras of other programs, then the images are taken as free of distortion. Fails as
-/// `read_xray_image`, `import_matrix`, `check_images_belong_together` and `calibrate_case`, and with bad_size
-/// for a camera of another image size.
+/// `read_xray_image`, `import_matrix` and `calibrate_case`, with patient_mismatch for images of two patients,
+/// and with bad_size for a camera of another image size.
 Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const pipeline::RunOptions& run);
 
 /// The views of a case that is calibrated already. Of the paper's method, which has no covariance, each
