@@ -117,7 +117,7 @@ std::string opencv_yaml(std::string_view text) {
 }
 
 void check_nesting(std::string_view text, bool xml, const std::string& origin) {
-  int depth = 0, most = 0;
+  int depth = 0, greatest = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
     const char next = i + 1 < text.size() ? text[i + 1] : '\0';
@@ -129,12 +129,12 @@ void check_nesting(std::string_view text, bool xml, const std::string& origin) {
       depth = 0;  // a flow list is in one line
     else
       depth += c == '[' || c == '{' || (c == '-' && next == ' ') ? 1 : c == ']' || c == '}' ? -1 : 0;
-    most = std::max(most, depth);
+    greatest = std::max(greatest, depth);
   }
   std::size_t deepest_column = 0;
   if (!xml)
     for (const YamlLine& line : yaml_lines(text)) deepest_column = std::max(deepest_column, line.column);
-  if (most > deepest_storage || deepest_column > 4 * deepest_storage)
+  if (greatest > deepest_storage || deepest_column > 4 * deepest_storage)
     throw BadInput(Reason::bad_value, fmt::format("{}: nested deeper than {}", origin, deepest_storage));
 }
 
