@@ -39,15 +39,6 @@ TEST(WithMapOfHoles, OwnMapIsConfirmedWithAndWithoutTheDescriptionOfThePlate) {
     }
 }
 
-TEST(WithMapOfHoles, ExchangedMapsAreAMismatch) {
-  for (const std::size_t view : {0U, 1U})
-    for (const auto& plate : {std::optional(perforated), std::optional<phantom::Plate>()}) {
-      const auto result = with_map(image_of_view(view), map_of_view(1 - view), plate);
-      ASSERT_FALSE(result);
-      EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
-    }
-}
-
 TEST(WithMapOfHoles, BentPlateWithoutAMapIsAMismatch) {
   const xray::XrayImage image = image_of_view(0);
   const auto result = with_map(image, flat_panel_map(image), {});
