@@ -162,7 +162,7 @@ void notify(const std::vector<Warning>& warnings, Console& console) {
                                     warning.view.empty() ? "" : ": ", warning.message);
 }
 
-void print_notes(const std::vector<Warning>& notes, Console& console) {
+void notify_of_notes(const std::vector<Warning>& notes, Console& console) {
   if (console.quiet) return;
   for (const Warning& note : notes)
     console.progress << fmt::format("helicarm: note: {}: {}\n", code(note.reason), note.message);
@@ -238,7 +238,7 @@ void measure(const PhantomArguments& arguments, Console& console) {
   forget_files(out, {"calibrator.json", "result.json", "report.html"});
   const phantom_calibration::PhantomResult result = measured(arguments, console);
   notify(result.warnings, console);
-  print_notes(result.notes, console);
+  notify_of_notes(result.notes, console);
   value_or_throw(phantom_calibration::write_phantom(result, out));
   if (result.failure) throw BadInput(*result.failure);
   if (console.json)
@@ -277,7 +277,7 @@ void verify(const PhantomArguments& arguments, Console& console) {
     value_or_throw(
         write_file(*arguments.out / "result.json", to_text(phantom_calibration::to_json(result)) + "\n"));
   notify(result.warnings, console);
-  if (console.json) print_notes(result.notes, console);
+  if (console.json) notify_of_notes(result.notes, console);
   if (console.json && !result.failure) console.out << to_text(phantom_calibration::to_json(result)) << "\n";
   if (!console.json && !console.quiet) print(result, console);
   if (result.failure) throw BadInput(*result.failure);
