@@ -18,7 +18,7 @@ std::string written(unsigned bits, bool from_top) {
   const unsigned row = (6 * bits + 31) / 32 * 4, palette = bits == 8 ? 1024 : 0, at = 54 + palette;
   std::string bytes = "BM" + little(at + 4 * row, 4) + little(0, 4) + little(at, 4) + little(40, 4) +
                       little(6, 4) + little(from_top ? 0xFFFFFFFC : 4, 4) + little(1, 2) + little(bits, 2) +
-                      little(0, 24);
+                      std::string(24, '\0');
   for (unsigned i = 0; i < palette / 4; ++i) bytes += little(0x010101u * i, 4);
   return bytes + std::string(std::size_t{4} * row, 'x');
 }

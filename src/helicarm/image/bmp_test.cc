@@ -28,7 +28,7 @@ std::string encoded_bmp(BmpKind kind) {
   std::string bytes = "BM" + number(pixels_at + 3 * row_bytes, 4) + number(0, 4) + number(pixels_at, 4) +
                       number(40, 4) + number(5, 4) + number(kind.from_top ? -3 : 3, 4) + number(1, 2) +
                       number(kind.bits, 2) + number(kind.compression, 4) + number(3 * row_bytes, 4) +
-                      number(0, 16);
+                      std::string(16, '\0');
   for (int i = 0; i < palette; ++i)
     bytes += number((i + kind.tint) & 0xFF, 1) + number(i, 1) + number(i, 1) + '\0';
   for (int row = 0; row < 3; ++row) {

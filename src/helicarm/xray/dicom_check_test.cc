@@ -184,7 +184,7 @@ TEST(DicomCheck, UnknownRepresentationInTheMetaGroup) {
   for (const char* vr : {"ZZ", "Q ", "\xff\xff"}) {
     std::string bytes = sound;
     bytes.replace(148, 2, vr);  // of the Transfer Syntax UID
-    EXPECT_EQ(reason(bytes), vr == std::string_view("ZZ") ? "bad_value" : "ok");
+    EXPECT_EQ(reason(bytes), "bad_value");
     // A long form of 4 GB.
     bytes = sound.substr(0, 144) + DicomBuilder::tag_bytes(0x00020001) + vr + std::string("\0\0", 2) +
             DicomBuilder::number(-2, 4) + sound.substr(144);
