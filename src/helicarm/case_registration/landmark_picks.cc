@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/centred_view.h"
+#include "helicarm/case_registration/plan.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/geometry/triangulation.h"
 
@@ -127,6 +128,7 @@ std::vector<registration::Landmark> picked_landmarks(const pipeline::CaseModel& 
                                                      const std::vector<RegistrationView>& views) {
   const std::filesystem::path& path = *asked.landmarks;
   std::string missing;
+  refuse_fcsv(path);
   const CsvTable table = value_or_throw(read_csv(path, {"name", "x_mm", "y_mm", "z_mm"}, {}));
   std::vector<PickedRays> picked;
   for (std::size_t row = 0; row < table.rows(); ++row) {

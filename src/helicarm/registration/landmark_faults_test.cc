@@ -83,9 +83,10 @@ TEST(LandmarkFaults, OneWrongLandmarkIsNotCertain) {
 }
 
 TEST(LandmarkFaults, PlacingErrorsAreNoFault) {
-  for (std::uint64_t trial = 0; trial < 300; ++trial)
-    if (const auto fault = fault_of(four_landmarks(1.2, 0.06, trial)))
-      EXPECT_FALSE(fault->is_certain) << fault->failure.message;
+  for (std::uint64_t trial = 0; trial < 300; ++trial) {
+    const auto fault = fault_of(four_landmarks(1.2, 0.06, trial));
+    EXPECT_FALSE(fault && fault->is_certain) << fault->failure.message;
+  }
   EXPECT_FALSE(fault_of(four_landmarks(0, 0)));
 }
 
