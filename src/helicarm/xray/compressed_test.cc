@@ -329,8 +329,8 @@ TEST_F(Compressed, FrameSplitOverFragments) {
   };
   const std::string one = frame('a'), two = frame('b') + '\0';
   const std::string padded = one + '\0';
-  const std::vector<std::string> pieces = {padded.substr(0, 70), padded.substr(70), two.substr(0, 30),
-                                           two.substr(30)};
+  const std::vector<std::string> pieces = {padded.substr(0, 70), padded.substr(70), two.substr(0, 66),
+                                           two.substr(66)};
   const int second = static_cast<int>(8 + pieces[0].size() + 8 + pieces[1].size());
   auto builder = DicomBuilder()
                      .syntax("1.2.840.10008.1.2.5")
