@@ -24,7 +24,10 @@ TEST(FrameRange, RefusesWhatIsNoRange) {
 
 pipeline::RegistrationCase sequence_of(const char* image) {
   pipeline::RegistrationCase given;
-  given.base.views.push_back({"AP", std::filesystem::path("/case") / image, {}, {}, {}, {}, {}});
+  pipeline::CaseView view;
+  view.name = "AP";
+  view.image = std::filesystem::path("/case") / image;
+  given.base.views.push_back(view);
   return given;
 }
 

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
 #include "helicarm/core/files.h"
 #include "helicarm/core/parallel.h"
-#include "helicarm/pipeline/belong_together.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/intrinsics_prior.h"
+#include "helicarm/rectification/usable.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -135,6 +137,23 @@ ViewResult reported(const LabelledView& view) {
   return result;
 }
 
+Expected<void> check_images_belong_together(const std::vector<ReadView>& views) {
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const xray::Acquisition& a = views[j].xray_image->acquisition;
+      const xray::Acquisition& b = views[i].xray_image->acquisition;
+      if (!a.patient_key.empty() && !b.patient_key.empty() && a.patient_key != b.patient_key)
+        return fail(Reason::patient_mismatch, fmt::format("{} and {} are of different patients or studies",
+                                                          views[j].name, views[i].name));
+      if (!a.instance_key.empty() && a.instance_key == b.instance_key)
+        return rectification::check_usable(*views[i].xray_image).and_then([&]() -> Expected<void> {
+          return fail(Reason::views_too_close,
+                      fmt::format("{} and {} are the same image", views[j].name, views[i].name));
+        });
+    }
+  return {};
+}
+
 OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions& options) {
   std::vector<NamedView> views;
   for (const CaseView& view : given.views) views.push_back({view.name});
@@ -145,9 +164,7 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
   });
   return joined<ReadView>(std::move(views), std::move(images))
       .and_then([](std::vector<ReadView> read) -> OrRefusal<std::vector<ReadView>> {
-        std::vector<const xray::XrayImage*> of_views;
-        for (const ReadView& view : read) of_views.push_back(view.xray_image.get());
-        const auto together = check_images_belong_together(of_views);
+        const auto together = check_images_belong_together(read);
         if (together) return read;
         Refusal refusal{together.error(), {}};
         for (const ReadView& view : read) refusal.views.push_back(reported(view));
