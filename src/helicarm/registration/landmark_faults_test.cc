@@ -68,10 +68,18 @@ TEST(LandmarkFaults, AMirrorImageIsNamed) {
 
 TEST(LandmarkFaults, AnotherUnitIsNamed) {
   auto landmarks = four_landmarks(0.05, 0.06);
-  for (Landmark& landmark : landmarks) landmark.in_model /= 10;
+  for (Landmark& landmark : landmarks) landmark.in_model *= 10;
   const auto fault = fault_of(landmarks);
   ASSERT_TRUE(fault && fault->is_certain);
-  EXPECT_THAT(fault->failure.message, HasSubstr("in cm"));
+  EXPECT_THAT(fault->failure.message, HasSubstr("in tenths of a mm"));
+}
+
+TEST(LandmarkFaults, CentimetresThatLeaveTheLandmarksNearALineAreAskedFor) {
+  auto landmarks = four_landmarks(0.05, 0.06);
+  for (Landmark& landmark : landmarks) landmark.in_model /= 10;
+  const auto found = register_landmarks(landmarks);
+  ASSERT_FALSE(found);
+  EXPECT_THAT(found.error().message, HasSubstr("in cm?"));
 }
 
 TEST(LandmarkFaults, OneWrongLandmarkIsNotCertain) {

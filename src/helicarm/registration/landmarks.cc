@@ -32,18 +32,26 @@ Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& l
     world_mean += landmark.in_world / n;
   }
   Matrix3d across = Matrix3d::Zero(), spread = Matrix3d::Zero();
+  double world_spread = 0;
   for (const Landmark& landmark : landmarks) {
     across += (landmark.in_world - world_mean) * (landmark.in_model - model_mean).transpose();
     spread += (landmark.in_model - model_mean) * (landmark.in_model - model_mean).transpose() / n;
+    world_spread += (landmark.in_world - world_mean).squaredNorm() / n;
   }
   const double aside =
       std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Matrix3d>(spread).eigenvalues()[1]));
-  if (aside < least_spread_mm)
+  if (aside < least_spread_mm) {
+    const double ratio = std::sqrt(world_spread / spread.trace());
     return fail(
         Reason::bad_value,
-        fmt::format("the landmarks lie within {:.2g} mm (rms) of a line, at least {:g} mm are required",
-                    aside, least_spread_mm),
+        fmt::format("the landmarks lie within {:.2g} mm (rms) of a line, at least {:g} mm are required{}",
+                    aside, least_spread_mm,
+                    ratio > 5 ? fmt::format("; their picks are {:.0f} times as far apart: is the file in {}? "
+                                            "It must be in mm",
+                                            ratio, ratio > 100 ? "m" : "cm")
+                              : ""),
         {{"spread_mm", aside}, {"limit_mm", least_spread_mm}});
+  }
   LandmarkRegistration result;
   result.world_from_model.rotation = geometry::nearest_rotation(across);
   result.world_from_model.translation = world_mean - result.world_from_model.rotation * model_mean;
