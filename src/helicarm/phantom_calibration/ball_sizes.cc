@@ -44,32 +44,6 @@ std::pair<Sizes, double> assigned(const std::vector<double>& seen, const std::ve
   return {sizes, chi2};
 }
 
-/// Further balls of any size that three views or more, and half of them, show alike: their diameters at the
-/// fit's scale. Candidates that the measured balls explain are not counted.
-std::vector<double> further_balls(const AdjustedViews& found,
-                                  const std::vector<pipeline::DetectedView>& detected,
-                                  const std::vector<double>& seen) {
-  constexpr double widest = 3, next_size = 1.2;
-  constexpr double gate_px = 6;
-  const auto [least, most] = std::ranges::minmax(seen);
-  Reconstruction r;
-  r.centres = found.consistent.fit.centres;
-  r.diameters_mm = seen;
-  std::vector<PhantomView> views;
-  for (std::size_t v = 0; v < found.view_of_case.size(); ++v) {
-    const PreparedView wide =
-        prepared(detected[found.view_of_case[v]], {least / widest, most * widest}, std::nullopt);
-    views.push_back(wide.view);
-    r.views.emplace_back(found.consistent.fit.views[v]);
-    r.candidate_of.push_back(
-        assign(wide.view, *r.views.back(), r.centres, r.diameters_mm, limit_scale(wide.view) * gate_px));
-  }
-  std::vector<double> sizes;
-  for (double d = least / widest; d < most * widest; d *= next_size) sizes.push_back(d);
-  add_fiducials(r, views, sizes);
-  return {r.diameters_mm.begin() + std::ptrdiff_t(seen.size()), r.diameters_mm.end()};
-}
-
 std::vector<double> sorted_once(std::vector<double> values) {
   std::ranges::sort(values);
   values.erase(std::unique(values.begin(), values.end()), values.end());
@@ -167,24 +141,6 @@ Expected<void> settle_sizes(AdjustedViews& found, const std::vector<pipeline::De
                        found.labels[i], scale * seen[i], numbers(listed)),
            {},
            {{"seen_mm", scale * seen[i]}, {"taken_as_mm", found.diameters_mm[i]}}});
-  std::vector<double> further = further_balls(found, detected, seen);
-  if (further.empty()) return {};
-  for (double& mm : further) mm *= scale;
-  Failure unlisted{
-      Reason::not_seen,
-      fmt::format("{} further balls are seen that have no listed size (\"diameters_mm\": {} mm), of "
-                  "about {:.1f} mm if the others have theirs: list all sizes of the balls",
-                  further.size(), numbers(listed), fmt::join(further, ", ")),
-      {},
-      {{"further_balls", double(further.size())}, {"measured_balls", double(seen.size())}}};
-  if (3 * further.size() >= seen.size() && !factor_by_hand) {
-    unlisted.reason = Reason::uncertain;
-    unlisted.message +=
-        ", or give a distance measured by hand: which balls have the listed size, and with it "
-        "the scale, is not known";
-    return tl::unexpected<Failure>(std::move(unlisted));
-  }
-  warnings.push_back(std::move(unlisted));
   return {};
 }
 

@@ -19,9 +19,8 @@ std::vector<Sizes> possible_sizes(const std::vector<double>& seen, const std::ve
 
 /// Compares the balls of a phantom measured from scratch with the sizes that the case lists. Several ways to
 /// assign them give different scales: `factor_by_hand` (that of hand-measured distances) decides, or the
-/// source distance, or the measurement is refused (`uncertain`). Refused, too, where many further balls of a
-/// size that is not listed are seen. Warns of listed sizes without a ball (`not_seen`) and of few further
-/// balls.
+/// source distance, or the measurement is refused (`uncertain`). Warns of listed sizes without a ball
+/// (`not_seen`).
 Expected<void> settle_sizes(AdjustedViews& found, const std::vector<pipeline::DetectedView>& detected,
                             const pipeline::Case& given, std::optional<double> factor_by_hand,
                             std::vector<Warning>& warnings);
