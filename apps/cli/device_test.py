@@ -99,6 +99,9 @@ class Tracker(unittest.TestCase):
         self.assertEqual(exchanged.returncode, 3)
         self.assertIn("residual_too_large", exchanged.stderr)
         self.assertIn("exchanged", exchanged.stderr)
+        few = run(*common, *touches[:4])
+        self.assertEqual(few.returncode, 3)
+        self.assertIn("poses_too_alike", few.stderr)
 
     def test_tip_without_covariance_is_not_taken_as_exact(self):
         divots = {"D1": (60, 0, 0), "D2": (0, 45, 0), "D3": (-40, -20, 50), "D4": (0, 5, 80)}
@@ -120,9 +123,6 @@ class Tracker(unittest.TestCase):
         self.assertEqual(run(*words).returncode, 0)
         both = run(*words, "--tip-sigma", "0.4")
         self.assertEqual((both.returncode, "omit one" in both.stderr), (2, True), both.stderr)
-        few = run(*common, *touches[:4])
-        self.assertEqual(few.returncode, 3)
-        self.assertIn("poses_too_alike", few.stderr)
 
     def test_missing_or_invalid_arguments_are_named(self):
         for words, said in ((("tracker", "pivot", self.file, "--tool", "Pointer"), "which holds ToolToTracker"),

@@ -102,7 +102,7 @@ class EarlierResults(SimulatedCase):
     def test_calibrate_mount_that_is_refused_leaves_no_mount(self):
         out = self.root / "mount.json"
         out.write_text("{}")
-        done = run("calibrate-mount", "--facet", "front", "--recorded", "A1=nowhere.mha", "--tip", self.root / "none.json",
+        done = run("tracker", "calibrate-mount", "--facet", "front", "--recorded", "A1=nowhere.mha", "--tip", self.root / "none.json",
                    "--out", out)
         self.assertEqual(done.returncode, 2, done.stderr)
         self.assertFalse(out.exists())

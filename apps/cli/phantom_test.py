@@ -41,7 +41,7 @@ class Phantom(SimulatedCase):
         states = {ball["label"]: ball["state"] for ball in verified["balls"]}
         self.assertEqual([label for label, state in states.items() if state != "as in the file"], ["P5"])
         done = run("phantom", "measure", folder / "nominal-case.json", "--out", folder / "measured", "--distance",
-                   "P1,P3=110.55", "--json")
+                   "P1,P3=113.12", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
         result = json.loads(done.stdout)
         self.assertEqual((len(result["balls"]), result["scale"]["source"]), (12, "distances"))

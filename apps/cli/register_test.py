@@ -80,7 +80,7 @@ class Register(SimulatedCase):
         self.assertEqual(len(covariances), 4)
         exported = run("export", folder, "--out", self.root / "exported", "--as", "csv,slicer")
         self.assertEqual(exported.returncode, 0, exported.stderr)
-        self.assertIn("\ns,plan,calibrator,", (self.root / "exported/points.csv").read_text())
+        self.assertIn("\nplanned_start,plan,calibrator,", (self.root / "exported/points.csv").read_text())
         self.assertIn("tunnel planned", (self.root / "exported/points.mrk.json").read_text())
         for command in ("run", "register", "export"):
             done = run(command, folder, "--out", self.root / "limited", "--max-error", 0.02)
