@@ -13,9 +13,11 @@ namespace helicarm::cli {
 /// What a reader says of an image, each on a line of the progress stream.
 inline void print_warnings(const std::vector<Warning>& warnings, Console& console) {
   if (console.quiet) return;
-  for (const Warning& warning : warnings)
-    console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,
-                                    warning.view.empty() ? "" : ": ", warning.message);
+  for (const Warning& warning : warnings) {
+    const bool named = warning.view.empty() || warning.message.starts_with(warning.view);
+    console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason),
+                                    named ? "" : warning.view, named ? "" : ": ", warning.message);
+  }
 }
 
 /// The same for --json, with the keys of result.json.
