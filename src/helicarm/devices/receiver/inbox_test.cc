@@ -68,7 +68,7 @@ TEST_F(InboxOnDisk, OtherBytesUnderOneUidAreBothKeptWithAWarning) {
 TEST_F(InboxOnDisk, UnreadableImageIsRefusedAndLeavesNothing) {
   EXPECT_EQ(inbox_->store("hello", "test").error().reason, Reason::not_an_image);
   EXPECT_FALSE(inbox_->store(xray::DicomBuilder().word(0x00280010, 65535).bytes(), "test"));
-  EXPECT_FALSE(inbox_->store(xray::DicomBuilder().text(0x00181164, "DS", "0\\0").bytes(), "test"));
+  EXPECT_FALSE(inbox_->store(xray::DicomBuilder().text(0x00181164, "DS", "-1\\-1").bytes(), "test"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);  // only the lock file
 }
 
