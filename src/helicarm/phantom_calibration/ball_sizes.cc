@@ -15,6 +15,7 @@ namespace {
 
 constexpr double seen_sigma = 0.02;      // of a ball's diameter relative to the others'
 constexpr double largest_misfit = 0.08;  // logarithm of seen over listed diameter
+constexpr double most_misfits = 0.25;    // share of balls whose seen diameter another object disturbs
 constexpr double clearly_worse = 9;      // chi-square
 constexpr double same_scale = 0.03;      // alternatives within it are one
 
@@ -36,12 +37,13 @@ std::pair<Sizes, double> assigned(const std::vector<double>& seen, const std::ve
   }
   sizes.mm_per_unit = std::exp(median_log(ratios));
   double chi2 = 0;
+  std::size_t misfits = 0;
   for (const double ratio : ratios) {
-    const double off = std::log(ratio / sizes.mm_per_unit);
-    if (std::abs(off) > largest_misfit) return {sizes, 1e300};
-    chi2 += off * off / (seen_sigma * seen_sigma);
+    const double off = std::abs(std::log(ratio / sizes.mm_per_unit));
+    misfits += off > largest_misfit;
+    chi2 += std::pow(std::min(off, largest_misfit) / seen_sigma, 2);
   }
-  return {sizes, chi2};
+  return {sizes, most_misfits * double(seen.size()) < double(misfits) ? 1e300 : chi2};
 }
 
 std::vector<double> sorted_once(std::vector<double> values) {

@@ -2,6 +2,7 @@
 #include "helicarm/virtual_devices/robot/virtual_ur_server.h"
 
 #include <algorithm>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -45,7 +46,8 @@ Expected<void> VirtualUr::Server::listen() {
   }
   if (!options_.lockstep) tick(std::chrono::steady_clock::now());
   thread_ = std::thread([this] {
-    const RealTime priority;
+    std::optional<RealTime> priority;
+    if (!options_.lockstep) priority.emplace();
     io_.run();
   });
   return {};
