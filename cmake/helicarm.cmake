@@ -71,11 +71,13 @@ function(helicarm_public target scope)
   target_compile_features(${target} ${scope} cxx_std_20)
 endfunction()
 
-# helicarm_module(NAME [APART] [TESTS_APART] [PRIVATE] SOURCES a.cc ... USES module ... LIBRARIES target ... TESTS a_test.cc ...)
+# helicarm_module(NAME [APART] [TESTS_APART] [PRIVATE] SOURCES a.cc ... USES module ... LIBRARIES target ... TESTS a_test.cc ...
+#                 TESTS_TOGETHER Suite ...)
 # A module's files are compiled as one unit, and its tests in groups; APART, TESTS_APART: file by file, as they use one
-# name for several things. PRIVATE: no part of the installed library.
+# name for several things. PRIVATE: no part of the installed library. TESTS_TOGETHER: suites that share what is dear to
+# make, each one test of ctest.
 function(helicarm_module name)
-  cmake_parse_arguments(ARG "APART;TESTS_APART;PRIVATE" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES" ${ARGN})
+  cmake_parse_arguments(ARG "APART;TESTS_APART;PRIVATE" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES;TESTS_TOGETHER" ${ARGN})
   list(TRANSFORM ARG_USES PREPEND helicarm_)
   list(TRANSFORM ARG_TEST_USES PREPEND helicarm_)
   if(ARG_SOURCES)
@@ -105,6 +107,11 @@ function(helicarm_module name)
     endif()
     # GCC 12 sees string literals overrun where std::string moves them (GCC bug 105329).
     target_compile_options(${name}_test PRIVATE -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow)
-    gtest_discover_tests(${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60)
+    list(TRANSFORM ARG_TESTS_TOGETHER APPEND ".*" OUTPUT_VARIABLE together)
+    list(JOIN together ":" together)
+    gtest_discover_tests(${name}_test TEST_PREFIX ${name}. TEST_FILTER "-${together}" DISCOVERY_TIMEOUT 60)
+    foreach(suite IN LISTS ARG_TESTS_TOGETHER)
+      add_test(NAME ${name}.${suite} COMMAND ${name}_test --gtest_filter=${suite}.*)
+    endforeach()
   endif()
 endfunction()
