@@ -15,6 +15,7 @@ namespace {
 
 constexpr double seen_sigma = 0.02;      // of a ball's diameter relative to the others'
 constexpr double largest_misfit = 0.08;  // logarithm of seen over listed diameter
+constexpr double another_size = 0.18;    // likewise, of a single ball: 4 mm against 4.8 mm
 constexpr double most_misfits = 0.25;    // share of balls whose seen diameter another object disturbs
 constexpr double clearly_worse = 9;      // chi-square
 constexpr double same_scale = 0.03;      // alternatives within it are one
@@ -136,7 +137,7 @@ Expected<void> settle_sizes(AdjustedViews& found, const std::vector<pipeline::De
            {{"diameter_mm", mm}}});
   const double scale = diameter_scale(found).factor;
   for (std::size_t i = 0; i < seen.size(); ++i)
-    if (std::abs(std::log(scale * seen[i] / found.diameters_mm[i])) > largest_misfit)
+    if (std::abs(std::log(scale * seen[i] / found.diameters_mm[i])) > another_size)
       warnings.push_back(
           {Reason::scale_disagrees,
            fmt::format("{} appears {:.2f} mm large, but \"diameters_mm\" lists {} mm: list all sizes",
