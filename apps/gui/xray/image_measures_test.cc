@@ -63,7 +63,7 @@ TEST(EvaluatedMeasure, QuadrantsGiveThePicksOfTheFemurOnly) {
   std::vector<std::string> points;
   for (const auto& [at, words] : done.positions) points.push_back(words.section(':', 0, 0).toStdString());
   EXPECT_THAT(points, testing::ElementsAre("FS", "FE"));
-  EXPECT_EQ(done.lines.size(), 2u + 2 * 2);
+  EXPECT_EQ(done.lines.size(), 2u + 2 * 2 + 2);  // both lie outside, and a line says so
   EXPECT_EQ(done.strokes.size(), 10u);
 }
 

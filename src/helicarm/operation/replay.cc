@@ -42,7 +42,7 @@ class Replay {
     if (record.kind == "case") images(record, origin);
     if (record.kind == "end") end(record);
     if (record.kind == "result") result(record, origin);
-    if (record.kind == "preview") compare_files(record, "", origin);
+    if (record.kind == "preview") list_files(record, "", origin);
     if (record.kind == "hand_eye") ++report.hand_eyes;
     if (record.kind == "guide") guide(record, origin);
     if (record.kind == "guided") guided(record, origin);
@@ -64,9 +64,27 @@ class Replay {
     }
   }
 
+  /// The listed files by their digests; after the last record.
+  void compare_files() {
+    for (const auto& [file, listed] : files_) {
+      ++report.files;
+      const auto path = path_inside(session_, file);
+      const auto bytes = path ? read_file(*path, most_image_bytes) : tl::unexpected<Failure>(path.error());
+      if (!bytes)
+        differ(listed.origin, fmt::format("{} is missing or cannot be read", file));
+      else if (xray::digest(*bytes) != listed.digest)
+        differ(listed.origin, fmt::format("{} was changed", file));
+    }
+  }
+
   ReplayReport report;
 
  private:
+  struct ListedFile {
+    Json digest;
+    std::string origin;
+  };
+
   void differ(const std::string& origin, const std::string& how) {
     report.differences.push_back(origin + ": " + how);
   }
@@ -115,19 +133,12 @@ class Replay {
     report.ended_by = record.content.value("why", "");
   }
 
-  /// The files that a record lists, in this folder of the session, by their digests.
-  void compare_files(const session::SessionRecord& record, const std::string& folder,
-                     const std::string& origin) {
+  /// The files that a record lists, in this folder of the session; a later preview replaces an earlier one's.
+  void list_files(const session::SessionRecord& record, const std::string& folder,
+                  const std::string& origin) {
     if (!record.content.contains("files")) return differ(origin, "the digests of its files are missing");
-    for (const auto& [name, digest] : record.content.at("files").items()) {
-      ++report.files;
-      const std::string file = folder.empty() ? name : folder + "/" + name;
-      const auto bytes = read_file(value_or_throw(path_inside(session_, file)), most_image_bytes);
-      if (!bytes)
-        differ(origin, fmt::format("{} is missing or cannot be read", file));
-      else if (xray::digest(*bytes) != digest)
-        differ(origin, fmt::format("{} was changed", file));
-    }
+    for (const auto& [name, digest] : record.content.at("files").items())
+      files_.insert_or_assign(folder.empty() ? name : folder + "/" + name, ListedFile{digest, origin});
   }
 
   void touched(const session::SessionRecord& record, const std::string& origin) {
@@ -142,7 +153,7 @@ class Replay {
   /// The case must equal the recorded one, which holds the accepted images with their poses.
   void images(const session::SessionRecord& record, const std::string& origin) {
     const std::string folder = record.content.at("folder").get<std::string>();
-    compare_files(record, folder, origin);
+    list_files(record, folder, origin);
     const Json& recorded = record.content.at("case");
     const std::string name = folder + "/case.json";
     if (const auto now = read_json(value_or_throw(path_inside(session_, name))); now && *now != recorded)
@@ -192,7 +203,7 @@ class Replay {
   void result(const session::SessionRecord& record, const std::string& origin) {
     ++report.results;
     const std::string folder = record.content.at("folder").get<std::string>();
-    compare_files(record, folder, origin);
+    list_files(record, folder, origin);
     const std::filesystem::path inside = value_or_throw(path_inside(session_, folder));
     const auto run = recompute_case(inside, plan_, cache_);
     if (!run) return differ(origin, run.error().message);
@@ -228,6 +239,7 @@ class Replay {
     compare(record.content.at("guidance"), to_json(guide_->at(window)), origin, "decision");
   }
 
+  std::map<std::string, ListedFile> files_;
   std::filesystem::path session_;
   OperationPlan plan_;
   std::optional<pipeline::Result> result_;  ///< of the last measurement
@@ -256,6 +268,7 @@ Expected<ReplayReport> replay(const std::filesystem::path& session, const GoOn& 
                        fmt::format("{}: stopped at record {}", session.string(), record.number));
       replay.take_whole(record);
     }
+    replay.compare_files();
     return replay.report;
   });
 }

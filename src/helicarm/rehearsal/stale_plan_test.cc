@@ -169,7 +169,7 @@ TEST_F(StalePlan, StaleOrderDoesNotMoveTheRobotThoughConfirmed) {
   operation_.reset();
   const auto replayed = operation::replay(folder_.path() / "session");
   ASSERT_TRUE(replayed) << replayed.error().message;
-  EXPECT_TRUE(replayed->differences.empty());
+  EXPECT_THAT(replayed->differences, testing::IsEmpty());
 }
 
 TEST_F(StalePlan, NothingMovesWithoutTheRecord) {
