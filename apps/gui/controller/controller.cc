@@ -189,6 +189,7 @@ void Controller::export_to(const fs::path& folder) {
         [this, result = std::move(result), registration = state_.registration, folder]() -> Change {
           const pipeline::Result whole =
               registration ? case_registration::with_models(result, *registration) : result;
+          report::forget_exports(folder);
           value_or_throw(report::write_report(whole, folder));
           value_or_throw(write_pdf_report(whole, folder / "report.pdf"));
           if (!whole.failure) value_or_throw(report::write_exports(whole, folder));
