@@ -103,7 +103,7 @@ function(helicarm_module name)
     target_link_libraries(${name}_test PRIVATE helicarm_${name} ${ARG_TEST_USES} GTest::gmock GTest::gtest_main)
     target_precompile_headers(${name}_test REUSE_FROM helicarm_precompiled_tests)
     if(HELICARM_UNITY AND NOT ARG_TESTS_APART)
-      set_target_properties(${name}_test PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+      set_target_properties(${name}_test PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
     endif()
     # GCC 12 sees string literals overrun where std::string moves them (GCC bug 105329).
     target_compile_options(${name}_test PRIVATE -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow)

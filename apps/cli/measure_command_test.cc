@@ -20,7 +20,7 @@ using testing::HasSubstr;
 const geometry::View lateral{{6000, 6000, 512, 500, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}};
 
 /// One view, the located point FS, and two fiducials about the calibrator's origin.
-Json result_json() {
+Json measured_result_json() {
   Json view{{"name", "LAT"}};
   view["rectification"] = {{"map", rectification::to_json(rectification::identity_map(1024, 1024, 0.2))}};
   view["projection"] = geometry::json_rows(lateral.projection());
@@ -41,16 +41,16 @@ Json result_json() {
            {point, seen, missed, {{"name", "lost"}, {"xyz_mm", nullptr}, {"covariance_mm2", nullptr}}}}};
 }
 
-struct Answer {
+struct Measured {
   CommandResult result;
   std::string text;
   Json measures() const { return (*parse_json(text, "out"))["measures"]; }
 };
 
-Answer measured(const std::string& rows, MeasureArguments arguments = {}, bool calibrated = true,
-                bool as_json = true) {
+Measured measured(const std::string& rows, MeasureArguments arguments = {}, bool calibrated = true,
+                  bool as_json = true) {
   const fs::path folder = fs::temp_directory_path() / fmt::format("helicarm_measure_{}", ::getpid());
-  EXPECT_TRUE(write_file(folder / "result.json", result_json().dump()));
+  EXPECT_TRUE(write_file(folder / "result.json", measured_result_json().dump()));
   EXPECT_TRUE(write_file(folder / "clicks.csv", "measure,kind,view,name,u_px,v_px,sigma_px\n" + rows));
   arguments.clicks = folder / "clicks.csv";
   if (calibrated) arguments.calibration = folder / "result.json";
@@ -133,7 +133,7 @@ TEST(MeasureCommand, WarningsOfALocatedPointStandWithTheMeasure) {
 TEST(MeasureCommand, PlaneBehindTheReceiverIsRefused) {
   MeasureArguments arguments;
   arguments.depth_mm = 1201;  // 6000 px of 0.2 mm
-  const Answer behind = measured(distance, arguments);
+  const Measured behind = measured(distance, arguments);
   ASSERT_FALSE(behind.result);
   EXPECT_THAT(behind.result.error().message, HasSubstr("1200 mm from the source"));
 }
@@ -163,7 +163,7 @@ TEST(MeasureCommand, TableNamesPlaneAndSigma) {
 
 TEST(MeasureCommand, RefusalsNameTheRow) {
   const auto refusal = [](const std::string& rows, bool calibrated = true) {
-    const Answer answer = measured(rows, {}, calibrated);
+    const Measured answer = measured(rows, {}, calibrated);
     return answer.result ? "accepted" : answer.result.error().message;
   };
   EXPECT_THAT(refusal("d,length,LAT,from,1,2,\n"), HasSubstr("row 1: kind: \"length\""));

@@ -32,12 +32,12 @@ std::string table_of(int n, bool flat, const std::string& sigma = "") {
   return text;
 }
 
-struct Answer {
+struct Solved {
   CommandResult result;
   std::string text;
 };
 
-Answer solve_text(const std::string& table, const std::string& method, bool json = true) {
+Solved solve_text(const std::string& table, const std::string& method, bool json = true) {
   const fs::path path = fs::temp_directory_path() / fmt::format("helicarm_solve_{}.csv", ::getpid());
   EXPECT_TRUE(write_file(path, table));
   std::ostringstream out, progress;
@@ -50,7 +50,7 @@ Answer solve_text(const std::string& table, const std::string& method, bool json
 
 TEST(SolveCommand, EveryMethodRecoversTheMirroredView) {
   for (const char* method : {"dlt", "homogeneous", "ml"}) {
-    const Answer answer = solve_text(table_of(12, false), method);
+    const Solved answer = solve_text(table_of(12, false), method);
     ASSERT_TRUE(answer.result.has_value()) << answer.result.error().message;
     const Json json = *parse_json(answer.text, "out");
     EXPECT_NEAR(json["intrinsics"]["fx_px"].get<double>(), -6000, 1e-4) << method;
@@ -72,7 +72,7 @@ TEST(SolveCommand, NegativeFxIsWarnedOf) {
 }
 
 TEST(SolveCommand, TableContainsEveryPoint) {
-  const Answer answer = solve_text(table_of(8, false, "0.2"), "ml", false);
+  const Solved answer = solve_text(table_of(8, false, "0.2"), "ml", false);
   ASSERT_TRUE(answer.result.has_value());
   EXPECT_NE(answer.text.find("P7"), std::string::npos);
   EXPECT_NE(answer.text.find("+-"), std::string::npos);

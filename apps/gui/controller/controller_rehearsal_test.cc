@@ -12,7 +12,7 @@
 namespace helicarm::gui {
 namespace {
 
-constexpr int patience_ms = 600000;  // for a sanitized program on a busy machine
+constexpr int rehearsal_patience_ms = 600000;  // for a sanitized program on a busy machine
 constexpr int most_attempts = 10;
 
 class ControllerRehearsal : public testing::Test {
@@ -30,7 +30,7 @@ class ControllerRehearsal : public testing::Test {
   bool wait(const char* what, const Done& done) {
     QElapsedTimer since;
     since.start();
-    while (!done() && since.elapsed() < patience_ms) {
+    while (!done() && since.elapsed() < rehearsal_patience_ms) {
       QCoreApplication::processEvents();
       static_cast<void>(controller_->live());
       QThread::msleep(10);

@@ -9,7 +9,7 @@
 namespace helicarm::gui {
 namespace {
 
-QString tr(const char* text) { return QCoreApplication::translate("Live", text); }
+QString live_tr(const char* text) { return QCoreApplication::translate("Live", text); }
 
 std::optional<double> least_age(const std::vector<tracker::ToolState>& tools,
                                 const std::vector<std::string>& names) {
@@ -21,10 +21,10 @@ std::optional<double> least_age(const std::vector<tracker::ToolState>& tools,
 }
 
 StatusIndicator marker_indicator(const QString& name, const std::optional<double>& age_s) {
-  if (!age_s) return {name, Light::off, age_text(age_s), tr("no pose from the tracker yet")};
+  if (!age_s) return {name, Light::off, age_text(age_s), live_tr("no pose from the tracker yet")};
   if (*age_s <= fresh_s) return {name, Light::green, age_text(age_s), {}};
   return {name, *age_s <= late_s ? Light::amber : Light::red, age_text(age_s),
-          tr("not visible, or tracker disconnected: a pose of this age is not used for motion")};
+          live_tr("not visible, or tracker disconnected: a pose of this age is not used for motion")};
 }
 
 QString words(std::string_view text) { return QString::fromUtf8(text.data(), qsizetype(text.size())); }
@@ -32,22 +32,23 @@ QString words(std::string_view text) { return QString::fromUtf8(text.data(), qsi
 }  // namespace
 
 QString age_text(const std::optional<double>& age_s) {
-  if (!age_s) return tr("not visible");
-  return *age_s < 1 ? tr("%1 ms").arg(*age_s * 1000, 0, 'f', 0) : tr("%1 s").arg(*age_s, 0, 'f', 1);
+  if (!age_s) return live_tr("not visible");
+  return *age_s < 1 ? live_tr("%1 ms").arg(*age_s * 1000, 0, 'f', 0) : live_tr("%1 s").arg(*age_s, 0, 'f', 1);
 }
 
 std::vector<StatusIndicator> tracker_indicators(const operation::TrackerPlan& plan,
                                                 const std::vector<tracker::ToolState>& tools) {
   std::vector<std::string> facets;
   for (const tracker::Facet& facet : plan.facets) facets.push_back(facet.name);
-  return {marker_indicator(tr("calibrator"), least_age(tools, facets)),
-          marker_indicator(tr("femur"), least_age(tools, {plan.femur})),
-          marker_indicator(tr("tibia"), least_age(tools, {plan.tibia})),
-          marker_indicator(tr("tool"), least_age(tools, {plan.tool}))};
+  return {marker_indicator(live_tr("calibrator"), least_age(tools, facets)),
+          marker_indicator(live_tr("femur"), least_age(tools, {plan.femur})),
+          marker_indicator(live_tr("tibia"), least_age(tools, {plan.tibia})),
+          marker_indicator(live_tr("tool"), least_age(tools, {plan.tool}))};
 }
 
 StatusIndicator robot_indicator(const robot::RobotLinkStatus& status) {
-  StatusIndicator indicator{tr("robot"), Light::off, {}, status.why ? sentence_of(*status.why) : QString()};
+  StatusIndicator indicator{
+      live_tr("robot"), Light::off, {}, status.why ? sentence_of(*status.why) : QString()};
   const QString age = age_text(status.state ? std::optional(status.age_s) : std::nullopt);
   switch (status.phase) {
     case robot::LinkPhase::disconnected:
@@ -64,25 +65,26 @@ StatusIndicator robot_indicator(const robot::RobotLinkStatus& status) {
       break;
   }
   const QString phase =
-      status.phase == robot::LinkPhase::idle ? tr("locked") : words(robot::name(status.phase));
-  indicator.text = status.phase == robot::LinkPhase::disconnected ? phase : tr("%1, %2").arg(phase, age);
-  if (status.phase == robot::LinkPhase::idle) indicator.why = tr("locked until a person unlocks it");
+      status.phase == robot::LinkPhase::idle ? live_tr("locked") : words(robot::name(status.phase));
+  indicator.text = status.phase == robot::LinkPhase::disconnected ? phase : live_tr("%1, %2").arg(phase, age);
+  if (status.phase == robot::LinkPhase::idle) indicator.why = live_tr("locked until a person unlocks it");
   return indicator;
 }
 
 StatusIndicator c_arm_indicator(const operation::CArmStatus& status, double now_s) {
-  StatusIndicator indicator{tr("C-arm"), Light::off, tr("no image yet"),
-                            tr("the C-arm connects when it has an image to send")};
+  StatusIndicator indicator{live_tr("C-arm"), Light::off, live_tr("no image yet"),
+                            live_tr("the C-arm connects when it has an image to send")};
   if (status.last_image_s)
-    indicator = {indicator.name, Light::green, tr("%1 ago").arg(age_text(now_s - *status.last_image_s)), {}};
+    indicator = {
+        indicator.name, Light::green, live_tr("%1 ago").arg(age_text(now_s - *status.last_image_s)), {}};
   if (status.broke_off) {
     indicator.light = Light::red;
-    indicator.text = tr("disconnected");
-    indicator.why = tr("a connection was lost or rejected before an image was sent");
+    indicator.text = live_tr("disconnected");
+    indicator.why = live_tr("a connection was lost or rejected before an image was sent");
   }
   if (status.refused) {
     indicator.light = Light::red;
-    indicator.text = tr("refused");
+    indicator.text = live_tr("refused");
     indicator.why = sentence_of(*status.refused);
   }
   return indicator;

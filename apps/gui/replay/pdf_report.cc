@@ -13,28 +13,28 @@
 namespace helicarm::gui {
 namespace {
 
-struct Words {
+struct ReportWords {
   Q_DECLARE_TR_FUNCTIONS(PdfReport)
 };
 
 QString text_of(const std::string& text) { return QString::fromStdString(text); }
 
 void draw_summary(const pipeline::Result& result, PdfLayout& layout) {
-  layout.title(Words::tr("helicarm report"));
-  layout.paragraph(Words::tr("Research instrument, not a medical device."), PdfLayout::Tone::bad);
+  layout.title(ReportWords::tr("helicarm report"));
+  layout.paragraph(ReportWords::tr("Research instrument, not a medical device."), PdfLayout::Tone::bad);
   if (result.failure)
-    layout.paragraph(Words::tr("Refused: %1").arg(text_of(report::message_of(*result.failure))),
+    layout.paragraph(ReportWords::tr("Refused: %1").arg(text_of(report::message_of(*result.failure))),
                      PdfLayout::Tone::bad);
   else
-    layout.paragraph(Words::tr("Measured."), PdfLayout::Tone::good);
+    layout.paragraph(ReportWords::tr("Measured."), PdfLayout::Tone::good);
   std::vector<LayoutCard> cards;
   for (const report::KeyFigure& figure : report::key_figures(result))
     cards.push_back({text_of(figure.value), text_of(figure.unit), text_of(figure.what)});
   layout.cards(cards);
-  if (!result.warnings.empty()) layout.heading(Words::tr("Warnings"));
+  if (!result.warnings.empty()) layout.heading(ReportWords::tr("Warnings"));
   for (const Warning& warning : result.warnings)
     layout.paragraph("• " + text_of(report::message_of(warning)));
-  if (!result.notes.empty()) layout.heading(Words::tr("Notes: limitations of these data"));
+  if (!result.notes.empty()) layout.heading(ReportWords::tr("Notes: limitations of these data"));
   for (const Warning& note : result.notes) layout.paragraph("• " + text_of(report::message_of(note)));
 }
 
@@ -46,17 +46,18 @@ void draw_views(const pipeline::Result& result, PdfLayout& layout) {
     if (figure.empty()) continue;
     QString caption = text_of(view.name);
     if (view.calibrated)
-      caption +=
-          Words::tr(": reprojection error %1 px rms").arg(view.calibrated->reprojection_rms_px, 0, 'f', 3);
-    if (view.found && view.found->mirrored) caption += Words::tr(", stored mirrored");
+      caption += ReportWords::tr(": reprojection error %1 px rms")
+                     .arg(view.calibrated->reprojection_rms_px, 0, 'f', 3);
+    if (view.found && view.found->mirrored) caption += ReportWords::tr(", stored mirrored");
     figures.push_back({print_svg(figure), caption});
   }
   if (figures.empty()) return;
-  layout.heading(Words::tr("Rectified X-ray images"));
+  layout.heading(ReportWords::tr("Rectified X-ray images"));
   layout.figures(figures);
   layout.paragraph(
-      Words::tr("Green: used fiducials, with their residuals as orange arrows. Red crosses: outliers. Blue: "
-                "plate. Violet: points. Yellow: planned tunnels. Red lines: tool."),
+      ReportWords::tr(
+          "Green: used fiducials, with their residuals as orange arrows. Red crosses: outliers. Blue: "
+          "plate. Violet: points. Yellow: planned tunnels. Red lines: tool."),
       PdfLayout::Tone::soft);
 }
 
@@ -73,9 +74,9 @@ void draw_distortion(const pipeline::Result& result, PdfLayout& layout) {
     if (const std::string figure = report::distortion_figure(view); !figure.empty())
       figures.push_back(
           {print_svg(figure, true),
-           Words::tr("%1: displacement from rectified to raw position").arg(text_of(view.name))});
+           ReportWords::tr("%1: displacement from rectified to raw position").arg(text_of(view.name))});
   if (figures.empty()) return;
-  layout.heading(Words::tr("Distortion"));
+  layout.heading(ReportWords::tr("Distortion"));
   layout.figures(figures);
 }
 
@@ -90,11 +91,12 @@ Expected<void> write_pdf_report(const pipeline::Result& result, const std::files
     writer.setPageSize(QPageSize(QPageSize::A4));
     writer.setPageMargins(QMarginsF(18, 16, 18, 12), QPageLayout::Millimeter);
     writer.setResolution(300);
-    writer.setTitle(Words::tr("helicarm report"));
+    writer.setTitle(ReportWords::tr("helicarm report"));
     writer.setCreator("helicarm " HELICARM_VERSION);
     const QString method = result.options.method == rectification::Method::paper ? "paper" : "best";
-    PdfLayout layout(writer, Words::tr("helicarm %1, method %2 · research instrument, not a medical device")
-                                 .arg(HELICARM_VERSION, method));
+    PdfLayout layout(writer,
+                     ReportWords::tr("helicarm %1, method %2 · research instrument, not a medical device")
+                         .arg(HELICARM_VERSION, method));
     draw_summary(result, layout);
     draw_views(result, layout);
     draw_tables(result, layout);

@@ -15,7 +15,7 @@
 namespace helicarm::gui {
 namespace {
 
-struct Words {
+struct TimelineWords {
   Q_DECLARE_TR_FUNCTIONS(Timeline)
 };
 
@@ -29,20 +29,20 @@ QString count_of(const Json& list) { return QString::number(list.size()); }
 
 QString exposure_summary(const Json& content) {
   const QString view = text_of(content, "view");
-  return content.at("poses").is_null() ? Words::tr("Acquisition %1, without poses").arg(view)
-                                       : Words::tr("Acquisition %1").arg(view);
+  return content.at("poses").is_null() ? TimelineWords::tr("Acquisition %1, without poses").arg(view)
+                                       : TimelineWords::tr("Acquisition %1").arg(view);
 }
 
 QString loop_summary(const Json& content) {
   const Json& loop = content.at("loop");
   const QString tunnel = text_of(content, "tunnel");
-  if (loop.empty()) return Words::tr("Tool at %1").arg(tunnel);
-  return Words::tr("Tool at %1: error %2 mm, measurements: %3")
+  if (loop.empty()) return TimelineWords::tr("Tool at %1").arg(tunnel);
+  return TimelineWords::tr("Tool at %1: error %2 mm, measurements: %3")
       .arg(tunnel, millimetres(loop.back().at("distance_mm")), count_of(loop));
 }
 
 QString outcome_summary(const Json& content) {
-  return Words::tr("Check of %1: start %2 mm, end %3 mm from the tool's axis")
+  return TimelineWords::tr("Check of %1: start %2 mm, end %3 mm from the tool's axis")
       .arg(text_of(content, "tunnel"), millimetres(content.at("start").at("distance_mm")),
            millimetres(content.at("end").at("distance_mm")));
 }
@@ -51,32 +51,36 @@ QString poses_summary(const Json& content) {
   QStringList seen;
   for (const auto& [tool, samples] : content.at("window").at("tools").items())
     if (!samples.empty()) seen << QString::fromStdString(tool);
-  return Words::tr("Tracker poses (%1): %2")
-      .arg(text_of(content, "why"), seen.isEmpty() ? Words::tr("none visible") : seen.join(", "));
+  return TimelineWords::tr("Tracker poses (%1): %2")
+      .arg(text_of(content, "why"), seen.isEmpty() ? TimelineWords::tr("none visible") : seen.join(", "));
 }
 
 QString summary_of(const std::string& kind, const Json& content) {
-  if (kind == "session") return Words::tr("Record begins, helicarm %1").arg(text_of(content, "version"));
-  if (kind == "plan") return Words::tr("Plan, tunnels: %1").arg(count_of(content.at("tunnels")));
+  if (kind == "session")
+    return TimelineWords::tr("Record begins, helicarm %1").arg(text_of(content, "version"));
+  if (kind == "plan") return TimelineWords::tr("Plan, tunnels: %1").arg(count_of(content.at("tunnels")));
   if (kind == "exposure") return exposure_summary(content);
   if (kind == "refused")
-    return Words::tr("Image for %1 refused: %2").arg(text_of(content, "view"), text_of(content, "why"));
-  if (kind == "case") return Words::tr("Measurement %1 begins").arg(text_of(content, "folder"));
-  if (kind == "result") return Words::tr("Measurement %1 done").arg(text_of(content, "folder"));
+    return TimelineWords::tr("Image for %1 refused: %2")
+        .arg(text_of(content, "view"), text_of(content, "why"));
+  if (kind == "case") return TimelineWords::tr("Measurement %1 begins").arg(text_of(content, "folder"));
+  if (kind == "result") return TimelineWords::tr("Measurement %1 done").arg(text_of(content, "folder"));
   if (kind == "poses") return poses_summary(content);
   if (kind == "hand_eye")
-    return Words::tr("Robot registered, %1 mm rms, poses: %2")
+    return TimelineWords::tr("Robot registered, %1 mm rms, poses: %2")
         .arg(millimetres(content.at("found").at("rms_mm")), count_of(content.at("pairs")));
   if (kind == "order")
-    return Words::tr("Order %1, waypoints: %2")
+    return TimelineWords::tr("Order %1, waypoints: %2")
         .arg(text_of(content, "name"), count_of(content.at("waypoints")));
   if (kind == "confirmed")
-    return Words::tr("Order %1 confirmed by %2").arg(text_of(content, "order"), text_of(content, "by"));
+    return TimelineWords::tr("Order %1 confirmed by %2")
+        .arg(text_of(content, "order"), text_of(content, "by"));
   if (kind == "halted")
-    return Words::tr("Order %1 halted: %2").arg(text_of(content, "order"), text_of(content, "message"));
+    return TimelineWords::tr("Order %1 halted: %2")
+        .arg(text_of(content, "order"), text_of(content, "message"));
   if (kind == "navigated") return loop_summary(content);
   if (kind == "outcome") return outcome_summary(content);
-  if (kind == "end") return Words::tr("End of the operation");
+  if (kind == "end") return TimelineWords::tr("End of the operation");
   return QString::fromStdString(kind);
 }
 

@@ -17,6 +17,7 @@
 #include "gui/controller/steps.h"
 #include "gui/window/register_page.h"
 #include "gui/window/style.h"
+#include "gui/xray/text.h"
 #include "helicarm/geometry/epipolar.h"
 
 namespace helicarm::gui {
@@ -27,8 +28,6 @@ constexpr int live_ms = 20;
 constexpr unsigned scene_every = 4;
 /// Range about the calibrator's centre in which an end may lie along its ray.
 constexpr double epipolar_reach_mm = 150;
-
-QString text(const std::string& words) { return QString::fromStdString(words); }
 
 /// The first step that is not done; the plan is the last one of a case of files.
 Phase open_phase(const std::array<StepCard, phases.size()>& cards, const ApplicationState& state) {

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double tre_step_mm = 10;
 
-QString text(const fs::path& path) { return QString::fromStdString(path.string()); }
+QString path_text(const fs::path& path) { return QString::fromStdString(path.string()); }
 
 }  // namespace
 
@@ -132,7 +132,7 @@ void MainWindow::build_recent() {
   recent_menu_->clear();
   for (const Folder kind : {Folder::cases, Folder::sessions})
     for (const fs::path& folder : recent_folders(recent_, kind))
-      recent_menu_->addAction(text(folder), this, [this, folder] { leave_for({folder}); });
+      recent_menu_->addAction(path_text(folder), this, [this, folder] { leave_for({folder}); });
   recent_menu_->setEnabled(!recent_menu_->isEmpty());
 }
 

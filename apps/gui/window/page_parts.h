@@ -4,11 +4,10 @@
 #include <QTableWidget>
 #include <string>
 
+#include "gui/xray/text.h"
 #include "helicarm/report/table.h"
 
 namespace helicarm::gui {
-
-inline QString text(const std::string& words) { return QString::fromStdString(words); }
 
 /// Bad cells are red, numbers to the right.
 inline void fill(QTableWidget* table, const report::Table& content) {

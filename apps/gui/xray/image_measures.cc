@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gui/xray/text.h"
+
 namespace helicarm::gui {
 namespace {
 
@@ -12,12 +14,6 @@ using measures::Kind;
 
 /// Half of a 95 % interval of a normal distribution, in standard deviations.
 constexpr double sigmas_at_95 = 1.96;
-
-QString text(std::string_view words) {
-  return QString::fromUtf8(words.data(), static_cast<qsizetype>(words.size()));
-}
-
-QString fixed(double value, int digits) { return QString::number(value, 'f', digits); }
 
 QString unit_of(const measures::Quantity& quantity) {
   return quantity.unit == "deg" ? QStringLiteral("°") : " " + text(quantity.unit);

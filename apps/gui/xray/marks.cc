@@ -4,18 +4,18 @@
 #include <QObject>
 #include <algorithm>
 
+#include "gui/xray/text.h"
+
 namespace helicarm::gui {
 namespace {
 
 using Eigen::Vector2d;
-using Kind = MarkUnderCursor::Kind;
+using MarkKind = MarkUnderCursor::Kind;
 
 /// Whether the layer's pixels differ from the raw ones.
 bool is_mapped(const pipeline::ViewResult& view, Layer layer) {
   return view.rectification && layer != Layer::raw;
 }
-
-QString fixed(double value, int digits) { return QString::number(value, 'f', digits); }
 
 QString tip_of(const report::BallMark& ball) {
   QString tip = QString::fromStdString(ball.label);
@@ -81,7 +81,7 @@ std::optional<Vector2d> layer_from_raw(const pipeline::ViewResult& view, Layer l
 std::optional<MarkUnderCursor> mark_near(const report::ViewMarks& marks, const Vector2d& place,
                                          double reach_px) {
   std::optional<MarkUnderCursor> nearest;
-  const auto consider = [&](const auto& some, Kind kind, const auto& name_of) {
+  const auto consider = [&](const auto& some, MarkKind kind, const auto& name_of) {
     for (std::size_t i = 0; i < some.size(); ++i) {
       const double distance = (some[i].place - place).norm();
       if (!(distance <= reach_px)) continue;
@@ -91,10 +91,10 @@ std::optional<MarkUnderCursor> mark_near(const report::ViewMarks& marks, const V
     }
   };
   const auto no_name = [](const report::DotMark&) { return std::string(); };
-  consider(marks.candidates, Kind::candidate, no_name);
-  consider(marks.false_blobs, Kind::candidate, no_name);
-  consider(marks.balls, Kind::ball, [](const report::BallMark& ball) { return ball.label; });
-  consider(marks.points, Kind::point, [](const report::PointMark& point) { return point.name; });
+  consider(marks.candidates, MarkKind::candidate, no_name);
+  consider(marks.false_blobs, MarkKind::candidate, no_name);
+  consider(marks.balls, MarkKind::ball, [](const report::BallMark& ball) { return ball.label; });
+  consider(marks.points, MarkKind::point, [](const report::PointMark& point) { return point.name; });
   return nearest;
 }
 

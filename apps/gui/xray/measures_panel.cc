@@ -9,12 +9,10 @@
 #include <algorithm>
 #include <array>
 
+#include "gui/xray/text.h"
+
 namespace helicarm::gui {
 namespace {
-
-QString text(std::string_view words) {
-  return QString::fromUtf8(words.data(), static_cast<qsizetype>(words.size()));
-}
 
 constexpr int through_fiducials = 0, at_depth = 1;  // entries before the points
 

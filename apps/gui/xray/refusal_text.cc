@@ -5,14 +5,11 @@
 #include <QStringList>
 #include <algorithm>
 
+#include "gui/xray/text.h"
 #include "helicarm/pipeline/advice.h"
 
 namespace helicarm::gui {
 namespace {
-
-QString text(std::string_view words) {
-  return QString::fromUtf8(words.data(), static_cast<qsizetype>(words.size()));
-}
 
 QString details_of(const pipeline::Result& result) {
   QStringList lines;

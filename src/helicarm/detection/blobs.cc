@@ -15,7 +15,7 @@ namespace {
 
 constexpr int levels_per_octave = 3;
 constexpr double first_sigma = 1.1;
-constexpr double ratio = 1.2599210498948732;  // 2^(1/3)
+constexpr double third_of_octave = 1.2599210498948732;  // 2^(1/3)
 
 /// Detection threshold: a multiple of the robust spread of the filter responses on a coarse grid (zeros
 /// excluded: black surround), but at most a quarter of the maximum, for plates full of holes.
@@ -77,7 +77,7 @@ void search_level(const std::array<cv::Mat, 3>& answers, double radius, double s
       const double dk = offset_of_peak(answers[0].at<float>(v, u), value, answers[2].at<float>(v, u));
       Dot blob;
       blob.centre_px = {(u + du + 0.5) * step - 0.5, (v + dv + 0.5) * step - 0.5};
-      blob.radius_px = radius * std::pow(ratio, dk);
+      blob.radius_px = radius * std::pow(third_of_octave, dk);
       blob.contrast = double(value);
       blobs.push_back(blob);
     }
@@ -90,10 +90,12 @@ void search_octave(const cv::Mat& base, double step, const BlobOptions& options,
   cv::GaussianBlur(base, blurred, {}, step > 1 ? std::sqrt(first_sigma * first_sigma - 0.25) : first_sigma);
   std::array<cv::Mat, 3> answers;
   for (int k = 0; k < levels_per_octave + 2; ++k) {
-    const double radius_before = std::numbers::sqrt2 * first_sigma * std::pow(ratio, double(k) - 0.5) * step;
+    const double radius_before =
+        std::numbers::sqrt2 * first_sigma * std::pow(third_of_octave, double(k) - 0.5) * step;
     if (radius_before > options.max_radius_px * 1.15) break;
     cv::GaussianBlur(blurred, wider, {},
-                     first_sigma * std::pow(ratio, double(k)) * std::sqrt(ratio * ratio - 1));
+                     first_sigma * std::pow(third_of_octave, double(k)) *
+                         std::sqrt(third_of_octave * third_of_octave - 1));
     std::rotate(answers.begin(), answers.begin() + 1, answers.end());
     const bool dark = options.polarity == Polarity::dark;
     cv::subtract(dark ? wider : blurred, dark ? blurred : wider, answers[2]);
@@ -110,7 +112,7 @@ std::vector<Dot> find_blobs(image::Image<float> image, const BlobOptions& option
   cv::Mat base = image::as_mat(image);
   for (double step = 1; base.cols >= 16 && base.rows >= 16; step *= 2) {
     const auto radius_at = [&](double level) {
-      return std::numbers::sqrt2 * first_sigma * step * std::pow(ratio, level + 0.5);
+      return std::numbers::sqrt2 * first_sigma * step * std::pow(third_of_octave, level + 0.5);
     };
     if (radius_at(1) > 1.15 * options.max_radius_px) break;
     if (1.15 * radius_at(levels_per_octave) > options.min_radius_px)

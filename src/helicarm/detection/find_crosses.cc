@@ -22,8 +22,8 @@ constexpr int ring_steps = 90;  // over 180 degrees
 /// Background b0 bx by bxx bxy byy; per wire depth, angle, offset; one common width.
 constexpr int n_background = 6;
 constexpr int n_parameters = n_background + 7;
-using Vector = Eigen::Matrix<double, n_parameters, 1>;
-using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
+using CrossVector = Eigen::Matrix<double, n_parameters, 1>;
+using CrossNormal = Eigen::Matrix<double, n_parameters, n_parameters>;
 
 float bilinear(const image::Image<float>& image, double u, double v) {
   const int i = std::clamp(static_cast<int>(std::floor(u)), 0, image.width() - 2);
@@ -152,7 +152,7 @@ std::optional<Dot> fit_wires(const xray::XrayImage& xray_image, const Vector2d& 
   if (pixels.size() < 60) return std::nullopt;
   mean /= double(pixels.size());
 
-  Vector p = Vector::Zero();
+  CrossVector p = CrossVector::Zero();
   p[0] = mean;
   const Vector2d shift = start - Vector2d(u0, v0);
   const auto offset = [&](double angle) {
@@ -161,7 +161,7 @@ std::optional<Dot> fit_wires(const xray::XrayImage& xray_image, const Vector2d& 
   p.segment<3>(6) << arms.depth, arms.first, offset(arms.first);
   p.segment<3>(9) << arms.depth, arms.second, offset(arms.second);
   p[12] = 0.7 * half_width;
-  Normal normal;
+  CrossNormal normal;
   double variance = 0;
   double move = 0;
   std::vector<double> residuals(pixels.size());
@@ -171,7 +171,7 @@ std::optional<Dot> fit_wires(const xray::XrayImage& xray_image, const Vector2d& 
     const Wire b{p[9], p[10], p[11]};
     for (int pass = 0; pass < 2; ++pass) {
       normal.setZero();
-      Vector right = Vector::Zero();
+      CrossVector right = CrossVector::Zero();
       double squares = 0;
       double weight = 0;
       for (std::size_t k = 0; k < pixels.size(); ++k) {
@@ -182,7 +182,7 @@ std::optional<Dot> fit_wires(const xray::XrayImage& xray_image, const Vector2d& 
         const Across wb = across(b, p[12], pixel.x, pixel.y);
         // At the crossing the second wire attenuates what the first transmits.
         const double left_b = 1 - std::clamp(a.depth / std::max(1e-9, std::abs(p[0])), 0.0, 0.9) * wa.value;
-        Vector row;
+        CrossVector row;
         row << 1, x, y, x * x, x * y, y * y, -wa.value, -a.depth * wa.by_angle, -a.depth * wa.by_offset,
             -wb.value * left_b, -b.depth * wb.by_angle * left_b, -b.depth * wb.by_offset * left_b,
             -a.depth * wa.by_width - b.depth * wb.by_width * left_b;
@@ -200,9 +200,9 @@ std::optional<Dot> fit_wires(const xray::XrayImage& xray_image, const Vector2d& 
         for (std::size_t k = 0; k < pixels.size(); ++k) pixels[k].weight = tukey_weight(residuals[k], cut);
         continue;
       }
-      Normal damped = normal;
+      CrossNormal damped = normal;
       damped.diagonal() *= 1 + 0.1 * std::pow(0.3, i);
-      Vector step = damped.selfadjointView<Eigen::Lower>().ldlt().solve(right);
+      CrossVector step = damped.selfadjointView<Eigen::Lower>().ldlt().solve(right);
       if (!step.allFinite()) return std::nullopt;
       const double turn = std::max(std::abs(step[7]), std::abs(step[10]));
       if (turn > 0.2) step *= 0.2 / turn;
@@ -219,7 +219,7 @@ std::optional<Dot> fit_wires(const xray::XrayImage& xray_image, const Vector2d& 
   const double fainter = std::min(std::abs(p[6]), std::abs(p[9]));
   if (fainter < 0.3 * std::max(std::abs(p[6]), std::abs(p[9])) || fainter < 3 * std::sqrt(variance))
     return std::nullopt;
-  const Normal inverse = normal.selfadjointView<Eigen::Lower>().ldlt().solve(Normal::Identity());
+  const CrossNormal inverse = normal.selfadjointView<Eigen::Lower>().ldlt().solve(CrossNormal::Identity());
   Dot cross;
   cross.centre_px = Vector2d(u0, v0) + *before;
   cross.sigma_px = std::sqrt(std::max(0.0, 0.5 * variance * (inverse(8, 8) + inverse(11, 11)))) /

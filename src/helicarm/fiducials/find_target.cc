@@ -24,7 +24,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double max_shift_px = 8;
-constexpr double sigma_floor_px = 0.06;  // model error of a template on a smooth background
+constexpr double template_floor_px = 0.06;  // model error of a template on a smooth background
 
 constexpr double max_log_size = 0.25;  // of a ball in the image from the file's diameter
 
@@ -33,8 +33,8 @@ constexpr int n_background = 10;
 constexpr int n_parameters = n_background + 4;
 constexpr int at_shift = n_background + 1;
 constexpr int at_size = n_background + 3;
-using Vector = Eigen::Matrix<double, n_parameters, 1>;
-using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
+using TargetVector = Eigen::Matrix<double, n_parameters, 1>;
+using TargetNormal = Eigen::Matrix<double, n_parameters, n_parameters>;
 
 /// raw -> rectified in a small patch: biquadratic interpolation of 3 x 3 exact points.
 class LocalInverse {
@@ -91,14 +91,14 @@ struct Patch {
 };
 
 struct Sums {
-  Normal normal;
-  Vector right;
+  TargetNormal normal;
+  TargetVector right;
   double squares;
   double weight;
 };
 
 /// Derivatives and residuals at the given parameters.
-void evaluate(Patch& patch, const SolidTemplate& absorbed, const Vector& p) {
+void evaluate(Patch& patch, const SolidTemplate& absorbed, const TargetVector& p) {
   const Vector2d shift = p.segment<2>(at_shift);
   const double size = std::exp(p[at_size]);
   const auto contrast = static_cast<float>(p[n_background]);
@@ -131,7 +131,7 @@ Sums accumulate(const Patch& patch, std::span<const float> weights) {
 
 /// Delete-a-group jackknife of the shift over the patch's sectors, one Gauss-Newton step each. It includes
 /// model errors on one side of the target, such as an edge of the body, which the noise does not.
-double jackknife_variance(const Patch& patch, const Vector& p) {
+double jackknife_variance(const Patch& patch, const TargetVector& p) {
   constexpr int sectors = 8;
   std::vector<int> sector(patch.offsets.size());
   for (std::size_t i = 0; i < sector.size(); ++i) {
@@ -146,7 +146,7 @@ double jackknife_variance(const Patch& patch, const Vector& p) {
     for (std::size_t i = 0; i < rest.size(); ++i)
       if (sector[i] == k) rest[i] = 0;
     const Sums sums = accumulate(patch, rest);
-    const Vector step = sums.normal.ldlt().solve(sums.right);
+    const TargetVector step = sums.normal.ldlt().solve(sums.right);
     sum += step.segment<2>(at_shift);
     squares += step.segment<2>(at_shift).squaredNorm();
   }
@@ -154,7 +154,7 @@ double jackknife_variance(const Patch& patch, const Vector& p) {
 }
 
 std::optional<Fit> fit_template(Patch patch, const SolidTemplate& absorbed) {
-  Vector p = Vector::Zero();
+  TargetVector p = TargetVector::Zero();
   evaluate(patch, absorbed, p);
   Sums sums = accumulate(patch, patch.weights);
   constexpr int linear = n_background + 1;
@@ -173,7 +173,7 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& absorbed) {
     for (std::size_t k = 0; k < residuals.size(); ++k)
       patch.weights[k] = detection::tukey_weight(residuals[k], cut);
     sums = accumulate(patch, patch.weights);
-    Vector step = sums.normal.ldlt().solve(sums.right);
+    TargetVector step = sums.normal.ldlt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
     // The template is not smooth: a step that reverses the one before it is damped.
     if (step.segment<2>(at_shift).dot(before) < 0) damping *= 0.5;
@@ -190,11 +190,11 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& absorbed) {
   evaluate(patch, absorbed, p);
   sums = accumulate(patch, patch.weights);
   const double variance = sums.squares / std::max(1.0, sums.weight - n_parameters);
-  const Normal inverse = sums.normal.ldlt().solve(Normal::Identity());
+  const TargetNormal inverse = sums.normal.ldlt().solve(TargetNormal::Identity());
   detection::PixelRows weighted = patch.rows.topRows<n_parameters>();
   weighted.array().rowwise() *=
       Eigen::Map<const Eigen::ArrayXf>(patch.weights.data(), Eigen::Index(patch.weights.size())).transpose();
-  const Normal covariance =
+  const TargetNormal covariance =
       inverse * detection::correlated_normal(patch.noise, weighted, patch.cells, patch.side) * inverse;
   Fit fit;
   fit.shift = p.segment<2>(at_shift);
@@ -303,9 +303,9 @@ Expected<ImagePoint> find_target(const xray::XrayImage& xray_image, const rectif
                 fmt::format("check target \"{}\" is not visible at its predicted position", target.name));
   const Vector2d uv = centre + best->shift;
   const double map_sigma = map.sigma_px(uv);
-  return ImagePoint{
-      map.raw_from_rectified(uv), uv,
-      std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
+  return ImagePoint{map.raw_from_rectified(uv), uv,
+                    std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma +
+                              template_floor_px * template_floor_px)};
 }
 
 Expected<ImagePoint> point_of_click(const rectification::DistortionMap& map, const Vector2d& click_raw,
@@ -360,7 +360,7 @@ Expected<ImagePoint> snap_to_ball(const xray::XrayImage& xray_image, const recti
   const double map_sigma = map.sigma_px(uv);
   return ImagePoint{raw, uv,
                     std::sqrt(best->error_px() * best->error_px() + map_sigma * map_sigma +
-                              sigma_floor_px * sigma_floor_px)};
+                              template_floor_px * template_floor_px)};
 }
 
 }  // namespace helicarm::fiducials

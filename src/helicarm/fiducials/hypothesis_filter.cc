@@ -10,26 +10,28 @@
 namespace helicarm::fiducials {
 namespace {
 
-constexpr double radius_sigmas = 3;  // a true triple lost here is replaced by another
-constexpr int reach = 3;             // of a candidate, in cells
+constexpr double filter_radius_sigmas = 3;  // a true triple lost here is replaced by another
+constexpr int reach = 3;                    // of a candidate, in cells
 
 template <class T>
-struct Vector {
+struct LaneVector {
   T x, y, z;
 
-  Vector operator+(const Vector& q) const { return {x + q.x, y + q.y, z + q.z}; }
-  Vector operator-(const Vector& q) const { return {x - q.x, y - q.y, z - q.z}; }
-  Vector operator*(const T& s) const { return {x * s, y * s, z * s}; }
-  T dot(const Vector& q) const { return x * q.x + y * q.y + z * q.z; }
-  Vector cross(const Vector& q) const { return {y * q.z - z * q.y, z * q.x - x * q.z, x * q.y - y * q.x}; }
-  Vector unit() const { return *this * T(dot(*this).rsqrt()); }
+  LaneVector operator+(const LaneVector& q) const { return {x + q.x, y + q.y, z + q.z}; }
+  LaneVector operator-(const LaneVector& q) const { return {x - q.x, y - q.y, z - q.z}; }
+  LaneVector operator*(const T& s) const { return {x * s, y * s, z * s}; }
+  T dot(const LaneVector& q) const { return x * q.x + y * q.y + z * q.z; }
+  LaneVector cross(const LaneVector& q) const {
+    return {y * q.z - z * q.y, z * q.x - x * q.z, x * q.y - y * q.x};
+  }
+  LaneVector unit() const { return *this * T(dot(*this).rsqrt()); }
 };
 
 /// Columns of the orthonormal frame of two edges.
 template <class T>
-std::array<Vector<T>, 3> frame_of(const Vector<T>& e1, const Vector<T>& e2) {
-  const Vector<T> along = e1.unit();
-  const Vector<T> normal = e1.cross(e2).unit();
+std::array<LaneVector<T>, 3> frame_of(const LaneVector<T>& e1, const LaneVector<T>& e2) {
+  const LaneVector<T> along = e1.unit();
+  const LaneVector<T> normal = e1.cross(e2).unit();
   return {along, normal.cross(along), normal};
 }
 
@@ -37,7 +39,7 @@ std::array<Vector<T>, 3> frame_of(const Vector<T>& e1, const Vector<T>& e2) {
 template <class Simd>
 struct ModelTriangles {
   Simd a, b, c;
-  std::array<Vector<Simd>, 3> corners;
+  std::array<LaneVector<Simd>, 3> corners;
 };
 
 /// Relative depths of the second and third corner behind the first.
@@ -49,8 +51,8 @@ struct Depths {
 };
 
 template <class Simd, class Image>
-std::array<Vector<Simd>, 2> lifted_edges(const Image& image, const Depths<Simd>& depths) {
-  const auto lift = [&](const Eigen::Vector2f& at, const Simd& behind) -> Vector<Simd> {
+std::array<LaneVector<Simd>, 2> lifted_edges(const Image& image, const Depths<Simd>& depths) {
+  const auto lift = [&](const Eigen::Vector2f& at, const Simd& behind) -> LaneVector<Simd> {
     return {(1 + behind) * at.x() - image.at0.x(), (1 + behind) * at.y() - image.at0.y(), behind};
   };
   return {lift(image.at1, depths.behind1), lift(image.at2, depths.behind2)};
@@ -102,15 +104,15 @@ void count_near(const ModelTriangles<Simd>& model, const Depths<Simd>& depths, c
   const float focal = image.focal_px * static_cast<float>(1 / near.cell_px());
   // Rows of the pose without the component along the triangle's normal, which changes sign if mirrored.
   const auto in_plane = [&](const Simd& along, const Simd& across, const Simd& origin) {
-    const Vector<Simd> row = own[0] * along + own[1] * across;
-    return std::pair<Vector<Simd>, Simd>(row, origin - row.dot(model.corners[0]));
+    const LaneVector<Simd> row = own[0] * along + own[1] * across;
+    return std::pair<LaneVector<Simd>, Simd>(row, origin - row.dot(model.corners[0]));
   };
   const auto x = in_plane(lifted[0].x, lifted[1].x, image.at0.x() * distance);
   const auto y = in_plane(lifted[0].y, lifted[1].y, image.at0.y() * distance);
   const auto z = in_plane(lifted[0].z, lifted[1].z, distance);
   const Simd normal_offset = own[2].dot(model.corners[0]);
   for (const auto& ball : support.balls) {
-    const auto at = [&](const std::pair<Vector<Simd>, Simd>& row) -> Simd {
+    const auto at = [&](const std::pair<LaneVector<Simd>, Simd>& row) -> Simd {
       return row.first.x * ball.x() + row.first.y * ball.y() + row.first.z * ball.z() + row.second;
     };
     const Simd px = at(x);
@@ -184,7 +186,7 @@ HypothesisFilter::HypothesisFilter(const Scene& scene) : scene_(scene), near_(sc
   in_scale_.resize(triangles_.size() + 1);
   for (const auto& candidate : scene.candidates) {
     for (const auto& ball : scene.balls) {
-      const Scale scale = scale_by_radius(scene, candidate, ball, radius_sigmas);
+      const Scale scale = scale_by_radius(scene, candidate, ball, filter_radius_sigmas);
       scales_.push_back({static_cast<float>(scale.finest), static_cast<float>(scale.coarsest)});
     }
   }

@@ -66,10 +66,10 @@ void add(RowSums& sums, const Row& row) {
 
 /// Lower triangle of the normal equations; row 9 is the gradient, (9, 9) is chi2. Two rows pad the columns to
 /// whole SIMD vectors.
-using Normal = Eigen::Matrix<double, 12, 10>;
+using PoseNormal = Eigen::Matrix<double, 12, 10>;
 
-Normal normal_equations(const geometry::View& view, const std::vector<FourCorrespondences>& fours,
-                        const CameraPrior& prior) {
+PoseNormal normal_equations(const geometry::View& view, const std::vector<FourCorrespondences>& fours,
+                            const CameraPrior& prior) {
   constexpr std::array<int, 8> of_u{0, 1, 2, 3, 5, 6, 7, 9};
   constexpr std::array<int, 8> of_v{0, 1, 2, 4, 5, 6, 8, 9};
   RowSums u_sums;
@@ -94,7 +94,7 @@ Normal normal_equations(const geometry::View& view, const std::vector<FourCorres
     add(v_sums, {-fv * (py * y + z), fv * py * x, fv * x, fv, -fv * py, k.fy * py * s.weight, s.weight,
                  (k.fy * py + k.v0 - s.v) * s.weight});
   }
-  Normal normal = Normal::Zero();
+  PoseNormal normal = PoseNormal::Zero();
   for (std::size_t i = 0; i < of_u.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       normal(of_u[i], of_u[j]) += u_sums[i][j].sum();
@@ -115,7 +115,7 @@ Normal normal_equations(const geometry::View& view, const std::vector<FourCorres
 }
 
 /// Cholesky factorisation in place; including the gradient's row in it does the forward substitution.
-Vector9 descent(Normal a, double damping) {
+Vector9 descent(PoseNormal a, double damping) {
   a.diagonal().head<9>() *= 1 + damping;
   for (int j = 0; j < 9; ++j) {
     a.col(j) /= std::sqrt(a(j, j));
@@ -151,11 +151,11 @@ PoseFit fit_pose(const geometry::View& start, const std::vector<WeightedCorrespo
                  const CameraPrior& prior, int most_steps) {
   const auto fours = in_fours(correspondences);
   PoseFit fit{start};
-  Normal normal = normal_equations(fit.view, fours, prior);
+  PoseNormal normal = normal_equations(fit.view, fours, prior);
   double damping = 1e-6;
   for (int step = 0; step < most_steps && damping < 1e3; ++step) {
     const geometry::View next = moved(fit.view, descent(normal, damping));
-    const Normal there = normal_equations(next, fours, prior);
+    const PoseNormal there = normal_equations(next, fours, prior);
     const double gain = normal(9, 9) - there(9, 9);
     if (!(there(9, 9) <= normal(9, 9))) {
       damping = damping * 30 + 1e-3;

@@ -21,7 +21,7 @@ std::vector<Eigen::Vector2d> hexagonal_dots(double pitch, int reach) {
   return dots;
 }
 
-Reason refusal(const Json& json) {
+Reason plate_refusal(const Json& json) {
   const auto plate = plate_from_json(json, "p.json");
   EXPECT_FALSE(plate.has_value());
   return plate ? Reason::usage : plate.error().reason;
@@ -54,16 +54,16 @@ TEST(ReadPlate, BadFieldsAreRefused) {
     json[key] = value;
     return json;
   };
-  EXPECT_EQ(refusal(with("sise", 1)), Reason::unknown_key);
-  EXPECT_EQ(refusal(with("kind", "cubes")), Reason::bad_value);
-  EXPECT_EQ(refusal(with("pitch_mm", 0.025)), Reason::bad_value);
-  EXPECT_EQ(refusal(with("pitch_mm", 24)), Reason::bad_value);
-  EXPECT_EQ(refusal(with("diameter_mm", 26)), Reason::bad_value);
-  EXPECT_EQ(refusal(with("lattice", "hexagonal")), Reason::bad_value);
-  EXPECT_EQ(refusal(with("dots_xy_mm", {{0, 0, 0}})), Reason::bad_value);
-  EXPECT_EQ(refusal(with("dots_xy_mm", {{0, 0}, {25, 0}, {0, 0}})), Reason::bad_value);
-  EXPECT_EQ(refusal(with("dots_xy_mm", {{0, 0}, {25, 0.3}, {50, 0}})), Reason::bad_value);
-  EXPECT_EQ(refusal(with("dots_xy_mm", Json::array())), Reason::bad_value);
+  EXPECT_EQ(plate_refusal(with("sise", 1)), Reason::unknown_key);
+  EXPECT_EQ(plate_refusal(with("kind", "cubes")), Reason::bad_value);
+  EXPECT_EQ(plate_refusal(with("pitch_mm", 0.025)), Reason::bad_value);
+  EXPECT_EQ(plate_refusal(with("pitch_mm", 24)), Reason::bad_value);
+  EXPECT_EQ(plate_refusal(with("diameter_mm", 26)), Reason::bad_value);
+  EXPECT_EQ(plate_refusal(with("lattice", "hexagonal")), Reason::bad_value);
+  EXPECT_EQ(plate_refusal(with("dots_xy_mm", {{0, 0, 0}})), Reason::bad_value);
+  EXPECT_EQ(plate_refusal(with("dots_xy_mm", {{0, 0}, {25, 0}, {0, 0}})), Reason::bad_value);
+  EXPECT_EQ(plate_refusal(with("dots_xy_mm", {{0, 0}, {25, 0.3}, {50, 0}})), Reason::bad_value);
+  EXPECT_EQ(plate_refusal(with("dots_xy_mm", Json::array())), Reason::bad_value);
 }
 
 TEST(LatticeMisfit, RotationAndShiftAreFree) {

@@ -27,7 +27,7 @@ using Eigen::Vector3d;
 
 constexpr double least_angle_deg = 15;
 constexpr double least_move_mm = 0.4;
-constexpr double contradiction = 3;  // standard deviations of chi2 beyond which the sigmas are enlarged
+constexpr double chi2_contradiction = 3;  // standard deviations of chi2 beyond which the sigmas are enlarged
 
 /// Standard deviations by which chi2 exceeds its degrees of freedom (Wilson and Hilferty 1931).
 double excess_of(double chi2, int dof) {
@@ -71,7 +71,7 @@ Expected<void> check_unmoved(const AdjustedViews& found) {
 
 /// Covariance inflation, as the calibration of views does it.
 double variance_scale_of(const BundleFit& fit, PhantomResult& result) {
-  if (fit.dof < 1 || excess_of(fit.chi2, fit.dof) < contradiction) return 1;
+  if (fit.dof < 1 || excess_of(fit.chi2, fit.dof) < chi2_contradiction) return 1;
   const double scale = fit.chi2 / fit.dof;
   result.warnings.push_back(
       {Reason::residual_too_large,

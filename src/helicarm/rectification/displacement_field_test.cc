@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector2d;
 
 /// About 15 px of pincushion at the corner.
-DistortionMap pincushion(int width, int height) {
+DistortionMap pincushion_map(int width, int height) {
   const Vector2d centre(width / 2.0, height / 2.0);
   const double scale = width / 2.0;
   Eigen::MatrixX2d coefficients = Eigen::MatrixX2d::Zero(10, 2);
@@ -68,7 +68,7 @@ class FieldReader {
 };
 
 TEST(DisplacementField, LeadsFromARectifiedPointToItsRawOne) {
-  const DistortionMap map = pincushion(301, 222);
+  const DistortionMap map = pincushion_map(301, 222);
   const Vector2d pixel(0.3, 0.4);
   const FieldReader field(displacement_field(map, pixel));
   for (const Vector2d& rectified : {Vector2d(0, 0), {150, 110}, {13.7, 200.2}, {300, 221}, {299.5, 1.25}}) {
@@ -79,7 +79,7 @@ TEST(DisplacementField, LeadsFromARectifiedPointToItsRawOne) {
 }
 
 TEST(DisplacementField, HeaderStatesLpsSpacingAndSize) {
-  const FieldReader field(displacement_field(pincushion(301, 222), {0.25, 0.5}));
+  const FieldReader field(displacement_field(pincushion_map(301, 222), {0.25, 0.5}));
   EXPECT_EQ(field.columns, 76);
   EXPECT_EQ(field.rows, 57);
   EXPECT_THAT(field.header, testing::StartsWith("NRRD000"));

@@ -10,7 +10,7 @@
 namespace helicarm::rectification {
 namespace {
 
-using Points = std::vector<Eigen::Vector2d>;
+using RimPoints = std::vector<Eigen::Vector2d>;
 
 constexpr double corner_share = 0.04;  // of a side: the square that must be dark
 constexpr double dark_share = 0.1;     // of the grey value in the middle
@@ -44,9 +44,9 @@ std::optional<float> threshold_of(const xray::XrayImage& xray_image) {
 }
 
 /// First and last pixel of the field in each row and column, unless they lie at the image's border.
-Points boundary_of(const image::Image<float>& image, float threshold) {
+RimPoints boundary_of(const image::Image<float>& image, float threshold) {
   constexpr int border = 3;
-  Points points;
+  RimPoints points;
   const auto scan = [&](int lines, int length, auto grey, auto point) {
     for (int line = 0; line < lines; ++line) {
       int first = 0, last = length - 1;
@@ -67,7 +67,7 @@ Points boundary_of(const image::Image<float>& image, float threshold) {
 }
 
 /// Least squares of a u^2 + b v^2 + c u + d v = 1 about the weighted mean; nothing unless it is an ellipse.
-std::optional<RoundField> ellipse_through(const Points& points, const Eigen::VectorXd& weights) {
+std::optional<RoundField> ellipse_through(const RimPoints& points, const Eigen::VectorXd& weights) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < points.size(); ++i) mean += weights[Eigen::Index(i)] * points[i];
   mean /= weights.sum();
@@ -99,7 +99,7 @@ std::optional<RoundField> round_field(const xray::XrayImage& xray_image) {
   if (xray_image.pixels.width() < 64 || xray_image.pixels.height() < 64) return std::nullopt;
   const auto threshold = threshold_of(xray_image);
   if (!threshold) return std::nullopt;
-  const Points points = boundary_of(xray_image.pixels, *threshold);
+  const RimPoints points = boundary_of(xray_image.pixels, *threshold);
   if (points.size() < least_points) return std::nullopt;
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(Eigen::Index(points.size()));
   Eigen::ArrayXd misses(weights.size());

@@ -22,16 +22,17 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector2i;
 using Complex = std::complex<double>;
-using Points = std::vector<Complex>;
+using ComplexPoints = std::vector<Complex>;
 
 struct IdealGrid {
-  Points places;
+  ComplexPoints places;
   double pitch = 0;
 };
 
 /// In the plane a similarity is w = scale z + shift with complex numbers; its least-squares fit is one
 /// division.
-IdealGrid ideal_grid(const Points& ideal, const Points& seen, const std::vector<std::size_t>& central) {
+IdealGrid ideal_grid(const ComplexPoints& ideal, const ComplexPoints& seen,
+                     const std::vector<std::size_t>& central) {
   Complex ideal_middle;
   Complex seen_middle;
   for (const std::size_t k : central) {
@@ -50,7 +51,7 @@ IdealGrid ideal_grid(const Points& ideal, const Points& seen, const std::vector<
   return grid;
 }
 
-std::vector<double> distances(const Points& p, const Points& q) {
+std::vector<double> distances(const ComplexPoints& p, const ComplexPoints& q) {
   std::vector<double> between;
   for (std::size_t k = 0; k < p.size(); ++k) between.push_back(std::abs(p[k] - q[k]));
   return between;
@@ -67,12 +68,12 @@ GridError summed(const std::vector<double>& errors) {
 
 Complex complex_of(const Vector2d& p) { return {p.x(), p.y()}; }
 
-struct IndexLess {
+struct PlaceLess {
   bool operator()(const Vector2i& p, const Vector2i& q) const {
     return p.x() != q.x() ? p.x() < q.x() : p.y() < q.y();
   }
 };
-using Grid = std::map<Vector2i, detection::Dot, IndexLess>;
+using Grid = std::map<Vector2i, detection::Dot, PlaceLess>;
 
 /// A missing crossing predicted by its neighbours in one direction: between two, or beyond two.
 std::optional<Vector2d> predicted(const Grid& grid, const Vector2i& at, const Vector2i& step) {
@@ -136,7 +137,7 @@ std::vector<detection::Disc> plate_dots(const xray::XrayImage& xray_image, const
   const IndexedLattice lattice = index_lattice(found, phantom::Lattice::square, {});
   Grid plate;
   for (const IndexedDot& d : lattice.dots) plate[d.index] = found[d.dot];
-  std::set<Vector2i, IndexLess> missing;
+  std::set<Vector2i, PlaceLess> missing;
   for (const auto& [at, dot] : plate)
     for (const Vector2i& step : {Vector2i(1, 0), Vector2i(-1, 0), Vector2i(0, 1), Vector2i(0, -1)})
       if (!plate.contains(at + step)) missing.insert(at + step);
@@ -239,15 +240,15 @@ Expected<TestGrid> measure_test_grid(const std::vector<detection::Dot>& crosses,
     central.resize(indices.size());
     std::iota(central.begin(), central.end(), std::size_t{0});
   }
-  Points ideal;
-  Points raw;
-  Points rectified;
+  ComplexPoints ideal;
+  ComplexPoints raw;
+  ComplexPoints rectified;
   for (std::size_t k = 0; k < indices.size(); ++k) {
     ideal.push_back(complex_of(indices[k].cast<double>()));
     raw.push_back(complex_of(grid.raw_px[k]));
     rectified.push_back(complex_of(grid.rectified_px[k]));
   }
-  const Points raw_ideal = ideal_grid(ideal, raw, central).places;
+  const ComplexPoints raw_ideal = ideal_grid(ideal, raw, central).places;
   for (const Complex& place : raw_ideal) grid.raw_ideal_px.emplace_back(place.real(), place.imag());
   grid.raw_error_px = distances(raw, raw_ideal);
   const IdealGrid rectified_ideal = ideal_grid(ideal, rectified, central);

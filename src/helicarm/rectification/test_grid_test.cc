@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr int side = 192;
+constexpr int grid_side = 192;
 const Vector2d middle(95.5, 95.5);
 
 /// 7 x 7 crossings, 30 px apart, slightly rotated.
@@ -37,7 +37,7 @@ Vector2d pincushion(const Vector2d& p) {
 }
 
 DistortionMap pincushion_map() {
-  DistortionMap map = identity_map(side, side, {});
+  DistortionMap map = identity_map(grid_side, grid_side, {});
   Eigen::MatrixX2d coefficients = Eigen::MatrixX2d::Zero(10, 2);
   coefficients.topRows(3) << middle.transpose(), 128, 0, 0, 128;
   coefficients.bottomRows(4) << 5, 0, 0, 5, 5, 0, 0, 5;
@@ -46,7 +46,7 @@ DistortionMap pincushion_map() {
 }
 
 TEST(MeasureTestGrid, PerfectGridHasNoError) {
-  const auto measured = measure_test_grid(grid(), identity_map(side, side, {}));
+  const auto measured = measure_test_grid(grid(), identity_map(grid_side, grid_side, {}));
   ASSERT_TRUE(measured);
   EXPECT_EQ(measured->crosses, 49);
   EXPECT_LT(measured->raw.max_px, 1e-9);
@@ -56,7 +56,7 @@ TEST(MeasureTestGrid, PerfectGridHasNoError) {
 TEST(MeasureTestGrid, MovedCornerIsTheLargestErrorAndSetsTheMean) {
   auto crosses = grid();
   crosses.front().centre_px += Vector2d(-1.2, 1.6);
-  const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
+  const auto measured = measure_test_grid(crosses, identity_map(grid_side, grid_side, {}));
   ASSERT_TRUE(measured);
   EXPECT_NEAR(measured->raw.max_px, 2, 1e-9);
   EXPECT_NEAR(measured->raw.mean_px, 2.0 / 49, 1e-9);
@@ -90,10 +90,11 @@ TEST(MeasureTestGrid, WithoutItsCentreIsRefused) {
   std::erase_if(crosses, [](const detection::Dot& cross) {  // two rows remain
     return cross.centre_px.y() - middle.y() < -40 || cross.centre_px.y() - middle.y() > 12;
   });
-  const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
+  const auto measured = measure_test_grid(crosses, identity_map(grid_side, grid_side, {}));
   ASSERT_FALSE(measured);
   EXPECT_EQ(measured.error().reason, Reason::too_few_fiducials);
-  EXPECT_EQ(measure_test_grid({}, identity_map(side, side, {})).error().reason, Reason::too_few_fiducials);
+  EXPECT_EQ(measure_test_grid({}, identity_map(grid_side, grid_side, {})).error().reason,
+            Reason::too_few_fiducials);
 }
 
 /// Five wires in each direction.
@@ -104,7 +105,7 @@ detection::drawn::Shade wires() {
     wires.push_back({{-5, middle.y() + offset.y()}, {197, middle.y() + offset.y() + 4}});
     wires.push_back({{middle.x() + offset.x() + 2, -5}, {middle.x() + offset.x() - 2, 197}});
   }
-  detection::drawn::Shade shade(side, side);
+  detection::drawn::Shade shade(grid_side, grid_side);
   detection::drawn::add_wires(shade, wires, 2.2, 0.9);
   return shade;
 }
@@ -119,7 +120,7 @@ xray::XrayImage noisy(const detection::drawn::Shade& shade) {
 TEST(FindGrid, EveryCrossingOfAGridOfWires) {
   const auto crosses = find_grid(noisy(wires()));
   EXPECT_EQ(crosses.size(), 25u);
-  const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
+  const auto measured = measure_test_grid(crosses, identity_map(grid_side, grid_side, {}));
   ASSERT_TRUE(measured);
   EXPECT_LT(measured->raw.max_px, 0.5);  // the rendered wires are not exactly square
 }
@@ -130,7 +131,7 @@ TEST(FindGrid, DotBesideACrossingDoesNotMoveIt) {
   detection::drawn::add_ball(shade, crossing + Vector2d(9, 10), 5, 0.9, 3);
   const auto crosses = find_grid(noisy(shade));
   EXPECT_GE(crosses.size(), 24u);
-  const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
+  const auto measured = measure_test_grid(crosses, identity_map(grid_side, grid_side, {}));
   ASSERT_TRUE(measured);
   EXPECT_LT(measured->raw.max_px, 0.5);
 }
@@ -177,7 +178,7 @@ TEST(FindGrid, CrossingOnTheFieldRimOrUnderAPlateDotIsLeftOut) {
 }
 
 TEST(TestGridPitch, ContradictionToThePixelSizeIsNamed) {
-  DistortionMap map = identity_map(side, side, 0.7);
+  DistortionMap map = identity_map(grid_side, grid_side, 0.7);
   const auto measured = measure_test_grid(grid(), map);
   ASSERT_TRUE(measured);
   EXPECT_NEAR(measured->rectified_pitch_px, 30, 1e-9);
@@ -194,7 +195,7 @@ TEST(TestGridPitch, ContradictionToThePixelSizeIsNamed) {
 }
 
 TEST(FindGrid, EmptyFieldHasNoCrossings) {
-  EXPECT_TRUE(find_grid(noisy(detection::drawn::Shade(side, side))).empty());
+  EXPECT_TRUE(find_grid(noisy(detection::drawn::Shade(grid_side, grid_side))).empty());
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ Imaging plain() {
   return imaging;
 }
 
-bool same(const image::Image<std::uint16_t>& a, const image::Image<std::uint16_t>& b) {
+bool same_pixels(const image::Image<std::uint16_t>& a, const image::Image<std::uint16_t>& b) {
   return std::equal(a.pixels().begin(), a.pixels().end(), b.pixels().begin(), b.pixels().end());
 }
 
@@ -54,9 +54,9 @@ TEST(DetectorResponse, ReproducibleFromTheSeedForAnyNumberOfThreads) {
   const image::Image<float> signal(64, 48, 0.5f);
   const Imaging imaging;
   const auto one = detector_response(signal, imaging, 7, 0, 1);
-  EXPECT_TRUE(same(one, detector_response(signal, imaging, 7, 0, 2)));
-  EXPECT_FALSE(same(one, detector_response(signal, imaging, 8, 0, 1)));
-  EXPECT_FALSE(same(one, detector_response(signal, imaging, 7, 2, 1)));
+  EXPECT_TRUE(same_pixels(one, detector_response(signal, imaging, 7, 0, 2)));
+  EXPECT_FALSE(same_pixels(one, detector_response(signal, imaging, 8, 0, 1)));
+  EXPECT_FALSE(same_pixels(one, detector_response(signal, imaging, 7, 2, 1)));
 }
 
 TEST(DetectorResponse, OverexposureIsWhiteAtEveryBitDepth) {
@@ -100,7 +100,7 @@ TEST(Mirrored, TwiceIsTheIdentityAndOnceSwapsTheColumns) {
   const auto mirror = mirrored(image);
   EXPECT_EQ(mirror(0, 1), image(4, 1));
   EXPECT_EQ(mirror(2, 0), image(2, 0));
-  EXPECT_TRUE(same(mirrored(mirror), image));
+  EXPECT_TRUE(same_pixels(mirrored(mirror), image));
 }
 
 }  // namespace

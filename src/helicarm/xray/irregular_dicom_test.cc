@@ -39,7 +39,7 @@ void expect_same_with_note(const std::string& file) {
   }));
 }
 
-std::string_view reason(const std::string& file) {
+std::string_view reason_of_file(const std::string& file) {
   const auto read = read_dicom(file, "x.dcm", {});
   return read ? "ok" : code(read.error().reason);
 }
@@ -104,7 +104,7 @@ TEST(IrregularDicom, ElementGivenTwice) {
         .bytes();
   };
   expect_same_with_note(twice(6));
-  EXPECT_EQ(reason(twice(5)), "bad_value");
+  EXPECT_EQ(reason_of_file(twice(5)), "bad_value");
 }
 
 TEST(IrregularDicom, UnknownRepresentationsHaveTheLengthsThatDcmtkGivesThem) {
@@ -148,10 +148,10 @@ TEST(IrregularDicom, HighBitAboveTheStoredBits) {
 TEST(IrregularDicom, LengthsBeyondTheFileAreRefused) {
   const std::string bare = data_set(DicomBuilder());
   for (std::size_t size = 0; size < bare.size(); size += 3)
-    EXPECT_NE(reason(bare.substr(0, size)), "ok") << size;
+    EXPECT_NE(reason_of_file(bare.substr(0, size)), "ok") << size;
   std::string lying = DicomBuilder().raw(0x00091001, "UN", "x").bytes();  // odd
   lying.replace(lying.find("UN") + 4, 4, DicomBuilder::number(0x7FFFFFFF, 4));
-  EXPECT_NE(reason(lying), "ok");
+  EXPECT_NE(reason_of_file(lying), "ok");
 }
 
 TEST(IrregularDicom, DeepNestingIsRefused) {
@@ -159,7 +159,7 @@ TEST(IrregularDicom, DeepNestingIsRefused) {
   for (int i = 0; i < 10000; ++i)
     nested += DicomBuilder::tag_bytes(0x00081140) + "SQ" + DicomBuilder::number(0, 2) +
               DicomBuilder::number(-1, 4) + DicomBuilder::tag_bytes(0xFFFEE000) + DicomBuilder::number(-1, 4);
-  EXPECT_EQ(reason(DicomBuilder().tail(nested).bytes()), "bad_value");
+  EXPECT_EQ(reason_of_file(DicomBuilder().tail(nested).bytes()), "bad_value");
 }
 
 TEST(IrregularDicom, NoiseAndMutationsNeverCrash) {

@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr int side = 512;
+constexpr int image_side = 512;
 
 /// 4 x 4 dots in one quarter of the image, with 6 px of pincushion about the image centre at its edge.
 std::vector<Correspondence> quarter_of_a_plate(double bend_px) {
@@ -29,7 +29,7 @@ std::vector<Correspondence> quarter_of_a_plate(double bend_px) {
 double held_out_px(const std::string& model, double bend_px) {
   MapOptions options;
   options.model = model;
-  return fit_map(quarter_of_a_plate(bend_px), side, side, options)->map.held_out_rms_px;
+  return fit_map(quarter_of_a_plate(bend_px), image_side, image_side, options)->map.held_out_rms_px;
 }
 
 TEST(RadialModel, SixteenDotsDetermineAPincushion) {
@@ -38,11 +38,12 @@ TEST(RadialModel, SixteenDotsDetermineAPincushion) {
 }
 
 TEST(RadialModel, IsChosenForFewBentDots) {
-  EXPECT_EQ(fit_map(quarter_of_a_plate(6), side, side, {})->map.model->name(), "radial");
+  EXPECT_EQ(fit_map(quarter_of_a_plate(6), image_side, image_side, {})->map.model->name(), "radial");
 }
 
 TEST(RadialModel, IsNotChosenForAStraightPlate) {
-  EXPECT_EQ(fit_map(quarter_of_a_plate(0), side, side, {})->map.model->name(), "polynomial of order 1");
+  EXPECT_EQ(fit_map(quarter_of_a_plate(0), image_side, image_side, {})->map.model->name(),
+            "polynomial of order 1");
 }
 
 TEST(RadialModel, NineDotsAreTooFew) {
@@ -50,7 +51,7 @@ TEST(RadialModel, NineDotsAreTooFew) {
   dots.resize(9);
   MapOptions options;
   options.model = "radial";
-  EXPECT_EQ(fit_map(dots, side, side, options).error().reason, Reason::plate_not_found);
+  EXPECT_EQ(fit_map(dots, image_side, image_side, options).error().reason, Reason::plate_not_found);
 }
 
 }  // namespace
