@@ -81,6 +81,21 @@ std::optional<double> bend_px(const SeenPlate& plate, const DistortionMap& map) 
   return fit ? std::optional(fit->map.residual_rms_px) : std::nullopt;
 }
 
+/// More than what an own map of these dots leaves, each predicted from the others, by five standard
+/// deviations of a root mean square and by 30 %: a map of another pose. A right one is at most 5 % above it,
+/// on intensifiers too.
+double bend_limit_px(const SeenPlate& plate, const DistortionMap& map) {
+  std::vector<Correspondence> dots;
+  for (const IndexedDot& d : plate.seen.lattice.dots) {
+    const detection::Dot& dot = plate.seen.dots[d.dot];
+    dots.push_back({lattice_point(d.index, plate.kind), dot.centre_px, dot.error_px()});
+  }
+  const auto own = fit_map(dots, map.width, map.height, {});
+  if (!own) return std::max(0.5, 3 * map.held_out_rms_px);
+  const double left = std::max(own->map.held_out_rms_px, map.held_out_rms_px);
+  return std::max(0.1, left * std::max(1.3, 1 + 5 / std::sqrt(2 * double(dots.size()))));
+}
+
 }  // namespace
 
 Expected<Rectification> with_map(const xray::XrayImage& xray_image, const DistortionMap& map,
@@ -106,7 +121,7 @@ Expected<Rectification> with_map(const xray::XrayImage& xray_image, const Distor
         xray_image, holes, least);
   if (!seen) return result;
   const auto bend = bend_px(*seen, map);
-  const double limit = std::max(0.5, 3 * map.held_out_rms_px);
+  const double limit = bend_limit_px(*seen, map);
   if (bend && *bend > limit)
     return fail(
         Reason::plate_mismatch,

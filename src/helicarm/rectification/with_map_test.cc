@@ -39,6 +39,27 @@ TEST(WithMapOfHoles, OwnMapIsConfirmedWithAndWithoutTheDescriptionOfThePlate) {
     }
 }
 
+TEST(WithMapOfHoles, MapOfTheOtherViewIsAMismatch) {
+  const auto result = with_map(image_of_view(1), map_of_view(0), perforated);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
+}
+
+TEST(WithMap, MapOfTheOtherViewIsAMismatchThoughItBendsByAFifthOfAPixel) {
+  const simulation::SimulatedCase simulated = small_case(2, simulation::CaseKind::accuracy);
+  const xray::XrayImage images[] = {exposure_of(simulated.views[0]), exposure_of(simulated.views[1])};
+  const phantom::Plate plate = phantom::plate48();
+  const DistortionMap maps[] = {rectify(images[0], plate, {}).value().map,
+                                rectify(images[1], plate, {}).value().map};
+  for (const int view : {0, 1}) {
+    EXPECT_TRUE(with_map(images[view], maps[view], plate));
+    const auto exchanged = with_map(images[view], maps[1 - view], plate);
+    ASSERT_FALSE(exchanged);
+    EXPECT_EQ(exchanged.error().reason, Reason::plate_mismatch);
+    EXPECT_LT(exchanged.error().figures.at("residual_rms_px"), 0.3);
+  }
+}
+
 TEST(WithMapOfHoles, BentPlateWithoutAMapIsAMismatch) {
   const xray::XrayImage image = image_of_view(0);
   const auto result = with_map(image, flat_panel_map(image), {});
