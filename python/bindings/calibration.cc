@@ -143,7 +143,7 @@ HeldCalibration loaded(const std::filesystem::path& path) {
 
 using Held = HeldCalibration;
 
-std::string words_of(const Held& calibration) {
+std::string words_of_held(const Held& calibration) {
   std::vector<std::string> names;
   for (const calibration::CalibratedView& view : calibration.views) names.push_back(view.name);
   std::string text = fmt::format("<Calibration of {}", fmt::join(names, ", "));
@@ -234,7 +234,7 @@ World: calibrator frame, mm. Pixels: rectified unless raw=True. A view is given 
                                return names;
                              })
       .def("__len__", [](const Held& c) { return c.views.size(); })
-      .def("__repr__", &words_of);
+      .def("__repr__", &words_of_held);
   add_point_methods(held);
   add_parameters(held);
   const calibration::CalibrationOptions usual;

@@ -78,8 +78,14 @@ class BallFitter {
     neighbours_.insert(neighbours_.end(), rectification.plate_dots.begin(), rectification.plate_dots.end());
     std::vector<double> contrasts;
     for (const detection::Dot& dot : labelled_dots) contrasts.push_back(dot.contrast);
-    std::sort(contrasts.begin(), contrasts.end());
-    typical_contrast_ = contrasts[contrasts.size() / 2];
+    typical_contrast_ = median(contrasts);
+    std::vector<double> middles, steps;
+    for (const detection::Dot& dot : labelled_dots) {
+      middles.push_back(mean_between(dot.centre_px, 0, 0.5 * dot.radius_px));
+      steps.push_back(mean_between(dot.centre_px, 1.5 * dot.radius_px, 2 * dot.radius_px) - middles.back());
+    }
+    metal_ = median(middles);
+    step_to_background_ = median(steps);
   }
 
   std::optional<detection::Dot> fit(const detection::Dot& start) const {
@@ -96,16 +102,46 @@ class BallFitter {
     return dot && is_plausible(*dot, start, typical_contrast_, reach_px) ? dot : std::nullopt;
   }
 
+  /// Whether the disc is as dark as the middles of the labelled balls: what lies behind such metal is not
+  /// seen.
+  bool is_metal(const Vector2d& raw, double radius) const {
+    const double above_metal = mean_between(raw, 0, radius) - metal_;
+    return std::signbit(above_metal) != std::signbit(step_to_background_) ||
+           std::abs(above_metal) < 0.1 * std::abs(step_to_background_);
+  }
+
   bool is_black(const Vector2d& raw) const {
     return image_.pixels(static_cast<int>(std::lround(raw.x())), static_cast<int>(std::lround(raw.y()))) <=
            appearance_.options.floor;
   }
 
  private:
+  static double median(std::vector<double> values) {
+    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  }
+
+  /// Mean grey value of the pixels at distances from `least` to `most` of a point.
+  double mean_between(const Vector2d& middle, double least, double most) const {
+    const auto& pixels = image_.pixels;
+    const auto from = [](double at) { return std::max(0, int(std::ceil(at))); };
+    double sum = 0, count = 0;
+    for (int v = from(middle.y() - most); v <= std::min(pixels.height() - 1, int(middle.y() + most)); ++v)
+      for (int u = from(middle.x() - most); u <= std::min(pixels.width() - 1, int(middle.x() + most)); ++u) {
+        const double distance = (Vector2d(u, v) - middle).norm();
+        if (distance < least || distance > most) continue;
+        sum += pixels(u, v);
+        ++count;
+      }
+    return count > 0 ? sum / count : 0;
+  }
+
   const xray::XrayImage& image_;
   detection::DotAppearance appearance_;
   std::vector<detection::Dot> neighbours_;
   double typical_contrast_ = 0;
+  double metal_ = 0, step_to_background_ = 0;  // grey values
 };
 
 bool inside(const xray::XrayImage& xray_image, const Vector2d& raw, double margin) {
@@ -121,7 +157,7 @@ FiducialStatus status_if_absent(const xray::XrayImage& xray_image, const BallFit
   const bool behind = std::any_of(
       labelled_dots.begin(), labelled_dots.end(),
       [&](const detection::Dot& other) { return (other.centre_px - raw).norm() < 1.2 * other.radius_px; });
-  return behind ? FiducialStatus::occluded : FiducialStatus::not_found;
+  return behind || fitter.is_metal(raw, radius) ? FiducialStatus::occluded : FiducialStatus::not_found;
 }
 
 void set_pixels(Fiducial& fiducial, const detection::Dot& dot, const rectification::DistortionMap& map,

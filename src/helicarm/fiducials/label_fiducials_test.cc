@@ -63,6 +63,25 @@ void expect_right(const LabelledFiducials& found, const SimulatedView& view, dou
   }
 }
 
+TEST(LabelFiducials, FiducialBehindABonePlateIsOccludedAndOneThatIsAbsentIsNotFound) {
+  const SimulatedView& view = faulty_case().views[0];
+  xray::XrayImage xray_image = exposure_of(view);
+  const rectification::Rectification rectification =
+      rectification::rectify(xray_image, *faulty_case().plate, {}).value();
+  const LabelledFiducials before = label(xray_image, rectification, faulty_case().calibrator).value();
+  ASSERT_EQ(before.fiducials[0].status, FiducialStatus::used);
+  EXPECT_EQ(before.fiducials[3].status, FiducialStatus::not_found);
+  const auto pixel = [&](const Vector2d& uv, int u, int v) -> auto& {
+    return xray_image.pixels(int(uv.x()) + u, int(uv.y()) + v);
+  };
+  const auto metal = pixel(before.fiducials[0].uv_raw, 0, 0);
+  for (int v = -12; v <= 12; ++v)
+    for (int u = -30; u <= 30; ++u) pixel(view.balls[3].raw, u, v) = metal;
+  const LabelledFiducials after = label(xray_image, rectification, faulty_case().calibrator).value();
+  EXPECT_EQ(after.fiducials[3].status, FiducialStatus::occluded);
+  EXPECT_EQ(after.fiducials[8].status, FiducialStatus::not_found);
+}
+
 TEST(LabelFiducials, ApAndLateralViewLabelEveryFiducial) {
   for (const SimulatedView& view : sound_case().views) {
     const LabelledFiducials found = found_in(sound_case(), view);
