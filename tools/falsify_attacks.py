@@ -282,6 +282,17 @@ def _(case):
     case.json["plate"] = None
 
 
+@attack("distortion maps of the two views exchanged", "accuracy")
+def _(case):
+    maps = []
+    for view in case.json["views"]:
+        out = case.folder / f"rectified-{view['name']}"
+        case.bench.call("rectify", case.folder / view["image"], "--plate", case.folder / case.json["plate"], "--out", out)
+        maps.append(f"{out.name}/map.json")
+    for view, other in zip(case.json["views"], reversed(maps)):
+        view["map"] = other
+
+
 @attack("another response of the detector (grey values to the power 0.6)", "flat")
 def _(case):
     case.change_images(lambda image: raised(image, 0.6))
@@ -309,6 +320,22 @@ def _(case):
     for view in case.views():
         u, v = case.ball(view, "P3")
         case.change_images(lambda image: covered(image, u - 90, v - 60, u + 90, v + 60, 40), [view])
+
+
+@attack("bone plate over three fiducials, a screw beside a fourth and four among them", "flat")
+def _(case):
+    for view in case.views():
+        image = case.image(view)
+        u, v = (int(x) for x in case.ball(view, "P1"))
+        steel = image.pixels()[v * image.size[0] + u]
+        balls = [case.ball(view, f"P{i}") for i in range(1, 13)]
+        for u, v in balls[2:5]:
+            image = covered(image, u - 22, v - 22, u + 22, v + 22, steel)
+        u, v = balls[7]
+        image = disc(image, u + 7, v + 4, 8, 0.35)
+        for i in (0, 5, 8, 10):
+            image = disc(image, balls[i][0] + 28, balls[i][1] + 17, 8, 0.35)
+        image.write()
 
 
 @attack("a decoy ball near a fiducial that is hidden", "flat")
