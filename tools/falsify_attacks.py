@@ -322,7 +322,7 @@ def _(case):
         case.change_images(lambda image: covered(image, u - 90, v - 60, u + 90, v + 60, 40), [view])
 
 
-@attack("bone plate over three fiducials, a screw beside a fourth and four among them", "flat")
+@attack("bone plate over three fiducials, a screw over a fourth and six among them", "flat")
 def _(case):
     for view in case.views():
         image = case.image(view)
@@ -330,11 +330,11 @@ def _(case):
         steel = image.pixels()[v * image.size[0] + u]
         balls = [case.ball(view, f"P{i}") for i in range(1, 13)]
         for u, v in balls[2:5]:
-            image = covered(image, u - 22, v - 22, u + 22, v + 22, steel)
+            image = covered(image, u - 30, v - 24, u + 30, v + 24, steel)
         u, v = balls[7]
-        image = disc(image, u + 7, v + 4, 8, 0.35)
-        for i in (0, 5, 8, 10):
-            image = disc(image, balls[i][0] + 28, balls[i][1] + 17, 8, 0.35)
+        image = disc(image, u + 9, v + 5, 12, 0.35)
+        for i in (0, 1, 5, 6, 8, 9):
+            image = disc(image, balls[i][0] + 36, balls[i][1] + 21, 12, 0.35)
         image.write()
 
 
