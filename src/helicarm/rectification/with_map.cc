@@ -81,9 +81,8 @@ std::optional<double> bend_px(const SeenPlate& plate, const DistortionMap& map) 
   return fit ? std::optional(fit->map.residual_rms_px) : std::nullopt;
 }
 
-/// More than what an own map of these dots leaves, each predicted from the others, by five standard
-/// deviations of a root mean square and by 30 %: a map of another pose. A right one is at most 5 % above it,
-/// on intensifiers too.
+/// What an own map of these dots leaves, each predicted from the others, and 30 % or five standard deviations
+/// of a root mean square more: a map of another pose exceeds it.
 double bend_limit_px(const SeenPlate& plate, const DistortionMap& map) {
   std::vector<Correspondence> dots;
   for (const IndexedDot& d : plate.seen.lattice.dots) {

@@ -9,7 +9,7 @@ namespace helicarm::xray {
 namespace {
 
 constexpr const char* jpeg = "1.2.840.10008.1.2.4.50";
-constexpr const char* jpeg_2000_file = "1.2.840.10008.1.2.4.90";
+constexpr const char* jpeg_2000_syntax = "1.2.840.10008.1.2.4.90";
 constexpr const char* rle = "1.2.840.10008.1.2.5";
 
 const std::string jpeg_begin = "\xFF\xD8\xFF\xDB";
@@ -45,8 +45,8 @@ TEST(FrameFragments, OneFrameHasAllFragments) {
 
 TEST(FrameFragments, WithoutATableImagesBeginFrames) {
   EXPECT_EQ(begins(jpeg, {jpeg_begin, "more", jpeg_begin, jpeg_begin, "more", "rest"}, 3), "1-3 3-4 4-7 ");
-  EXPECT_EQ(begins(jpeg_2000_file, {codestream_begin, "more", codestream_begin, "more"}, 2), "1-3 3-5 ");
-  EXPECT_EQ(begins(jpeg_2000_file, {boxes_begin, "more", boxes_begin, "more"}, 2), "1-3 3-5 ");
+  EXPECT_EQ(begins(jpeg_2000_syntax, {codestream_begin, "more", codestream_begin, "more"}, 2), "1-3 3-5 ");
+  EXPECT_EQ(begins(jpeg_2000_syntax, {boxes_begin, "more", boxes_begin, "more"}, 2), "1-3 3-5 ");
   EXPECT_EQ(begins(rle, {rle_begin, "more", rle_begin, "more"}, 2), "1-3 3-5 ");
 }
 

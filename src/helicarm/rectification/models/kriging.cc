@@ -136,7 +136,7 @@ ModelFit fit_order(const PlateDots& dots, int order, const MatrixX2d& knots) {
 
 constexpr int cubic = 3;  // beyond the dots only the trend remains: it must extrapolate moderately
 
-ModelFit fit_kriging(const PlateDots& dots, std::optional<int> order) {
+ModelFit kriging_fit(const PlateDots& dots, std::optional<int> order) {
   const Index n = dots.raw.rows();
   const int highest = n > 200 ? std::min(highest_order(n), 5) : cubic;
   if (highest_order(n) < order.value_or(cubic)) return {};
@@ -209,6 +209,6 @@ ModelPointer read_trend(JsonReader& reader) {
   return std::make_shared<KrigingModel>(std::move(trend));
 }
 
-ModelKind kriging_kind() { return {"kriging", 2 * term_count(cubic), fit_kriging, read_trend}; }
+ModelKind kriging_kind() { return {"kriging", 2 * term_count(cubic), kriging_fit, read_trend}; }
 
 }  // namespace helicarm::rectification

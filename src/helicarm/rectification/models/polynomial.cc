@@ -29,7 +29,7 @@ ModelFit fit_order(const PlateDots& dots, int order) {
           fit.held_out_rms};
 }
 
-ModelFit fit_polynomial(const PlateDots& dots, std::optional<int> order) {
+ModelFit polynomial_fit(const PlateDots& dots, std::optional<int> order) {
   if (order) return fit_order(dots, *order);
   return simplest_good(1, highest_order(dots.raw.rows()), [&](int o) { return fit_order(dots, o); });
 }
@@ -63,6 +63,6 @@ int highest_order(Eigen::Index dots) {
   return highest;
 }
 
-ModelKind polynomial_kind() { return {"polynomial", 0, fit_polynomial, read_trend}; }
+ModelKind polynomial_kind() { return {"polynomial", 0, polynomial_fit, read_trend}; }
 
 }  // namespace helicarm::rectification

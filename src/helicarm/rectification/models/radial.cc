@@ -43,7 +43,7 @@ class RadialModel : public LinearModel {
   Vector2d axis_;  ///< normalised
 };
 
-ModelFit fit_radial(const PlateDots& dots, std::optional<int>) {
+ModelFit radial_fit(const PlateDots& dots, std::optional<int>) {
   if (dots.raw.rows() < 2 * term_number) return {};
   const LinearFit fit =
       fit_linear(dots, rows_for(dots, [&](const Vector2d& t) { return basis_at(t, dots.image_centre); }));
@@ -63,6 +63,6 @@ ModelPointer read(JsonReader& reader) {
 
 }  // namespace
 
-ModelKind radial_kind() { return {"radial", 0, fit_radial, read}; }
+ModelKind radial_kind() { return {"radial", 0, radial_fit, read}; }
 
 }  // namespace helicarm::rectification
