@@ -28,7 +28,8 @@ void message_to_lines_in_xrays(benchmark::State& state) {
   tracker::PoseBoard board;
   guidance::Poses xray_image;
   xray_image.tracker_from_calibrator = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, 900}};
-  xray_image.tracker_from_femur = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {100, 50, 900}};
+  xray_image.tracker_from_bone["femur"] =
+      geometry::RigidTransform{Eigen::Matrix3d::Identity(), {100, 50, 900}};
   const geometry::View views[2] = {
       {{4000, 4000, 511, 511, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 700}}},
       {{4000, 4000, 511, 511, 0}, {geometry::rotation_from_euler(1.57, 0, 0), {0, 0, 700}}}};
@@ -44,9 +45,8 @@ void message_to_lines_in_xrays(benchmark::State& state) {
                begin + time_s);
     guidance::Poses now;
     now.tracker_from_tool = board.latest("tool", begin + time_s).value().tracker_from_tool;
-    now.tracker_from_femur = board.latest("femur", begin + time_s).value().tracker_from_tool;
-    const verification::ToolLine line =
-        operation::tool_line("femur", guidance::Bone::femur, xray_image, now, {}).value();
+    now.tracker_from_bone["femur"] = board.latest("femur", begin + time_s).value().tracker_from_tool;
+    const verification::ToolLine line = operation::tool_line("femur", "femur", xray_image, now, {}).value();
     for (const geometry::View& view : views) benchmark::DoNotOptimize(verification::line_in_xray(view, line));
   }
 }

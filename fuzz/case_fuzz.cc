@@ -30,7 +30,7 @@ void run(std::string_view bytes) {
     check(view.pixel_mm.value_or(1) > 0 && view.source_detector_mm.value_or(1000) >= 200,
           "lengths are in range");
     check_pose(view.poses.tracker_from_calibrator);
-    check_pose(view.poses.tracker_from_femur);
+    for (const auto& [bone, pose] : view.poses.tracker_from_bone) check_pose(pose);
   }
   check_pose(read->poses_now.tracker_from_tool);
   for (const pipeline::Pick& pick : read->picks)

@@ -9,7 +9,8 @@ void run(std::string_view bytes) {
   views[0].name = "AP";
   views[1].name = "LAT";
   run_round_trip(
-      bytes, [&](const Json& json) { return pipeline::picks_from(json, "picks", views); },
+      bytes,
+      [&](const Json& json) { return pipeline::picks_from(json, "picks", views, guidance::knee_bones()); },
       [](const std::vector<pipeline::Pick>& picks) {
         Json list = Json::array();
         for (const pipeline::Pick& pick : picks) list.push_back(to_json(pick));

@@ -18,11 +18,11 @@ std::vector<std::string> seeds() {
   operation::OperationPlan plan;
   plan.tracker.facets = {{"calibrator/1", {Eigen::Matrix3d::Identity(), {85, 0, 10}}}};
   plan.robot.tool = {{Eigen::Matrix3d::Identity(), {0, 0, 150}}, 1.2};
-  plan.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE", operation::TunnelEnd::end}};
+  plan.tunnels = {{"femur", "femur", "FS", "FE", operation::TunnelEnd::end}};
   operation::OperationPlan full = plan;
   full.robot.approach.keep_outs = {{{0, 0, -200}, Eigen::Vector3d::UnitZ()}};
   full.tracker.pointer = operation::Pointer{"pointer", {0, 0, 120}};
-  full.check_points = {{"divot", guidance::Bone::tibia, 1}};
+  full.check_points = {{"divot", "tibia", 1}};
   full.picks = Json::array({{{"name", "FS"}, {"view", "AP"}, {"uv", {10, 20}}}});
   full.plate.reset();
   return {write(plan).dump(), write(full).dump()};

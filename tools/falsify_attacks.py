@@ -163,7 +163,7 @@ def _(case):
 
 @attack("the bone's pose at the second acquisition is 5 mm off", "tunnels")
 def _(case):
-    pose = case.json["views"][1]["poses"]["tracker_from_femur"]
+    pose = case.json["views"][1]["poses"]["tracker_from_bone"]["femur"]
     for k in range(3):
         pose[k][3] += 5 / math.sqrt(3)
 

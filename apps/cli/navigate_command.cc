@@ -57,8 +57,9 @@ std::string not_seen(const operation::OperationPlan& plan, const tracker::PoseBo
     return board.latest(tool, tracker::monotonic_seconds()).has_value();
   };
   std::string missing;
-  for (const std::string& tool : {plan.tracker.femur, plan.tracker.tibia, plan.tracker.tool})
-    if (!seen(tool)) missing += " " + tool;
+  for (const auto& [bone, marker] : plan.tracker.markers)
+    if (!seen(marker)) missing += " " + marker;
+  if (!seen(plan.tracker.tool)) missing += " " + plan.tracker.tool;
   if (std::ranges::none_of(plan.tracker.facets,
                            [&](const tracker::Facet& facet) { return seen(facet.name); }))
     missing += " calibrator";

@@ -162,8 +162,8 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
     if (!arguments.plan.empty()) {
       operation::OperationPlan plan = rehearsal::plan_for(*virtual_or, virtual_or->tracker().port());
       if (arguments.check_points)
-        plan.check_points = {{"femur notch", guidance::Bone::femur, notch_limit_mm},
-                             {"tibia notch", guidance::Bone::tibia, notch_limit_mm}};
+        plan.check_points = {{"femur notch", "femur", notch_limit_mm},
+                             {"tibia notch", "tibia", notch_limit_mm}};
       value_or_throw(write_file(arguments.plan, to_text(operation::to_json(plan))));
     }
     if (!console.quiet)

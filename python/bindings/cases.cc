@@ -118,6 +118,22 @@ py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, con
   return python_from(value_or_raise(simulated));
 }
 
+py::object place_array(const guidance::Place* place) {
+  return vector_array<3>(place ? std::optional<Eigen::Vector3d>(place->point()) : std::nullopt);
+}
+
+py::dict bone_places(const guidance::PointInFrames& point) {
+  py::dict places;
+  for (const auto& [bone, place] : point.in_bones) {
+    py::dict at;
+    at["xyz_mm"] = place_array(&place);
+    at["covariance_mm2"] = read_only(matrix_array(place.covariance));
+    at["error_95_mm"] = localization::length_at_95(place.covariance);
+    places[bone.c_str()] = at;
+  }
+  return places;
+}
+
 void add_result_points(py::module_& module) {
   using Point = pipeline::PointResult;
   const auto of_place = [](auto get) {
@@ -143,17 +159,21 @@ void add_result_points(py::module_& module) {
             return py::float_(localization::length_at_95(g.covariance_in_calibrator));
           }),
           "Distance from the true point that 95 % of such points do not exceed, mm; or None.")
+      .def_property_readonly(
+          "in_bones", [](const Point& p) { return p.place ? bone_places(*p.place) : py::dict(); },
+          "Of each bone in which it is known: {xyz_mm, covariance_mm2, error_95_mm}.")
       .def_property_readonly("in_femur_mm", of_place([](const guidance::PointInFrames& g) {
-                               return vector_array<3>(g.in_femur);
+                               return place_array(g.in("femur"));
                              }),
                              "(3,) or None.")
       .def_property_readonly("in_tibia_mm", of_place([](const guidance::PointInFrames& g) {
-                               return vector_array<3>(g.in_tibia);
+                               return place_array(g.in("tibia"));
                              }),
                              "(3,) or None.")
-      .def_property_readonly(
-          "in_tool_mm", of_place([](const guidance::PointInFrames& g) { return vector_array<3>(g.in_tool); }),
-          "(3,) or None.")
+      .def_property_readonly("in_tool_mm", of_place([](const guidance::PointInFrames& g) {
+                               return place_array(g.in_tool ? &*g.in_tool : nullptr);
+                             }),
+                             "(3,) or None.")
       .def_readonly("ray_gap_mm", &Point::ray_gap_mm)
       .def_property_readonly(
           "reason",

@@ -42,10 +42,14 @@ std::optional<WantedPick> missing_pick(const ApplicationState& state, const std:
 
 }  // namespace
 
+WantedPick wanted_end(const operation::PlannedTunnel& tunnel, const std::string& end) {
+  return {end, "", tunnel.bone.empty() ? std::nullopt : std::optional(tunnel.bone)};
+}
+
 std::optional<WantedPick> next_pick(const ApplicationState& state) {
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
     for (const std::string& point : {tunnel.start, tunnel.end})
-      if (const auto missing = missing_pick(state, point, tunnel.bone)) return missing;
+      if (const auto missing = missing_pick(state, point, wanted_end(tunnel, point).bone)) return missing;
   return std::nullopt;
 }
 

@@ -105,6 +105,8 @@ struct WantedPick {
   std::string view;
   std::optional<guidance::Bone> bone;
 };
+/// An end of a tunnel, in any view.
+WantedPick wanted_end(const operation::PlannedTunnel& tunnel, const std::string& end);
 std::optional<WantedPick> next_pick(const ApplicationState& state);
 /// The next landmark and view to pick.
 std::optional<WantedPick> next_landmark(const ApplicationState& state);

@@ -22,7 +22,7 @@ struct LiveState {
   double at_s = 0;  ///< monotonic
   std::vector<StatusIndicator> indicators;
   robot::RobotLinkStatus robot;
-  guidance::Bone bone = guidance::Bone::femur;           ///< reference bone of the tool
+  guidance::Bone bone;                                   ///< reference bone of the tool
   std::optional<Expected<operation::ToolOverlay>> tool;  ///< empty before registration
   QString tunnel;                                        ///< tunnel of `aim`
   std::optional<Expected<operation::TunnelAim>> aim;     ///< empty without a tunnel

@@ -151,9 +151,9 @@ LiveState Controller::live() const {
     const auto holds = plan_watch_->holds(board, equipment_->devices->robot().track(), now.at_s);
     if (!holds && holds.error().reason == Reason::plan_stale) now.stale = holds.error();
   }
-  if (!live_tool_) return now;
+  if (!live_tool_ || state_.tunnels.empty()) return now;
   const auto tunnel = std::ranges::find(state_.tunnels, followed_, &operation::PlannedTunnel::name);
-  if (tunnel != state_.tunnels.end()) now.bone = tunnel->bone;
+  now.bone = (tunnel == state_.tunnels.end() ? state_.tunnels.front() : *tunnel).bone;
   now.tool = live_tool_->overlay(board, now.bone);
   if (tunnel == state_.tunnels.end()) return now;
   now.tunnel = QString::fromStdString(followed_);

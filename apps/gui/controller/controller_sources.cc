@@ -21,12 +21,11 @@ std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given, bo
   std::vector<operation::PlannedTunnel> tunnels;
   for (const pipeline::TunnelPlan& tunnel : given.tunnels) {
     const auto pick = std::ranges::find(given.picks, tunnel.start, &pipeline::Pick::name);
-    const guidance::Bone bone =
-        pick == given.picks.end() ? guidance::Bone::femur : pick->moves_with.value_or(guidance::Bone::femur);
-    tunnels.push_back({tunnel.name, bone, tunnel.start, tunnel.end});
+    const auto bone = pick == given.picks.end() ? std::nullopt : pick->moves_with;
+    tunnels.push_back({tunnel.name, bone.value_or(guidance::Bone()), tunnel.start, tunnel.end});
   }
   if (given.picks.empty() && tunnels.empty() && !has_models)
-    tunnels = {{"femur", guidance::Bone::femur, "FS", "FE"}, {"tibia", guidance::Bone::tibia, "TS", "TE"}};
+    tunnels = {{"femur", "femur", "FS", "FE"}, {"tibia", "tibia", "TS", "TE"}};
   return tunnels;
 }
 
@@ -115,7 +114,8 @@ Controller::Change Controller::with_plan(const operation::OperationPlan& plan, c
   std::vector<pipeline::CaseView> views(plan.views.size());
   for (std::size_t i = 0; i < views.size(); ++i) views[i].name = plan.views[i];
   const phantom::Calibrator calibrator = value_or_throw(phantom::calibrator_named(plan.calibrator, "."));
-  const std::vector<pipeline::Pick> picks = value_or_throw(pipeline::picks_from(offered, "plan", views));
+  const std::vector<pipeline::Pick> picks =
+      value_or_throw(pipeline::picks_from(offered, "plan", views, plan.bones));
   return [=](ApplicationState& state) {
     state.views = plan.views;
     state.calibrator = calibrator;
@@ -135,7 +135,7 @@ void Controller::open_case(const fs::path& folder, bool keeps_picks) {
          pipeline::Case given = value_or_throw(pipeline::read_case(folder));
          if (pipeline::has_models(folder)) equipment.with_models = pipeline::read_registration_case(folder);
          if (!keeps_picks) return with_case(std::move(given), equipment);
-         const auto unsaved = unsaved_picks(folder, given.views);
+         const auto unsaved = unsaved_picks(folder, given);
          return [change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)), folder,
                  unsaved](ApplicationState& state) {
            change(state);

@@ -16,7 +16,7 @@ ApplicationState state_with(std::vector<pipeline::ViewResult> views) {
   state.source = Source::files;
   state.views = {"AP", "LAT"};
   state.next_view = "LAT";
-  state.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE"}};
+  state.tunnels = {{"femur", "femur", "FS", "FE"}};
   auto result = std::make_shared<pipeline::Result>();
   result->views = std::move(views);
   state.result = std::move(result);

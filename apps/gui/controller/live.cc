@@ -40,10 +40,11 @@ std::vector<StatusIndicator> tracker_indicators(const operation::TrackerPlan& pl
                                                 const std::vector<tracker::ToolState>& tools) {
   std::vector<std::string> facets;
   for (const tracker::Facet& facet : plan.facets) facets.push_back(facet.name);
-  return {marker_indicator(live_tr("calibrator"), least_age(tools, facets)),
-          marker_indicator(live_tr("femur"), least_age(tools, {plan.femur})),
-          marker_indicator(live_tr("tibia"), least_age(tools, {plan.tibia})),
-          marker_indicator(live_tr("tool"), least_age(tools, {plan.tool}))};
+  std::vector<StatusIndicator> indicators{marker_indicator(live_tr("calibrator"), least_age(tools, facets))};
+  for (const auto& [bone, marker] : plan.markers)
+    indicators.push_back(marker_indicator(QString::fromStdString(bone), least_age(tools, {marker})));
+  indicators.push_back(marker_indicator(live_tr("tool"), least_age(tools, {plan.tool})));
+  return indicators;
 }
 
 StatusIndicator robot_indicator(const robot::RobotLinkStatus& status) {

@@ -14,12 +14,14 @@ fs::path unsaved_file(const fs::path& case_folder) { return case_folder / "unsav
 
 }  // namespace
 
-Expected<std::optional<std::vector<pipeline::Pick>>> unsaved_picks(
-    const fs::path& case_folder, const std::vector<pipeline::CaseView>& views) {
+Expected<std::optional<std::vector<pipeline::Pick>>> unsaved_picks(const fs::path& case_folder,
+                                                                   const pipeline::Case& given) {
   const fs::path file = unsaved_file(case_folder);
   if (!fs::exists(file)) return std::nullopt;
   return read_json(file)
-      .and_then([&](const Json& json) { return pipeline::picks_from(json, file.filename().string(), views); })
+      .and_then([&](const Json& json) {
+        return pipeline::picks_from(json, file.filename().string(), given.views, given.bones);
+      })
       .map([](std::vector<pipeline::Pick> picks) { return std::optional(std::move(picks)); });
 }
 

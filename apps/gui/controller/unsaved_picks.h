@@ -10,9 +10,9 @@
 /// so that neither a crash nor opening another case loses them.
 namespace helicarm::gui {
 
-/// Nothing where there are none. Fails as `read_json` and `picks_from`.
-Expected<std::optional<std::vector<pipeline::Pick>>> unsaved_picks(
-    const std::filesystem::path& case_folder, const std::vector<pipeline::CaseView>& views);
+/// Nothing where there are none; of the views and bones of the case. Fails as `read_json` and `picks_from`.
+Expected<std::optional<std::vector<pipeline::Pick>>> unsaved_picks(const std::filesystem::path& case_folder,
+                                                                   const pipeline::Case& given);
 
 /// Fails as `write_file`.
 Expected<void> keep_unsaved(const std::filesystem::path& case_folder,

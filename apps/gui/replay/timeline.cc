@@ -223,10 +223,12 @@ Expected<operation::ToolOverlay> overlay_of(const operation::LiveTool& tool, con
       return seen == state.tracker_from.end() ? std::nullopt : std::optional(seen->second);
     };
     const auto tunnel = std::ranges::find(plan.tunnels, state.tunnel, &operation::PlannedTunnel::name);
-    const guidance::Poses now{
-        {}, pose(plan.tracker.femur), pose(plan.tracker.tibia), pose(plan.tracker.tool)};
+    guidance::Poses now;
+    for (const auto& [bone, marker] : plan.tracker.markers)
+      if (const auto seen = pose(marker)) now.tracker_from_bone.emplace(bone, *seen);
+    now.tracker_from_tool = pose(plan.tracker.tool);
     return value_or_throw(
-        tool.overlay(now, tunnel == plan.tunnels.end() ? guidance::Bone::femur : tunnel->bone));
+        tool.overlay(now, tunnel == plan.tunnels.end() ? plan.tunnels.front().bone : tunnel->bone));
   });
 }
 

@@ -163,15 +163,15 @@ std::vector<DrawnLink> drawn_links(const LiveScene& live) {
   return links;
 }
 
-std::optional<MovedBone> moved_bone(const ResultScene& scene, guidance::Bone bone,
-                                    const std::optional<geometry::RigidTransform>& motion) {
+std::optional<MovedBone> moved_bone(const ResultScene& scene, const guidance::Bone& bone,
+                                    const geometry::RigidTransform& motion) {
   constexpr double least_mm = 0.5;
   Vector3d sum = Vector3d::Zero();
   int points = 0;
   for (const PointShape& point : scene.points)
     if (point.moves_with == bone) sum += point.error.centre, ++points;
-  if (!motion || points == 0) return std::nullopt;
-  const Vector3d middle = sum / points, now = *motion * middle;
+  if (points == 0) return std::nullopt;
+  const Vector3d middle = sum / points, now = motion * middle;
   const double moved_mm = (now - middle).norm();
   return moved_mm < least_mm ? std::nullopt : std::optional(MovedBone{now, moved_mm});
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -97,11 +98,9 @@ std::optional<phantom::TriangleMesh> cone_of(const phantom::Calibrator& calibrat
 
 /// The moving parts. Absent: unknown at present and not drawn.
 struct LiveScene {
-  std::optional<geometry::RigidTransform> calibrator_from_tip;  ///< z along the tool, out of its tip
-  /// Motion of the bones since the acquisition.
-  std::optional<geometry::RigidTransform> calibrator_from_femur_now, calibrator_from_tibia_now;
-  /// Present poses of the bones' markers.
-  std::optional<geometry::RigidTransform> calibrator_from_femur_marker, calibrator_from_tibia_marker;
+  std::optional<geometry::RigidTransform> calibrator_from_tip;     ///< z along the tool, out of its tip
+  std::map<guidance::Bone, geometry::RigidTransform> bones_moved;  ///< since the acquisition
+  std::map<guidance::Bone, geometry::RigidTransform> calibrator_from_bone_marker;  ///< now
   std::optional<geometry::RigidTransform> calibrator_from_base;
   std::string robot_model = "UR5";
   std::optional<robot::Joints> joints;
@@ -123,8 +122,8 @@ struct MovedBone {
   double moved_mm;
 };
 /// Nothing for a motion below 0.5 mm, the tracker's noise, and without points that move with the bone.
-std::optional<MovedBone> moved_bone(const ResultScene& scene, guidance::Bone bone,
-                                    const std::optional<geometry::RigidTransform>& motion);
+std::optional<MovedBone> moved_bone(const ResultScene& scene, const guidance::Bone& bone,
+                                    const geometry::RigidTransform& motion);
 
 /// The links of the arm from the base to the flange; empty if base, joints or model are unknown.
 std::vector<Segment> robot_links(const LiveScene& live);

@@ -97,18 +97,16 @@ TEST(SceneValues, MovedBoneIsStatedAtItsPointsAndNotForNoise) {
   for (const double x : {0, 10})
     scene.points.push_back({"TS",
                             localization::PointSource::pick,
-                            guidance::Bone::tibia,
+                            "tibia",
                             {{x, 0, 0}, Matrix3d::Identity(), Vector3d::Ones()},
                             {}});
   const geometry::RigidTransform motion{Matrix3d::Identity(), {0, 0, 3.1}};
-  const auto moved = moved_bone(scene, guidance::Bone::tibia, motion);
+  const auto moved = moved_bone(scene, "tibia", motion);
   ASSERT_TRUE(moved);
   EXPECT_DOUBLE_EQ(moved->moved_mm, 3.1);
   EXPECT_EQ(moved->place, Vector3d(5, 0, 3.1));
-  EXPECT_FALSE(moved_bone(scene, guidance::Bone::femur, motion));
-  EXPECT_FALSE(moved_bone(scene, guidance::Bone::tibia, std::nullopt));
-  EXPECT_FALSE(moved_bone(scene, guidance::Bone::tibia,
-                          geometry::RigidTransform{Matrix3d::Identity(), {0.2, 0, 0.2}}));
+  EXPECT_FALSE(moved_bone(scene, "femur", motion));
+  EXPECT_FALSE(moved_bone(scene, "tibia", geometry::RigidTransform{Matrix3d::Identity(), {0.2, 0, 0.2}}));
 }
 
 case_registration::RegisteredModel registered_femur() {
@@ -117,7 +115,7 @@ case_registration::RegisteredModel registered_femur() {
   model.registration.world_from_model.translation = {1, 2, 3};
   model.registration.covariance.setIdentity();
   model.model = std::make_shared<const registration::Model>();
-  model.moves_with = guidance::Bone::femur;
+  model.moves_with = "femur";
   for (const double z : {10, 30}) {
     case_registration::RegisteredPoint& point = model.points.emplace_back();
     point.name = z < 20 ? "tunnel_start" : "tunnel_end";
@@ -141,7 +139,7 @@ TEST(SceneValues, RegisteredModelHasItsPlan) {
   EXPECT_NEAR(scene.points[1].error.radii.x(), 2.795, 1e-3);
   ASSERT_EQ(scene.tunnels.size(), 1u);
   EXPECT_EQ(scene.tunnels[0].axis.to, Vector3d(0, 0, 30));
-  EXPECT_EQ(scene.tunnels[0].moves_with, guidance::Bone::femur);
+  EXPECT_EQ(scene.tunnels[0].moves_with, "femur");
 }
 
 TEST(SceneValues, RefusedOrMovedModelHasNoPlan) {

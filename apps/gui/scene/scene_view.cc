@@ -143,10 +143,8 @@ std::vector<DrawnModel> SceneView::drawn_models() const {
 std::vector<SceneLabel> SceneView::labels() const {
   std::vector<SceneLabel> labels;
   const auto carried = [&](const std::optional<guidance::Bone>& bone, const Eigen::Vector3d& place) {
-    if (!bone) return place;
-    const auto& motion =
-        *bone == guidance::Bone::femur ? live_.calibrator_from_femur_now : live_.calibrator_from_tibia_now;
-    return motion ? *motion * place : place;
+    const auto motion = bone ? live_.bones_moved.find(*bone) : live_.bones_moved.end();
+    return motion == live_.bones_moved.end() ? place : motion->second * place;
   };
   for (const PointShape& point : with_plans(scene_, models_).points)
     labels.push_back(
@@ -166,17 +164,15 @@ std::vector<SceneLabel> SceneView::labels() const {
   if (live_.calibrator_from_base && live_.joints)
     labels.push_back(
         {live_.calibrator_from_base->translation, QString::fromStdString(live_.robot_model), palette::joint});
-  for (const auto& [bone, motion, name] :
-       {std::tuple(guidance::Bone::femur, &live_.calibrator_from_femur_now, tr("femur")),
-        {guidance::Bone::tibia, &live_.calibrator_from_tibia_now, tr("tibia")}})
-    if (const auto moved = moved_bone(scene_, bone, *motion))
+  for (const auto& [bone, motion] : live_.bones_moved)
+    if (const auto moved = moved_bone(scene_, bone, motion))
       labels.push_back({moved->place,
-                        tr("%1 moved %2 mm since the image").arg(name).arg(moved->moved_mm, 0, 'f', 1),
+                        tr("%1 moved %2 mm since the image")
+                            .arg(QString::fromStdString(bone))
+                            .arg(moved->moved_mm, 0, 'f', 1),
                         palette::bone});
-  if (live_.calibrator_from_femur_marker)
-    labels.push_back({live_.calibrator_from_femur_marker->translation, tr("femur marker"), palette::bone});
-  if (live_.calibrator_from_tibia_marker)
-    labels.push_back({live_.calibrator_from_tibia_marker->translation, tr("tibia marker"), palette::bone});
+  for (const auto& [bone, marker] : live_.calibrator_from_bone_marker)
+    labels.push_back({marker.translation, tr("%1 marker").arg(QString::fromStdString(bone)), palette::bone});
   return labels;
 }
 

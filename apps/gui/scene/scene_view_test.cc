@@ -49,8 +49,8 @@ class ShownScene : public testing::Test {
     live.joints =
         ways.empty() ? robot::Joints((robot::Joints() << 0, -1.2, 1.5, -1, 0.5, 0).finished()) : ways.front();
     const guidance::Poses& poses = simulated().given.views[0].poses;
-    live.calibrator_from_femur_marker = guidance::calibrator_from(guidance::Bone::femur, poses);
-    live.calibrator_from_tibia_marker = guidance::calibrator_from(guidance::Bone::tibia, poses);
+    for (const auto& [bone, pose] : poses.tracker_from_bone)
+      live.calibrator_from_bone_marker.emplace(bone, *guidance::calibrator_from(bone, poses));
     for (int i = 10; i >= 0; --i) live.path.push_back(start - 12 * i * turn.col(2));
     return live;
   }
@@ -115,7 +115,7 @@ TEST_F(ShownScene, ToolRobotAndBonesMove) {
   view_.show_live(now);
   const QImage turned = acquired_view("robot_turned");
   EXPECT_GT(pixels_apart(still, turned), 100);
-  now.calibrator_from_tibia_now = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {25, 0, 0}};
+  now.bones_moved["tibia"] = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {25, 0, 0}};
   view_.show_live(now);
   EXPECT_GT(pixels_apart(acquired_view("tibia_moved"), turned), 100);
   view_.show_live({});
@@ -151,8 +151,8 @@ TEST_F(ShownScene, ModelsStandAtTheirPoses) {
   view_.show_models({shape});
   EXPECT_GT(pixels_apart(acquired_view("models_refused"), moved), 1000);
   LiveScene live;
-  live.calibrator_from_femur_now = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, 20}};
-  shape.moves_with = guidance::Bone::femur;
+  live.bones_moved["femur"] = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, 20}};
+  shape.moves_with = "femur";
   view_.show_models({shape});
   const QImage still = acquired_view("models_still");
   view_.show_live(live);

@@ -64,12 +64,11 @@ Stage::Stage() {
   solids_ = add(true);
   lines_ = add(false);
   path_ = add(false);
-  for (vtkActor*& points : points_) points = add(true);
+  points_ = add(true);
   tool_ = add(true);
-  for (vtkActor*& marker : markers_) marker = add(true);
   for (vtkActor*& link : links_) link = add(true);
   slice_ = add(false);
-  for (vtkActor*& bone : bones_) make_glass(bone = add(true), bone_opacity);
+  for (const guidance::Bone& bone : guidance::knee_bones()) make_glass(of_bone(bones_, bone), bone_opacity);
   make_glass(cone_ = add(true), cone_opacity);
 
   ShapeBuilder tool;
@@ -77,13 +76,7 @@ Stage::Stage() {
   tool.add_tube({{0, 0, -30}, {0, 0, -8}}, 2.5, 2.5, palette::tool);
   tool.add_tube({{0, 0, -8}, {0, 0, 0}}, 2.5, 0.2, palette::tool);
   give(tool_, tool);
-  for (vtkActor* marker : markers_) {
-    ShapeBuilder triad;
-    add_triad(triad, 25);
-    give(marker, triad);
-  }
   move(tool_, {});
-  for (vtkActor* marker : markers_) move(marker, {});
   for (vtkActor* link : links_) move(link, {});
 }
 
@@ -108,6 +101,12 @@ vtkActor* Stage::add(bool lit) {
   return actor;
 }
 
+vtkActor* Stage::of_bone(std::map<guidance::Bone, vtkActor*>& actors, const guidance::Bone& bone) {
+  const auto [actor, is_new] = actors.try_emplace(bone);
+  if (is_new) actor->second = add(true);
+  return actor->second;
+}
+
 void Stage::move(vtkActor* actor, const std::optional<geometry::RigidTransform>& calibrator_from_body) {
   actor->SetVisibility(calibrator_from_body.has_value());
   if (!calibrator_from_body) return;
@@ -128,9 +127,11 @@ void Stage::set_result(const ResultScene& scene, double error_scale) {
     const Vector3d ray[]{view.central_ray.from, view.central_ray.to};
     lines.add_line(ray, palette::dim(palette::of_view(i)));
   }
-  std::array<ShapeBuilder, 3> points;
+  ShapeBuilder points;
+  std::map<guidance::Bone, ShapeBuilder> bone_points;
+  for (const auto& [bone, actor] : bone_points_) bone_points[bone];  // emptied if it has none now
   const auto group = [&](const std::optional<guidance::Bone>& bone) -> ShapeBuilder& {
-    return points[bone ? (*bone == guidance::Bone::femur ? 1 : 2) : 0];
+    return bone ? bone_points[*bone] : points;
   };
   for (const PointShape& point : scene.points) {
     for (const Segment& ray : point.rays) {
@@ -153,14 +154,15 @@ void Stage::set_result(const ResultScene& scene, double error_scale) {
   give(solids_, solids);
   give(lines_, lines);
   give(cone_, cone);
-  for (std::size_t i = 0; i < points.size(); ++i) give(points_[i], points[i]);
+  give(points_, points);
+  for (const auto& [bone, shapes] : bone_points) give(of_bone(bone_points_, bone), shapes);
 }
 
 void Stage::set_bones(const std::optional<BoneMeshes>& bones) {
-  for (std::size_t i = 0; i < 2; ++i) {
+  for (const auto& [name, actor] : bones_) {
     ShapeBuilder bone;
-    if (bones) bone.add_mesh(i == 0 ? bones->femur : bones->tibia, palette::bone);
-    give(bones_[i], bone);
+    if (bones) bone.add_mesh(name == "femur" ? bones->femur : bones->tibia, palette::bone);
+    give(actor, bone);
   }
 }
 
@@ -201,25 +203,32 @@ void Stage::set_models(const std::vector<DrawnModel>& models) {
 }
 
 void Stage::set_live(const LiveScene& live) {
-  const std::array motions{live.calibrator_from_femur_now, live.calibrator_from_tibia_now};
-  const std::array markers{live.calibrator_from_femur_marker, live.calibrator_from_tibia_marker};
+  const auto motion_of = [&](const guidance::Bone& bone) {
+    const auto motion = live.bones_moved.find(bone);
+    return motion == live.bones_moved.end() ? geometry::RigidTransform() : motion->second;
+  };
   const auto filled = [](vtkActor* actor) {
     return vtkPolyDataMapper::SafeDownCast(actor->GetMapper())->GetInput()->GetNumberOfCells() > 0;
   };
-  for (std::size_t i = 0; i < 2; ++i) {
-    for (vtkActor* actor : {bones_[i], points_[i + 1]}) {
-      move(actor, motions[i].value_or(geometry::RigidTransform()));
+  for (const auto* actors : {&bones_, &bone_points_})
+    for (const auto& [bone, actor] : *actors) {
+      move(actor, motion_of(bone));
       actor->SetVisibility(filled(actor));
     }
-    move(markers_[i], markers[i]);
+  for (const auto& [bone, marker] : markers_) move(marker, {});
+  for (const auto& [bone, calibrator_from_marker] : live.calibrator_from_bone_marker) {
+    vtkActor* marker = of_bone(markers_, bone);
+    if (!filled(marker)) {
+      ShapeBuilder triad;
+      add_triad(triad, 25);
+      give(marker, triad);
+    }
+    move(marker, calibrator_from_marker);
   }
   move(tool_, live.calibrator_from_tip);
   for (std::size_t i = 0; i < models_.size(); ++i) {
     const auto& [surface, colour, calibrator_from_model, moves_with] = models_[i];
-    const geometry::RigidTransform moved =
-        moves_with
-            ? motions[*moves_with == guidance::Bone::femur ? 0 : 1].value_or(geometry::RigidTransform())
-            : geometry::RigidTransform();
+    const geometry::RigidTransform moved = moves_with ? motion_of(*moves_with) : geometry::RigidTransform();
     for (vtkActor* actor : {model_actors_[i].depth, model_actors_[i].surface})
       move(actor, surface ? std::optional(moved * calibrator_from_model) : std::nullopt);
   }

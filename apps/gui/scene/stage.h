@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 
 #include <vtkActor.h>
 #include <vtkGenericOpenGLRenderWindow.h>
@@ -53,16 +54,19 @@ class Stage {
 
   bool is_shown(std::size_t link) const;
   vtkActor* add(bool lit);
+  /// The actor of a bone, added if it is new.
+  vtkActor* of_bone(std::map<guidance::Bone, vtkActor*>& actors, const guidance::Bone& bone);
   ModelActors add_model();
   void move(vtkActor* actor, const std::optional<geometry::RigidTransform>& calibrator_from_body);
 
   vtkNew<vtkGenericOpenGLRenderWindow> window_;
   vtkNew<vtkRenderer> renderer_;
   vtkActor *solids_, *lines_, *slice_, *tool_, *path_;
-  std::array<vtkActor*, 3> points_;  ///< at rest, with the femur, with the tibia
-  std::array<vtkActor*, 2> markers_;
+  vtkActor* points_;                                 ///< at rest
+  std::map<guidance::Bone, vtkActor*> bone_points_;  ///< that move with a bone
+  std::map<guidance::Bone, vtkActor*> markers_;
   std::array<vtkActor*, 7> links_;  ///< the last is the base's foot
-  std::array<vtkActor*, 2> bones_;
+  std::map<guidance::Bone, vtkActor*> bones_;
   vtkActor* cone_;
   std::vector<ModelActors> model_actors_;
   std::vector<DrawnModel> models_;  ///< of the first actors

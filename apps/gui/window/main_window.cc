@@ -368,8 +368,7 @@ void MainWindow::show_live() {
   scene.path = controller_.state().path.in_calibrator;
   if (tool && tool->calibrator_from_tip) {
     scene.calibrator_from_tip = tool->calibrator_from_tip;
-    (live_.bone == guidance::Bone::femur ? scene.calibrator_from_tibia_now
-                                         : scene.calibrator_from_femur_now) = tool->other_bone_moved;
+    scene.bones_moved = tool->other_bones_moved;
     if (live_.robot.state) {
       scene.calibrator_from_base = *scene.calibrator_from_tip * live_.robot.state->base_from_tcp.inverse();
       scene.joints = live_.robot.state->joints;

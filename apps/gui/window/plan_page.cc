@@ -158,7 +158,7 @@ std::optional<WantedPick> PlanPage::target() const {
     return end ? end : next_landmark(state);
   }
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
-    if (tunnel.start == *chosen_ || tunnel.end == *chosen_) return WantedPick{*chosen_, "", tunnel.bone};
+    if (tunnel.start == *chosen_ || tunnel.end == *chosen_) return wanted_end(tunnel, *chosen_);
   if (std::ranges::find(state.landmarks, *chosen_) != state.landmarks.end())
     return WantedPick{*chosen_, "", {}};
   return std::nullopt;

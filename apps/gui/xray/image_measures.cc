@@ -47,8 +47,7 @@ QString words_of(std::string_view name) {
 }
 
 bool is_of_other_bone(const pipeline::PointResult& point, Kind kind) {
-  const auto other = kind == Kind::femoral_quadrants ? guidance::Bone::tibia : guidance::Bone::femur;
-  return point.moves_with == other;
+  return point.moves_with == (kind == Kind::femoral_quadrants ? "tibia" : "femur");
 }
 
 measures::Click with_sigma(std::string name, const Eigen::Vector2d& uv, double sigma_px) {

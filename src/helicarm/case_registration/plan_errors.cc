@@ -11,16 +11,16 @@ namespace helicarm::case_registration {
 
 std::optional<PlannedError> largest_error(const std::vector<RegisteredPoint>& points) {
   std::optional<PlannedError> largest;
-  const auto take = [&](const std::string& point, const char* frame, const Eigen::Matrix3d& covariance) {
+  const auto take = [&](const std::string& point, const std::string& frame,
+                        const Eigen::Matrix3d& covariance) {
     const double error = localization::length_at_95(covariance);
     if (!largest || error > largest->error_95_mm) largest = PlannedError{point, frame, error};
   };
   for (const RegisteredPoint& point : points) {
     const guidance::PointInFrames& place = point.place;
     take(point.name, "world", place.covariance_in_calibrator);
-    if (place.covariance_in_femur) take(point.name, "femur's", *place.covariance_in_femur);
-    if (place.covariance_in_tibia) take(point.name, "tibia's", *place.covariance_in_tibia);
-    if (place.covariance_in_tool) take(point.name, "tool's", *place.covariance_in_tool);
+    for (const auto& [bone, at] : place.in_bones) take(point.name, bone + "'s", at.covariance);
+    if (place.in_tool) take(point.name, "tool's", place.in_tool->covariance);
   }
   return largest;
 }

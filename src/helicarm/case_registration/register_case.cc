@@ -23,7 +23,7 @@ using registration::RegistrationView;
 constexpr double outline_step_px = 2;
 
 /// Poses at each acquisition by which a bone can be followed, or nothing.
-bool tracked(const pipeline::Case& given, guidance::Bone bone) {
+bool tracked(const pipeline::Case& given, const guidance::Bone& bone) {
   return std::ranges::all_of(given.views, [&](const pipeline::CaseView& view) {
     return guidance::calibrator_from(bone, view.poses).has_value();
   });
@@ -31,7 +31,7 @@ bool tracked(const pipeline::Case& given, guidance::Bone bone) {
 
 /// The views as if the bone were where it was at the first one's acquisition.
 std::vector<RegistrationView> following(std::vector<RegistrationView> views, const pipeline::Case& given,
-                                        guidance::Bone bone) {
+                                        const guidance::Bone& bone) {
   const RigidTransform first = *guidance::calibrator_from(bone, given.views.front().poses);
   for (std::size_t i = 0; i < views.size(); ++i)
     views[i].view.camera_from_world = views[i].view.camera_from_world *
@@ -198,6 +198,7 @@ Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given
                                          const RegisterOptions& options) {
   return guarded([&] {
     CaseRegistration result;
+    result.bones = given.base.bones;
     result.warnings = given.base.warnings;
     if (pipeline::is_sequence(given))
       throw BadInput(Reason::bad_value,
@@ -216,6 +217,7 @@ Expected<CaseRegistration> register_loaded(const pipeline::RegistrationCase& giv
                                            const RegisterOptions& options) {
   return guarded([&] {
     CaseRegistration result;
+    result.bones = given.base.bones;
     result.warnings = given.base.warnings;
     result.loaded = std::move(loaded);
     result.warnings.insert(result.warnings.end(), result.loaded.warnings.begin(),

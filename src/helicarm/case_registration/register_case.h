@@ -58,6 +58,7 @@ struct CaseRegistration {
   std::vector<Warning> warnings;
   std::vector<RegisteredModel> models;
   LoadedViews loaded;
+  std::vector<guidance::Bone> bones = {};  ///< of the case
 
   bool refused() const;
 };

@@ -9,12 +9,12 @@ namespace {
 using geometry::json_list;
 using geometry::json_rows;
 
-Json json_of(const RegisteredPoint& point) {
+Json json_of(const RegisteredPoint& point, const std::vector<guidance::Bone>& bones) {
   Json json = {{"name", point.name},
                {"xyz_mm", json_list(point.place.in_calibrator)},
                {"covariance_mm2", json_rows(point.place.covariance_in_calibrator)},
                {"error_95_mm", localization::length_at_95(point.place.covariance_in_calibrator)}};
-  json.update(pipeline::in_frames(&point.place));
+  json.update(pipeline::in_frames(&point.place, bones));
   return json;
 }
 
@@ -38,7 +38,7 @@ Json json_of_landmarks(const RegisteredModel& model) {
           {"landmarks", residuals}};
 }
 
-Json json_of(const RegisteredModel& model) {
+Json json_of(const RegisteredModel& model, const std::vector<guidance::Bone>& bones) {
   const registration::Registration& r = model.registration;
   Json json = {{"name", r.name},
                {"status", r.failure ? "refused" : "ok"},
@@ -67,7 +67,7 @@ Json json_of(const RegisteredModel& model) {
                             {"dof", r.disagreement->dof}};
   for (const char* list : {"views", "points", "tunnels"}) json[list] = Json::array();
   for (const auto& view : r.views) json["views"].push_back(json_of(view));
-  for (const RegisteredPoint& point : model.points) json["points"].push_back(json_of(point));
+  for (const RegisteredPoint& point : model.points) json["points"].push_back(json_of(point, bones));
   for (const guidance::Tunnel& tunnel : model.tunnels) json["tunnels"].push_back(pipeline::to_json(tunnel));
   json["seconds"] = r.seconds;
   return json;
@@ -84,7 +84,7 @@ Json to_json(const CaseRegistration& result) {
                {"models", Json::array()}};
   for (const registration::RegistrationView& view : result.loaded.views)
     json["views"].push_back({{"name", view.name}});
-  for (const RegisteredModel& model : result.models) json["models"].push_back(json_of(model));
+  for (const RegisteredModel& model : result.models) json["models"].push_back(json_of(model, result.bones));
   json["version"] = HELICARM_VERSION;
   return json;
 }

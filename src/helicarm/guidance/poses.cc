@@ -3,8 +3,15 @@
 
 namespace helicarm::guidance {
 
-std::optional<geometry::RigidTransform> calibrator_from(Bone bone, const Poses& poses) {
-  const auto& tracker_from_bone = poses.tracker_from(bone);
+std::vector<Bone> knee_bones() { return {"femur", "tibia"}; }
+
+std::optional<geometry::RigidTransform> Poses::tracker_from(const Bone& bone) const {
+  const auto pose = tracker_from_bone.find(bone);
+  return pose == tracker_from_bone.end() ? std::nullopt : std::optional(pose->second);
+}
+
+std::optional<geometry::RigidTransform> calibrator_from(const Bone& bone, const Poses& poses) {
+  const auto tracker_from_bone = poses.tracker_from(bone);
   if (!poses.tracker_from_calibrator || !tracker_from_bone) return std::nullopt;
   return poses.tracker_from_calibrator->inverse() * *tracker_from_bone;
 }

@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "helicarm/geometry/rigid_transform.h"
 
 namespace helicarm::guidance {
 
-enum class Bone { femur, tibia };
-constexpr Bone other_bone(Bone bone) { return bone == Bone::femur ? Bone::tibia : Bone::femur; }
+/// Name that the case or plan gives a bone with a marker.
+using Bone = std::string;
+
+/// Of a case or plan that names none.
+std::vector<Bone> knee_bones();
 
 /// Tracker readings at one moment (Fig. 15b): the pose of each marker, absent if it was not visible.
 struct Poses {
-  std::optional<geometry::RigidTransform> tracker_from_calibrator;
-  std::optional<geometry::RigidTransform> tracker_from_femur;
-  std::optional<geometry::RigidTransform> tracker_from_tibia;
-  std::optional<geometry::RigidTransform> tracker_from_tool;
+  std::optional<geometry::RigidTransform> tracker_from_calibrator = {};
+  std::map<Bone, geometry::RigidTransform> tracker_from_bone = {};
+  std::optional<geometry::RigidTransform> tracker_from_tool = {};
 
-  const std::optional<geometry::RigidTransform>& tracker_from(Bone bone) const {
-    return bone == Bone::femur ? tracker_from_femur : tracker_from_tibia;
-  }
-  std::optional<geometry::RigidTransform>& tracker_from(Bone bone) {
-    return bone == Bone::femur ? tracker_from_femur : tracker_from_tibia;
-  }
+  std::optional<geometry::RigidTransform> tracker_from(const Bone& bone) const;
 };
 
 /// Whether one reading of a marker is used for all moments, so that its error is common to them.
@@ -36,6 +36,6 @@ struct TrackerNoise {
 };
 
 /// Pose of a bone in the calibrator at the moment of `poses`; nothing if a marker was not visible.
-std::optional<geometry::RigidTransform> calibrator_from(Bone bone, const Poses& poses);
+std::optional<geometry::RigidTransform> calibrator_from(const Bone& bone, const Poses& poses);
 
 }  // namespace helicarm::guidance

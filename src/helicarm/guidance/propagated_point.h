@@ -10,10 +10,8 @@
 
 namespace helicarm::guidance {
 
-enum class Marker { calibrator, femur, tibia, tool };
-
-/// One reading of one marker: points transformed by the same reading share its error.
-using Reading = std::pair<Marker, int>;
+/// One reading of one marker, by the marker's name: points transformed by the same reading share its error.
+using Reading = std::pair<std::string, int>;
 
 /// A point carried through the frames with the first-order effect of every tracker reading on it. A measured
 /// pose is the true one times a small motion (translation tau, rotation omega) about the marker's own origin.

@@ -17,7 +17,7 @@ Expected<Tunnel> plan_tunnel(const std::string& name, const PointInFrames& start
                              const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise) {
   const bool ordered = start.in_tool && end.in_tool;
   const Eigen::Vector3d along =
-      ordered ? *end.in_tool - *start.in_tool : end.in_calibrator - start.in_calibrator;
+      ordered ? end.in_tool->point() - start.in_tool->point() : end.in_calibrator - start.in_calibrator;
   const double length = along.norm();
   if (!(length >= shortest_tunnel_mm && length <= longest_tunnel_mm))
     return fail(Reason::bad_tunnel,
@@ -25,14 +25,14 @@ Expected<Tunnel> plan_tunnel(const std::string& name, const PointInFrames& start
                             shortest_tunnel_mm, longest_tunnel_mm),
                 {{"length_mm", length}, {"limit_mm", longest_tunnel_mm}});
   Tunnel tunnel{name, {}, {}, {}, length};
+  tunnel.start_in_bones = start.in_bones;
+  tunnel.end_in_bones = end.in_bones;
   if (ordered) {
-    tunnel.start_in_tool = start.in_tool;
-    tunnel.end_in_tool = end.in_tool;
+    tunnel.start_in_tool = start.in_tool->point();
+    tunnel.end_in_tool = end.in_tool->point();
     tunnel.axis_in_tool = along / length;
-  }
-  if (start.propagated_to_tool && end.propagated_to_tool) {
     const Eigen::Matrix3d covariance =
-        covariance_between(*start.propagated_to_tool, *end.propagated_to_tool, calibration_covariance, noise);
+        covariance_between(start.in_tool->propagated, end.in_tool->propagated, calibration_covariance, noise);
     const Eigen::Vector3d axis = along / length;
     const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - axis * axis.transpose()) / length;
     tunnel.axis_covariance = across * covariance * across;

@@ -20,6 +20,7 @@ struct Tunnel {
   std::optional<double> length_mm;
   std::optional<Eigen::Matrix3d> axis_covariance = {};  ///< rad^2, across the axis; with tracker noise
   std::optional<double> length_sigma_mm = {};
+  std::map<Bone, Place> start_in_bones = {}, end_in_bones = {};
 
   /// Standard deviation of the axis direction (root of the trace), degrees.
   std::optional<double> axis_sigma_deg() const;

@@ -14,7 +14,7 @@ namespace {
 PointInFrames point_at(double x, bool in_tool) {
   PointInFrames point{};
   point.in_calibrator = {0, 0, x};
-  if (in_tool) point.in_tool = Eigen::Vector3d(x, 0, 0);
+  if (in_tool) point.in_tool = {{{x, 0, 0}, Eigen::Matrix3d::Zero(), {}, {}}, Eigen::Matrix3d::Zero()};
   return point;
 }
 
@@ -49,10 +49,9 @@ PointInFrames propagated_point(double x, const Eigen::Matrix<double, 3, 2>& by_c
   PropagatedPoint at{{x, 0, 0}, Eigen::Matrix3d::Zero(), {}, by_calibration};
   at.covariance =
       0.01 * Eigen::Matrix3d::Identity() + by_calibration * calibration * by_calibration.transpose();
-  at = leave_tracker(at, {}, {Marker::tool, 0});
+  at = leave_tracker(at, {}, {"tool", 0});
   PointInFrames point{};
-  point.in_tool = at.point;
-  point.propagated_to_tool = at;
+  point.in_tool = {at, at.covariance};
   return point;
 }
 

@@ -6,7 +6,7 @@
 
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/operation.h"
-#include "helicarm/operation/records.h"
+#include "helicarm/pipeline/poses_json.h"
 #include "helicarm/xray/read_dicom.h"
 #include "helicarm/xray/view_of.h"
 
@@ -129,7 +129,7 @@ Expected<void> Operation::take(const std::string& wanted, const receiver::Arriva
                         {"inbox", inbox_of(arrival.path)},
                         {"held_s", held_s(*acquisition, arrival_s)},
                         {"window", to_json(window)},
-                        {"poses", seen ? to_json(*seen) : Json()}});
+                        {"poses", seen ? pipeline::to_json(*seen) : Json()}});
     const guidance::Poses poses = value_or_throw(seen);
     for (const PlannedTunnel& tunnel : plan_.tunnels)
       if (!poses.tracker_from(tunnel.bone))

@@ -8,7 +8,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/private_files.h"
 #include "helicarm/geometry/view_json.h"
-#include "helicarm/operation/records.h"
+#include "helicarm/pipeline/poses_json.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/report/report.h"
 #include "helicarm/xray/digest.h"
@@ -28,7 +28,7 @@ Json without(Json json, const char* key) {
 Json image_json(const CaseImage& image) {
   return {{"name", image.name},
           {"image", image.name + ".dcm"},
-          {"poses", without(to_json(image.poses), "tracker_from_tool")}};
+          {"poses", pipeline::to_json(image.poses, pipeline::OtherMarker::calibrator)}};
 }
 
 Json tool_line_json(const verification::ToolLine& line) {
@@ -78,11 +78,12 @@ Json operation_case_json(const OperationPlan& plan, const std::vector<CaseImage>
                          const guidance::Poses& now, const std::vector<verification::ToolLine>& tool_lines) {
   const guidance::TrackerNoise noise = plan.tracker.noise();
   Json json = {
-      {"format", "helicarm-case/1"},
+      {"format", "helicarm-case/2"},
       {"calibrator", plan.calibrator},
       {"plate", plan.plate ? Json(*plan.plate) : Json()},
+      {"bones", plan.bones},
       {"views", Json::array()},
-      {"poses_now", without(to_json(now), "tracker_from_calibrator")},
+      {"poses_now", pipeline::to_json(now, pipeline::OtherMarker::tool)},
       {"tracker", {{"sigma_mm", noise.sigma_mm}, {"sigma_deg", noise.sigma_deg}, {"samples", "independent"}}},
       {"picks", plan.picks},
       {"tunnels", Json::array()},

@@ -9,7 +9,7 @@
 
 namespace helicarm::operation {
 
-std::vector<std::string> Operation::checks_to_come(guidance::Bone bone) const {
+std::vector<std::string> Operation::checks_to_come(const guidance::Bone& bone) const {
   std::vector<std::string> names;
   for (const PlannedCheck& check : plan_.check_points)
     if (check.bone == bone && !in_place_.contains(check.name)) names.push_back(check.name);

@@ -21,7 +21,7 @@ constexpr double end_s = 100;
 OperationPlan plan() {
   OperationPlan plan;
   plan.drill = HandDrill{{0, -140, 20}, {0, -20, 20}, 0.1};
-  plan.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE", TunnelEnd::start}};
+  plan.tunnels = {{"femur", "femur", "FS", "FE", TunnelEnd::start}};
   plan.tracker.sigma_mm = 0.1;
   plan.tracker.sigma_deg = 0.03;
   return plan;
@@ -31,9 +31,8 @@ pipeline::Result measured() {
   pipeline::Result result;
   for (const auto& [name, at] : {std::pair("FS", entry), {"FE", Vector3d(entry + Vector3d(0, 0, 40))}}) {
     pipeline::PointResult point{
-        name, localization::PointSource::pick, guidance::Bone::femur, {}, guidance::PointInFrames{}, 0, {}};
-    point.place->propagated_to_femur =
-        guidance::PropagatedPoint{at, 0.01 * Eigen::Matrix3d::Identity(), {}, {}};
+        name, localization::PointSource::pick, "femur", {}, guidance::PointInFrames{}, 0, {}};
+    point.place->in_bones["femur"].propagated = {at, 0.01 * Eigen::Matrix3d::Identity(), {}, {}};
     result.points.push_back(point);
   }
   return result;
@@ -51,7 +50,7 @@ RigidTransform tracker_from_tool(const RigidTransform& tracker_from_bone,
 
 FreehandGuide guide() {
   guidance::Poses basis;
-  basis.tracker_from_femur = tracker_from_femur;
+  basis.tracker_from_bone["femur"] = tracker_from_femur;
   basis.tracker_from_tool = tracker_from_tool(tracker_from_femur, femur_from_tip(0, -20));
   return FreehandGuide::begin(plan(), LiveTool(plan(), measured(), {}, tracked_tool(*plan().drill)), "femur",
                               basis)

@@ -15,11 +15,11 @@ namespace {
 constexpr double degrees_per_rad = 180 / std::numbers::pi;
 
 const guidance::PropagatedPoint* located_in(const pipeline::Result& result, const std::string& name,
-                                            guidance::Bone bone) {
+                                            const guidance::Bone& bone) {
   const auto point = std::ranges::find(result.points, name, &pipeline::PointResult::name);
   if (point == result.points.end() || !point->place) return nullptr;
-  const auto& in_bone = point->place->propagated_to(bone);
-  return in_bone ? &*in_bone : nullptr;
+  const guidance::Place* in_bone = point->place->in(bone);
+  return in_bone ? &in_bone->propagated : nullptr;
 }
 
 }  // namespace
@@ -40,19 +40,20 @@ LiveTool::LiveTool(const OperationPlan& plan, const pipeline::Result& result,
   }
 }
 
-LiveTool::Now LiveTool::newest(const tracker::PoseBoard& board, guidance::Bone bone) const {
+LiveTool::Now LiveTool::newest(const tracker::PoseBoard& board, const guidance::Bone& bone) const {
   const double now_s = tracker::monotonic_seconds();
   const tracker::PoseSample tool = value_or_throw(board.latest(tracker_.tool, now_s));
   const tracker::PoseSample marker = value_or_throw(board.latest(tracker_.marker_of(bone), now_s));
   Now now{{}, now_s - std::min(tool.time_s, marker.time_s)};
   now.poses.tracker_from_tool = tool.tracker_from_tool;
-  now.poses.tracker_from(bone) = marker.tracker_from_tool;
-  const auto other = board.latest(tracker_.marker_of(guidance::other_bone(bone)), now_s);
-  if (other) now.poses.tracker_from(guidance::other_bone(bone)) = other->tracker_from_tool;
+  for (const auto& [other, name] : tracker_.markers)
+    if (const auto seen = board.latest(name, now_s))
+      now.poses.tracker_from_bone.emplace(other, seen->tracker_from_tool);
+  now.poses.tracker_from_bone[bone] = marker.tracker_from_tool;
   return now;
 }
 
-Expected<ToolOverlay> LiveTool::overlay(const tracker::PoseBoard& board, guidance::Bone bone) const {
+Expected<ToolOverlay> LiveTool::overlay(const tracker::PoseBoard& board, const guidance::Bone& bone) const {
   return guarded([&] {
     const Now now = newest(board, bone);
     ToolOverlay overlay = value_or_throw(this->overlay(now.poses, bone));
@@ -61,22 +62,22 @@ Expected<ToolOverlay> LiveTool::overlay(const tracker::PoseBoard& board, guidanc
   });
 }
 
-Expected<ToolOverlay> LiveTool::overlay(const guidance::Poses& now, guidance::Bone bone) const {
+Expected<ToolOverlay> LiveTool::overlay(const guidance::Poses& now, const guidance::Bone& bone) const {
   if (!now.tracker_from_tool || !now.tracker_from(bone))
     return fail(Reason::no_pose, "the marker of the tool or the bone is not visible");
   const geometry::RigidTransform bone_from_tracker = now.tracker_from(bone)->inverse();
   ToolOverlay overlay;
   if (!views_.empty()) {
     const guidance::Poses& then = views_.front().poses;
-    const guidance::Bone other = guidance::other_bone(bone);
-    const auto placed = guidance::calibrator_from(bone, then),
-               other_placed = guidance::calibrator_from(other, then);
+    const auto placed = guidance::calibrator_from(bone, then);
     if (placed)
       overlay.calibrator_from_tip =
           *placed * bone_from_tracker * *now.tracker_from_tool * tool_.marker_from_tip;
-    if (placed && other_placed && now.tracker_from(other))
-      overlay.other_bone_moved =
-          *placed * bone_from_tracker * *now.tracker_from(other) * other_placed->inverse();
+    for (const auto& [other, tracker_from_other] : now.tracker_from_bone)
+      if (const auto other_placed = guidance::calibrator_from(other, then);
+          placed && other_placed && other != bone)
+        overlay.other_bones_moved.emplace(
+            other, *placed * bone_from_tracker * tracker_from_other * other_placed->inverse());
   }
   for (const Shown& shown : views_) {
     const auto line = tool_line("", bone, shown.poses, now, tool_.marker_from_tip);

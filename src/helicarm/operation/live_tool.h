@@ -33,9 +33,9 @@ struct ToolOverlay {
   /// At the first view's acquisition, as if the tool had moved with the bone; empty if the bone was not
   /// visible.
   std::optional<geometry::RigidTransform> calibrator_from_tip = {};
-  /// Motion of the other bone relative to this one since then, in the calibrator's frame; empty if it was not
-  /// visible then or is not now.
-  std::optional<geometry::RigidTransform> other_bone_moved = {};
+  /// Motion of each other bone relative to this one since then, in the calibrator's frame; of those that were
+  /// visible then and are now.
+  std::map<guidance::Bone, geometry::RigidTransform> other_bones_moved = {};
 };
 
 /// Projects the tool into measured X-ray images. A value: any thread may use a copy during the operation.
@@ -50,9 +50,9 @@ class LiveTool {
 
   /// The tool's line in each X-ray image, relative to this bone. Refuses no_pose, and stale_pose for a pose
   /// older than 0.1 s.
-  Expected<ToolOverlay> overlay(const tracker::PoseBoard& board, guidance::Bone bone) const;
+  Expected<ToolOverlay> overlay(const tracker::PoseBoard& board, const guidance::Bone& bone) const;
   /// As above for recorded poses; the age is 0.
-  Expected<ToolOverlay> overlay(const guidance::Poses& now, guidance::Bone bone) const;
+  Expected<ToolOverlay> overlay(const guidance::Poses& now, const guidance::Bone& bone) const;
 
   /// Refuses as `overlay`, and not_seen for a tunnel that is not located.
   Expected<TunnelAim> aim(const tracker::PoseBoard& board, const std::string& tunnel) const;
@@ -78,7 +78,7 @@ class LiveTool {
     guidance::Bone bone;
     guidance::PropagatedPoint enter, leave;  ///< in the bone's frame
   };
-  Now newest(const tracker::PoseBoard& board, guidance::Bone bone) const;
+  Now newest(const tracker::PoseBoard& board, const guidance::Bone& bone) const;
 
   const Located& located(const std::string& tunnel) const;
 

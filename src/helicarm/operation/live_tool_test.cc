@@ -20,8 +20,8 @@ const Vector3d entry(30, 5, -20);
 OperationPlan plan() {
   OperationPlan plan;
   plan.robot.tool = {{geometry::rotation_from_euler(0, 0.1, 0), {3, -2, 150}}, 1.2};
-  plan.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE", TunnelEnd::start},
-                  {"tibia", guidance::Bone::tibia, "TS", "TE", TunnelEnd::start}};
+  plan.tunnels = {{"femur", "femur", "FS", "FE", TunnelEnd::start},
+                  {"tibia", "tibia", "TS", "TE", TunnelEnd::start}};
   return plan;
 }
 
@@ -29,10 +29,8 @@ pipeline::Result measured() {
   pipeline::Result result;
   for (const auto& [name, at] : {std::pair("FS", entry), {"FE", Vector3d(entry + Vector3d(0, 0, 40))}}) {
     pipeline::PointResult point{
-        name, localization::PointSource::pick, guidance::Bone::femur, {}, guidance::PointInFrames{}, 0, {}};
-    point.place->in_femur = at;
-    point.place->propagated_to_femur =
-        guidance::PropagatedPoint{at, 0.01 * Eigen::Matrix3d::Identity(), {}, {}};
+        name, localization::PointSource::pick, "femur", {}, guidance::PointInFrames{}, 0, {}};
+    point.place->in_bones["femur"].propagated = {at, 0.01 * Eigen::Matrix3d::Identity(), {}, {}};
     result.points.push_back(point);
   }
   pipeline::ViewResult view;
@@ -47,8 +45,8 @@ pipeline::Result measured() {
 guidance::Poses exposure() {
   guidance::Poses poses;
   poses.tracker_from_calibrator = {geometry::rotation_from_euler(0.1, 2, 0.4), {10, 20, 900}};
-  poses.tracker_from_femur = femur_then;
-  poses.tracker_from_tibia = tibia_then;
+  poses.tracker_from_bone["femur"] = femur_then;
+  poses.tracker_from_bone["tibia"] = tibia_then;
   return poses;
 }
 
@@ -81,7 +79,7 @@ TEST(LiveTool, ReportsPositionAngleAndDepthAtThePresentBonePose) {
   EXPECT_LT(aim.distance_sigma_mm, std::sqrt(2) * std::hypot(0.1, 0.17, 250 * turn * 1.5));
   EXPECT_NEAR(aim.angle_sigma_deg, std::hypot(0.2 / 40 * 180 / EIGEN_PI, 0.1), 0.02);
 
-  const ToolOverlay overlay = live.overlay(board, guidance::Bone::femur).value();
+  const ToolOverlay overlay = live.overlay(board, "femur").value();
   const Vector3d tip =
       exposure().tracker_from_calibrator->inverse() * (femur_then * femur_from_tip.translation);
   EXPECT_LT((overlay.calibrator_from_tip.value().translation - tip).norm(), 1e-6);
@@ -97,13 +95,16 @@ TEST(LiveTool, ReportsMotionOfTheOtherBoneRelativeToThisOne) {
   const geometry::RigidTransform leg_moved = femur_now * femur_then.inverse();
   guidance::Poses now;
   now.tracker_from_tool = femur_now;
-  now.tracker_from_femur = femur_now;
-  now.tracker_from_tibia = leg_moved * calibrator_then * bent * calibrator_then.inverse() * tibia_then;
-  const auto moved = live.overlay(now, guidance::Bone::femur).value().other_bone_moved;
-  EXPECT_TRUE(moved.value().matrix().isApprox(bent.matrix(), 1e-9));
-  now.tracker_from_tibia.reset();
-  EXPECT_FALSE(live.overlay(now, guidance::Bone::femur).value().other_bone_moved);
-  EXPECT_EQ(live.overlay(now, guidance::Bone::tibia).error().reason, Reason::no_pose);
+  now.tracker_from_bone["femur"] = femur_now;
+  now.tracker_from_bone["tibia"] =
+      leg_moved * calibrator_then * bent * calibrator_then.inverse() * tibia_then;
+  const auto moved = live.overlay(now, "femur").value().other_bones_moved;
+  ASSERT_TRUE(moved.contains("tibia"));
+  EXPECT_FALSE(moved.contains("femur"));
+  EXPECT_TRUE(moved.at("tibia").matrix().isApprox(bent.matrix(), 1e-9));
+  now.tracker_from_bone.erase("tibia");
+  EXPECT_TRUE(live.overlay(now, "femur").value().other_bones_moved.empty());
+  EXPECT_EQ(live.overlay(now, "tibia").error().reason, Reason::no_pose);
 }
 
 TEST(LiveTool, TunnelThatIsNotLocatedIsRefused) {
@@ -114,7 +115,7 @@ TEST(LiveTool, TunnelThatIsNotLocatedIsRefused) {
 TEST(LiveTool, WithoutAPoseIsRefused) {
   const LiveTool live(plan(), measured(), {exposure()}, exact_hand_eye());
   EXPECT_EQ(live.aim(tracker::PoseBoard(), "femur").error().reason, Reason::no_pose);
-  EXPECT_EQ(live.overlay(tracker::PoseBoard(), guidance::Bone::femur).error().reason, Reason::no_pose);
+  EXPECT_EQ(live.overlay(tracker::PoseBoard(), "femur").error().reason, Reason::no_pose);
 }
 
 }  // namespace

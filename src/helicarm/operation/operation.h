@@ -69,7 +69,7 @@ class Operation {
   /// required. Refuses as `touched_in_bone`, and a first touch after an image (usage).
   Expected<double> touch(const std::string& check_point);
   /// Check points to touch before this tunnel is planned.
-  std::vector<std::string> checks_to_come(guidance::Bone bone) const;
+  std::vector<std::string> checks_to_come(const guidance::Bone& bone) const;
 
   /// Accepts an image: dates it by its arrival (monotonic seconds) and averages the poses of all markers over
   /// the acquisition window. The positioner angle decides the view, else `view`. Refuses as

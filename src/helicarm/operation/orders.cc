@@ -37,7 +37,7 @@ Expected<robot::RobotOrder> tunnel_order(const OperationPlan& plan, const Planne
   });
 }
 
-geometry::RigidTransform target_in_bone(const robot::RobotOrder& order, guidance::Bone bone,
+geometry::RigidTransform target_in_bone(const robot::RobotOrder& order, const guidance::Bone& bone,
                                         const guidance::Poses& now, const tracker::HandEye& hand_eye) {
   return now.tracker_from(bone).value().inverse() * hand_eye.tracker_from_base *
          order.waypoints.back().base_from_tcp;
@@ -63,7 +63,7 @@ Expected<TunnelOutcome> outcome_of(const PlannedTunnel& tunnel, const pipeline::
       const auto point = std::ranges::find(result.points, name, &pipeline::PointResult::name);
       if (point == result.points.end() || !point->place || !point->place->in_tool)
         throw BadInput(Reason::not_seen, fmt::format("{}: is not located in the tool marker's frame", name));
-      return end_miss(*point->place->in_tool, *point->place->covariance_in_tool, tool);
+      return end_miss(point->place->in_tool->point(), point->place->in_tool->covariance, tool);
     };
     TunnelOutcome outcome{tunnel.name, {}, end(tunnel.start), end(tunnel.end), {}};
     if (!result.verifications.empty()) outcome.verification = result.verifications.front();

@@ -21,7 +21,7 @@ Expected<robot::RobotOrder> tunnel_order(const OperationPlan& plan, const Planne
                                          const guidance::Poses& now, const robot::Joints& joints);
 
 /// The target of an order to a tunnel, in the frame of the bone's marker at planning.
-geometry::RigidTransform target_in_bone(const robot::RobotOrder& order, guidance::Bone bone,
+geometry::RigidTransform target_in_bone(const robot::RobotOrder& order, const guidance::Bone& bone,
                                         const guidance::Poses& now, const tracker::HandEye& hand_eye);
 
 /// From a tunnel's order, where the tool is now, back along the tool's axis to the stand-off distance (unless

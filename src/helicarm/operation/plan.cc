@@ -12,11 +12,13 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/plan_fields.h"
+#include "helicarm/pipeline/poses_json.h"
 
 namespace helicarm::operation {
 namespace {
 
-constexpr const char* plan_format = "helicarm-plan/1";
+constexpr const char* plan_format = "helicarm-plan/2";
+constexpr const char* earlier_plan_format = "helicarm-plan/1";
 constexpr Range millimetres{-100000, 100000};
 
 /// Orthonormalised if written with few digits; otherwise unchanged to the last bit, for replay.
@@ -33,8 +35,6 @@ geometry::RigidTransform pose_from(JsonReader& reader, const char* key) {
 double planned_number(JsonReader& reader, const char* key) {
   return reader.number(key, field_named<OperationPlan>(plan_fields, key).range);
 }
-
-const char* word(guidance::Bone bone) { return bone == guidance::Bone::femur ? "femur" : "tibia"; }
 
 std::uint16_t port_from(JsonReader& reader, const char* key) {
   return static_cast<std::uint16_t>(reader.integer(key, 1, 65535));
@@ -59,22 +59,36 @@ Pointer pointer_from(JsonReader reader) {
   return pointer;
 }
 
-PlannedCheck check_from(JsonReader& reader) {
-  PlannedCheck check{reader.text("name"),
-                     static_cast<guidance::Bone>(reader.choice("bone", {"femur", "tibia"})),
+PlannedCheck check_from(JsonReader& reader, const std::vector<guidance::Bone>& bones) {
+  PlannedCheck check{reader.text("name"), pipeline::bone_from(reader, "bone", bones),
                      reader.optional_number("limit_mm", {0.1, 10}).value_or(tracker::CheckPoint{}.limit_mm)};
   reader.finish();
   return check;
 }
 
-TrackerPlan tracker_from(JsonReader reader) {
+/// "markers", or of helicarm-plan/1 a key for each bone of the knee.
+void read_markers(JsonReader& reader, const std::vector<guidance::Bone>& bones, TrackerPlan& tracker) {
+  tracker.markers.clear();
+  const auto read = [&](JsonReader& names) {
+    for (const guidance::Bone& bone : bones) tracker.markers[bone] = names.text(bone.c_str());
+    tracker.tool = names.text("tool");
+  };
+  if (!reader.has("markers")) return read(reader);
+  JsonReader names = reader.object("markers");
+  read(names);
+  names.finish();
+  std::set<std::string> once{tracker.tool};
+  for (const auto& [bone, marker] : tracker.markers)
+    if (!once.insert(marker).second)
+      names.refuse(Reason::name_clash, bone.c_str(), fmt::format("\"{}\" is another body's marker", marker));
+}
+
+TrackerPlan tracker_from(JsonReader reader, const std::vector<guidance::Bone>& bones) {
   TrackerPlan tracker;
   tracker.address = reader.text("address");
   tracker.port = port_from(reader, "port");
   tracker.rate_hz = reader.optional_number("rate_hz", {1, 1000}).value_or(tracker.rate_hz);
-  tracker.femur = reader.text("femur");
-  tracker.tibia = reader.text("tibia");
-  tracker.tool = reader.text("tool");
+  read_markers(reader, bones, tracker);
   std::set<std::string> names;
   for (JsonReader& entry : reader.objects("facets", true, 16)) {
     tracker::Facet facet{entry.text("name"), pose_from(entry, "calibrator_from_facet")};
@@ -134,10 +148,9 @@ HandDrill drill_from(JsonReader reader) {
   return drill;
 }
 
-PlannedTunnel tunnel_from(JsonReader& reader) {
-  PlannedTunnel tunnel{reader.text("name"),
-                       static_cast<guidance::Bone>(reader.choice("bone", {"femur", "tibia"})),
-                       reader.text("start"), reader.text("end"),
+PlannedTunnel tunnel_from(JsonReader& reader, const std::vector<guidance::Bone>& bones) {
+  PlannedTunnel tunnel{reader.text("name"), pipeline::bone_from(reader, "bone", bones), reader.text("start"),
+                       reader.text("end"),
                        static_cast<TunnelEnd>(reader.choice("enter_at", {"start", "end"}))};
   check_file_name(reader, "name", tunnel.name);
   reader.finish();
@@ -160,6 +173,9 @@ std::vector<std::string> views_from(JsonReader& reader) {
 }
 
 Json json_of(const TrackerPlan& tracker) {
+  Json markers = Json::object();
+  for (const auto& [bone, marker] : tracker.markers) markers[bone] = marker;
+  markers["tool"] = tracker.tool;
   Json facets = Json::array();
   for (const tracker::Facet& facet : tracker.facets)
     facets.push_back({{"name", facet.name},
@@ -169,9 +185,7 @@ Json json_of(const TrackerPlan& tracker) {
   return {{"address", tracker.address},
           {"port", tracker.port},
           {"rate_hz", tracker.rate_hz},
-          {"femur", tracker.femur},
-          {"tibia", tracker.tibia},
-          {"tool", tracker.tool},
+          {"markers", std::move(markers)},
           {"facets", std::move(facets)},
           {"sigma_mm", tracker.sigma_mm},
           {"sigma_deg", tracker.sigma_deg},
@@ -225,12 +239,13 @@ guidance::TrackerNoise TrackerPlan::noise() const {
 Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(json, origin);
-    reader.choice("format", {plan_format});
+    reader.choice("format", {plan_format, earlier_plan_format});
     OperationPlan plan;
     plan.calibrator = reader.text("calibrator");
     plan.plate = reader.optional_text("plate");
     plan.views = views_from(reader);
-    plan.tracker = tracker_from(reader.object("tracker"));
+    plan.bones = pipeline::bones_from(reader);
+    plan.tracker = tracker_from(reader.object("tracker"), plan.bones);
     if (!reader.raw("drill").is_null()) plan.drill = drill_from(reader.object("drill"));
     if (!plan.drill)
       plan.robot = robot_from(reader.object("robot"));
@@ -241,12 +256,12 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
                     "\"address\" names a recording, which must not guide a robot: give a server's address");
     std::set<std::string> names;
     for (JsonReader& entry : reader.objects("tunnels", true, 20)) {
-      plan.tunnels.push_back(tunnel_from(entry));
+      plan.tunnels.push_back(tunnel_from(entry, plan.bones));
       take_once(entry, names, plan.tunnels.back().name);
     }
     names.clear();
     for (JsonReader& entry : reader.objects("check_points", false, 20)) {
-      plan.check_points.push_back(check_from(entry));
+      plan.check_points.push_back(check_from(entry, plan.bones));
       take_once(entry, names, plan.check_points.back().name);
     }
     if (!plan.check_points.empty() && !plan.tracker.pointer)
@@ -268,17 +283,18 @@ Json to_json(const OperationPlan& plan) {
   Json tunnels = Json::array();
   for (const PlannedTunnel& tunnel : plan.tunnels)
     tunnels.push_back({{"name", tunnel.name},
-                       {"bone", word(tunnel.bone)},
+                       {"bone", tunnel.bone},
                        {"start", tunnel.start},
                        {"end", tunnel.end},
                        {"enter_at", tunnel.enter_at == TunnelEnd::start ? "start" : "end"}});
   Json check_points = Json::array();
   for (const PlannedCheck& check : plan.check_points)
-    check_points.push_back({{"name", check.name}, {"bone", word(check.bone)}, {"limit_mm", check.limit_mm}});
+    check_points.push_back({{"name", check.name}, {"bone", check.bone}, {"limit_mm", check.limit_mm}});
   return {{"format", plan_format},
           {"calibrator", plan.calibrator},
           {"plate", plan.plate ? Json(*plan.plate) : Json()},
           {"views", plan.views},
+          {"bones", plan.bones},
           {"tracker", json_of(plan.tracker)},
           {"robot", plan.drill ? Json() : json_of(plan.robot)},
           {"drill", plan.drill ? json_of(*plan.drill) : Json()},

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,8 +35,7 @@ struct TrackerPlan {
   std::string address = "127.0.0.1";
   std::uint16_t port = 18944;
   double rate_hz = 60;  ///< requested from the tracker
-  std::string femur = "femur";
-  std::string tibia = "tibia";
+  std::map<guidance::Bone, std::string> markers = {{"femur", "femur"}, {"tibia", "tibia"}};  ///< of the bones
   std::string tool = "tool";
   std::vector<tracker::Facet> facets;  ///< of the calibrator; a single marker is one facet
   std::optional<Pointer> pointer;
@@ -49,9 +49,7 @@ struct TrackerPlan {
   /// Of every reading, with the largest error of a facet's mount: it acts as one of the calibrator's reading.
   guidance::TrackerNoise noise() const;
 
-  const std::string& marker_of(guidance::Bone bone) const {
-    return bone == guidance::Bone::femur ? femur : tibia;
-  }
+  const std::string& marker_of(const guidance::Bone& bone) const { return markers.at(bone); }
 };
 
 struct RobotPlan {
@@ -96,6 +94,7 @@ struct OperationPlan {
   std::string calibrator = "udcsc";  ///< name of a built-in, or a file beside the plan
   std::optional<std::string> plate = "plate48";
   std::vector<std::string> views{"AP", "LAT"};  ///< in order of acquisition
+  std::vector<guidance::Bone> bones = guidance::knee_bones();
   TrackerPlan tracker;
   RobotPlan robot;
   std::optional<HandDrill> drill;  ///< if given, no robot is used

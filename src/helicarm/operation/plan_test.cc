@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/operation/plan.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace helicarm::operation {
@@ -11,7 +12,7 @@ OperationPlan plan() {
   plan.tracker.facets = {{"calibrator/1", {Eigen::Matrix3d::Identity(), {85, 0, 10}}}};
   plan.robot.tool = {{Eigen::Matrix3d::Identity(), {0, 0, 150}}, 1.2};
   plan.robot.approach.keep_outs = {{{0, 0, -200}, Eigen::Vector3d::UnitZ()}};
-  plan.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE", TunnelEnd::end}};
+  plan.tunnels = {{"femur", "femur", "FS", "FE", TunnelEnd::end}};
   plan.max_error_mm = 2;
   return plan;
 }
@@ -106,6 +107,55 @@ TEST(Plan, LimitsOfAStalePlanMayBeLeftOutAndAreBounded) {
     ASSERT_TRUE(left_out) << left_out.error().message;
     EXPECT_EQ(to_json(*left_out), to_json(plan()));
   }
+}
+
+TEST(Plan, EarlierVersionNamesTheMarkersOfTheKnee) {
+  Json json = to_json(plan());
+  json["format"] = "helicarm-plan/1";
+  json.erase("bones");
+  json["tracker"].erase("markers");
+  json["tracker"].update({{"femur", "F"}, {"tibia", "T"}, {"tool", "drill"}});
+  const auto read = plan_from(json, "plan.json");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->bones, guidance::knee_bones());
+  EXPECT_EQ(read->tracker.marker_of("tibia"), "T");
+  EXPECT_EQ(read->tracker.tool, "drill");
+}
+
+class PlanOfBones : public testing::Test {
+ protected:
+  PlanOfBones() {
+    json_["bones"] = {"L4", "pelvis", "L5"};
+    json_["tracker"]["markers"] = {{"L4", "a"}, {"pelvis", "b"}, {"L5", "c"}, {"tool", "d"}};
+    json_["tunnels"][0]["bone"] = "L4";
+    json_["check_points"] = Json::array();
+  }
+  std::string refusal() const { return plan_from(json_, "plan.json").error().message; }
+
+  Json json_ = to_json(plan());
+};
+
+TEST_F(PlanOfBones, IsReadAndWrittenWithTheirNames) {
+  const auto read = plan_from(json_, "plan.json");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->tracker.marker_of("L5"), "c");
+  EXPECT_EQ(read->tunnels[0].bone, "L4");
+  EXPECT_EQ(to_json(*plan_from(to_json(*read), "plan.json")), to_json(*read));
+}
+
+TEST_F(PlanOfBones, TunnelInABoneThatIsNotNamedIsRefused) {
+  json_["tunnels"][0]["bone"] = "L3";
+  EXPECT_THAT(refusal(), testing::HasSubstr("\"L3\" is not a bone; \"bones\" names L4, pelvis, L5"));
+}
+
+TEST_F(PlanOfBones, BoneWithoutAMarkerIsRefused) {
+  json_["tracker"]["markers"].erase("L5");
+  EXPECT_THAT(refusal(), testing::HasSubstr("\"L5\""));
+}
+
+TEST_F(PlanOfBones, OneMarkerOfTwoBonesIsRefused) {
+  json_["tracker"]["markers"]["L5"] = "a";
+  EXPECT_THAT(refusal(), testing::HasSubstr("\"a\" is another body's marker"));
 }
 
 TEST(Plan, FacetThatIsNotARigidMotionIsRefused) {

@@ -8,18 +8,7 @@ namespace {
 
 constexpr Range any_place{-1e6, 1e6};
 
-Json pose_json(const std::optional<geometry::RigidTransform>& pose) {
-  return pose ? geometry::json_rows(pose->matrix()) : Json();
-}
-
 }  // namespace
-
-Json to_json(const guidance::Poses& poses) {
-  return {{"tracker_from_calibrator", pose_json(poses.tracker_from_calibrator)},
-          {"tracker_from_femur", pose_json(poses.tracker_from_femur)},
-          {"tracker_from_tibia", pose_json(poses.tracker_from_tibia)},
-          {"tracker_from_tool", pose_json(poses.tracker_from_tool)}};
-}
 
 Json to_json(const tracker::HandEye& hand_eye) {
   return {{"flange_from_marker", geometry::json_rows(hand_eye.flange_from_marker.matrix())},

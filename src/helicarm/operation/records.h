@@ -5,13 +5,11 @@
 
 #include "helicarm/core/json.h"
 #include "helicarm/devices/tracker/hand_eye.h"
-#include "helicarm/guidance/poses.h"
 #include "helicarm/operation/orders.h"
 
 /// Values as the session log stores them: exact to the last bit.
 namespace helicarm::operation {
 
-Json to_json(const guidance::Poses& poses);
 Json to_json(const tracker::HandEye& hand_eye);
 Json to_json(const std::vector<tracker::HandEyePair>& pairs);
 /// Fails as JsonReader.

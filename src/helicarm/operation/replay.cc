@@ -13,6 +13,7 @@
 #include "helicarm/operation/freehand.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/operation/replay_orders.h"
+#include "helicarm/pipeline/poses_json.h"
 #include "helicarm/session/session_log.h"
 #include "helicarm/xray/digest.h"
 
@@ -20,6 +21,17 @@ namespace helicarm::operation {
 namespace {
 
 constexpr std::uintmax_t most_image_bytes = std::uintmax_t{256} << 20;
+
+/// The case of an operation of an earlier version in the present form; `present` has its format and bones.
+Json case_in_present_form(const Json& recorded, const Json& present) {
+  if (recorded.value("format", "") != "helicarm-case/1") return recorded;
+  Json json = present;
+  for (const auto& [key, value] : recorded.items())
+    if (key != "format") json[key] = value;
+  for (Json& view : json.at("views")) view.at("poses") = pipeline::in_present_form(view.at("poses"));
+  json.at("poses_now") = pipeline::in_present_form(json.at("poses_now"));
+  return json;
+}
 
 Json without_timing(Json result) {
   result.erase("timing_ms");
@@ -100,7 +112,8 @@ class Replay {
     const std::string digest = record.content.at("picture").get<std::string>();
     const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
     const auto poses = poses_of_exposure(window, plan_.tracker);
-    compare(record.content.at("poses"), poses ? to_json(*poses) : Json(), origin, "pose");
+    compare(pipeline::in_present_form(record.content.at("poses")), poses ? pipeline::to_json(*poses) : Json(),
+            origin, "pose");
     if (const Json inbox = record.content.value("inbox", Json()); inbox.is_string())
       if (!received(inbox.get<std::string>()).contains(digest))
         differ(origin,
@@ -166,7 +179,7 @@ class Replay {
     }
     const auto derived = guarded([&] { return derived_case(recorded); });
     if (!derived) return differ(origin, fmt::format("{}: {}", name, derived.error().message));
-    compare(recorded, *derived, origin, "case");
+    compare(case_in_present_form(recorded, *derived), *derived, origin, "case");
   }
 
   /// From the records before it; the picks are the user's.

@@ -36,7 +36,7 @@ class OrderReplay {
  private:
   struct Planned {
     robot::RobotOrder order;
-    guidance::Bone bone = guidance::Bone::femur;
+    guidance::Bone bone = {};
     geometry::RigidTransform bone_from_target;
   };
   struct Leaving {

@@ -26,7 +26,8 @@ constexpr Range any_time{0, 1e12};
 constexpr Range sample_range{-1e6, 1e6};
 
 std::vector<std::string> tools_of(const TrackerPlan& plan) {
-  std::vector<std::string> tools{plan.femur, plan.tibia, plan.tool};
+  std::vector<std::string> tools{plan.tool};
+  for (const auto& [bone, marker] : plan.markers) tools.push_back(marker);
   if (plan.pointer) tools.push_back(plan.pointer->name);
   for (const tracker::Facet& facet : plan.facets) tools.push_back(facet.name);
   return tools;
@@ -163,8 +164,9 @@ Expected<guidance::Poses> poses_of_exposure(const PoseWindow& window, const Trac
   return guarded([&] {
     guidance::Poses poses;
     poses.tracker_from_calibrator = value_or_throw(see_calibrator(window, plan)).tracker_from_marker;
-    poses.tracker_from_femur = value_or_throw(bone_if_seen(see_tool(window, plan, plan.femur)));
-    poses.tracker_from_tibia = value_or_throw(bone_if_seen(see_tool(window, plan, plan.tibia)));
+    for (const auto& [bone, marker] : plan.markers)
+      if (const auto seen = value_or_throw(bone_if_seen(see_tool(window, plan, marker))))
+        poses.tracker_from_bone.emplace(bone, *seen);
     return poses;
   });
 }
@@ -175,15 +177,14 @@ Expected<guidance::Poses> poses_now(const PoseWindow& window, const TrackerPlan&
       return value_or_throw(see_tool(window, plan, tool)).tracker_from_marker;
     };
     guidance::Poses poses;
-    poses.tracker_from_femur = see(plan.femur);
-    poses.tracker_from_tibia = see(plan.tibia);
+    for (const auto& [bone, marker] : plan.markers) poses.tracker_from_bone.emplace(bone, see(marker));
     poses.tracker_from_tool = see(plan.tool);
     return poses;
   });
 }
 
 Expected<Eigen::Vector3d> touched_in_bone(const PoseWindow& window, const TrackerPlan& plan,
-                                          guidance::Bone bone) {
+                                          const guidance::Bone& bone) {
   return guarded([&]() -> Eigen::Vector3d {
     if (!plan.pointer) throw BadInput(Reason::bad_value, "the plan has no pointer; add it to \"tracker\"");
     const auto see = [&](const std::string& tool) {

@@ -50,7 +50,7 @@ Expected<guidance::Poses> poses_of_exposure(const PoseWindow& window, const Trac
 /// Position of the pointer's tip in the frame of the bone's marker. Refuses as `see_tool`; bad_value without
 /// a pointer.
 Expected<Eigen::Vector3d> touched_in_bone(const PoseWindow& window, const TrackerPlan& plan,
-                                          guidance::Bone bone);
+                                          const guidance::Bone& bone);
 
 /// Bones and tool; all must be visible.
 Expected<guidance::Poses> poses_now(const PoseWindow& window, const TrackerPlan& plan);

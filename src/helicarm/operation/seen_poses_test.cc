@@ -66,8 +66,8 @@ TEST(SeenPoses, OneFacetIsEnough) {
 
 TEST(SeenPoses, OccludedBoneIsAbsentFromTheAcquisition) {
   const guidance::Poses poses = poses_of_exposure(window(), plan()).value();
-  EXPECT_TRUE(poses.tracker_from_calibrator && poses.tracker_from_femur);
-  EXPECT_FALSE(poses.tracker_from_tibia);
+  EXPECT_TRUE(poses.tracker_from_calibrator && poses.tracker_from("femur"));
+  EXPECT_FALSE(poses.tracker_from("tibia"));
 }
 
 TEST(SeenPoses, BoneThatMovedDuringTheAcquisitionIsRefused) {

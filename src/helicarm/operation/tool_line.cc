@@ -26,20 +26,16 @@ Matrix6d carried(const Vector3d& lever) {
   return effect;
 }
 
-const geometry::RigidTransform& pose_of(const guidance::Poses& poses, guidance::Bone bone) {
-  const auto& pose = poses.tracker_from(bone);
-  if (!pose)
-    throw BadInput(Reason::no_pose, fmt::format("{}: its marker is not visible",
-                                                bone == guidance::Bone::femur ? "femur" : "tibia"));
+geometry::RigidTransform pose_of(const guidance::Poses& poses, const guidance::Bone& bone) {
+  const auto pose = poses.tracker_from(bone);
+  if (!pose) throw BadInput(Reason::no_pose, fmt::format("{}: its marker is not visible", bone));
   return *pose;
 }
 
-Vector3d located(const pipeline::Result& result, const std::string& name, guidance::Bone bone) {
+Vector3d located(const pipeline::Result& result, const std::string& name, const guidance::Bone& bone) {
   const auto point = std::ranges::find(result.points, name, &pipeline::PointResult::name);
-  if (point != result.points.end() && point->place) {
-    const auto& in_bone = bone == guidance::Bone::femur ? point->place->in_femur : point->place->in_tibia;
-    if (in_bone) return *in_bone;
-  }
+  if (point != result.points.end() && point->place)
+    if (const guidance::Place* in_bone = point->place->in(bone)) return in_bone->point();
   throw BadInput(Reason::not_seen, fmt::format("{}: is not located in its bone's frame", name));
 }
 
@@ -88,7 +84,7 @@ TrackedTool tracked_tool(const HandDrill& drill) {
 }
 
 Expected<robot::ToolMeasurement> measure_tool(const PoseWindow& window, const OperationPlan& plan,
-                                              const tracker::HandEye& hand_eye, guidance::Bone bone,
+                                              const tracker::HandEye& hand_eye, const guidance::Bone& bone,
                                               const geometry::RigidTransform& bone_from_target) {
   return guarded([&] {
     const std::string& bone_marker = plan.tracker.marker_of(bone);
@@ -110,7 +106,7 @@ Expected<robot::ToolMeasurement> measure_tool(const PoseWindow& window, const Op
   });
 }
 
-Expected<verification::ToolLine> tool_line(const std::string& tunnel, guidance::Bone bone,
+Expected<verification::ToolLine> tool_line(const std::string& tunnel, const guidance::Bone& bone,
                                            const guidance::Poses& exposure, const guidance::Poses& now,
                                            const geometry::RigidTransform& marker_from_tip) {
   return guarded([&] {

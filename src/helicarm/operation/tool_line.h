@@ -46,12 +46,12 @@ PointAtTip at_tip(const Eigen::Vector3d& point_in_marker, const Eigen::Matrix3d&
 
 /// Poses of the target's bone and of the tool in this window; covariance: scatter of the samples.
 Expected<robot::ToolMeasurement> measure_tool(const PoseWindow& window, const OperationPlan& plan,
-                                              const tracker::HandEye& hand_eye, guidance::Bone bone,
+                                              const tracker::HandEye& hand_eye, const guidance::Bone& bone,
                                               const geometry::RigidTransform& bone_from_target);
 
 /// The tool's line at each view's acquisition, as if the tool had moved with the bone: two points in the
 /// calibrator frame (3.3). Refuses no_pose if the bone was not visible then or is not now.
-Expected<verification::ToolLine> tool_line(const std::string& tunnel, guidance::Bone bone,
+Expected<verification::ToolLine> tool_line(const std::string& tunnel, const guidance::Bone& bone,
                                            const guidance::Poses& exposure, const guidance::Poses& now,
                                            const geometry::RigidTransform& marker_from_tcp);
 

@@ -85,17 +85,15 @@ TEST(ToolLine, LineAtTheAcquisitionFollowsTheBone) {
   const Vector3d on_bone(30, 5, -20);
   guidance::Poses exposure, now;
   exposure.tracker_from_calibrator = tracker_from_calibrator;
-  exposure.tracker_from_femur = femur_then;
-  now.tracker_from_femur = femur_now;
+  exposure.tracker_from_bone["femur"] = femur_then;
+  now.tracker_from_bone["femur"] = femur_now;
   geometry::RigidTransform tip{geometry::rotation_from_euler(0.5, 0.5, 0.5), femur_now * on_bone};
   now.tracker_from_tool = tip * marker_from_tip.inverse();
-  const verification::ToolLine line =
-      tool_line("femur", guidance::Bone::femur, exposure, now, marker_from_tip).value();
+  const verification::ToolLine line = tool_line("femur", "femur", exposure, now, marker_from_tip).value();
   EXPECT_LT((line.p2_in_calibrator - tracker_from_calibrator.inverse() * (femur_then * on_bone)).norm(),
             1e-9);
   EXPECT_NEAR((line.p2_in_calibrator - line.p1_in_calibrator).norm(), 100, 1e-9);
-  EXPECT_EQ(tool_line("tibia", guidance::Bone::tibia, exposure, now, marker_from_tip).error().reason,
-            Reason::no_pose);
+  EXPECT_EQ(tool_line("tibia", "tibia", exposure, now, marker_from_tip).error().reason, Reason::no_pose);
 }
 
 TEST(HandEyeTour, TurnsAboutAllAxesAndEndsWhereItBegan) {

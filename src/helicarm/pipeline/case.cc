@@ -8,9 +8,9 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
-#include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/pipeline/case_json.h"
+#include "helicarm/pipeline/poses_json.h"
 #include "helicarm/xray/dicom_acquisition.h"
 
 namespace helicarm::pipeline {
@@ -24,7 +24,6 @@ constexpr std::size_t most_picks = 1000;
 constexpr std::size_t most_note_characters = 100000;
 constexpr Range pixel_range{-0.5, 65535};
 constexpr Range place_range{-10000, 10000};
-constexpr Range pose_range{-100000, 100000};
 
 template <class T, class Name>
 const T* find_named(const std::vector<T>& all, const std::string& name, Name name_of) {
@@ -45,28 +44,6 @@ void take_name(const JsonReader& reader, std::set<std::string>& names, const std
 
 Eigen::Vector3d place_from(JsonReader& reader, const char* key) {
   return Eigen::Vector3d(reader.numbers(key, 3, place_range).data());
-}
-
-std::optional<geometry::RigidTransform> pose_from(JsonReader& reader, const char* key) {
-  const Json& rows = reader.raw(key);
-  if (rows.is_null()) return std::nullopt;
-  const std::size_t count = rows.is_array() && rows.size() == 3 ? 3 : 4;
-  const auto numbers = reader.matrix(key, count, 4, pose_range);
-  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  for (std::size_t i = 0; i < numbers.size(); ++i)
-    matrix(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) = numbers[i];
-  return value_or_throw(
-      geometry::rigid_transform_from(matrix, fmt::format("{}: \"{}\"", reader.where(), key)));
-}
-
-guidance::Poses poses_from(JsonReader reader, bool now) {
-  guidance::Poses poses;
-  if (!now) poses.tracker_from_calibrator = pose_from(reader, "tracker_from_calibrator");
-  poses.tracker_from_femur = pose_from(reader, "tracker_from_femur");
-  poses.tracker_from_tibia = pose_from(reader, "tracker_from_tibia");
-  if (now) poses.tracker_from_tool = pose_from(reader, "tracker_from_tool");
-  reader.finish();
-  return poses;
 }
 
 fs::path file_named(const std::string& name, const JsonReader& reader, const char* key,
@@ -90,19 +67,29 @@ bool looks_like_metres(const geometry::RigidTransform& pose) {
          Eigen::AngleAxisd(pose.rotation).angle() > least_turn_rad;
 }
 
+using NamedPose = std::pair<std::string, geometry::RigidTransform>;
+
+/// Each reading under its key.
+std::vector<NamedPose> readings_of(const guidance::Poses& poses) {
+  std::vector<NamedPose> readings;
+  if (poses.tracker_from_calibrator)
+    readings.emplace_back("tracker_from_calibrator", *poses.tracker_from_calibrator);
+  for (const auto& [bone, pose] : poses.tracker_from_bone)
+    readings.emplace_back("tracker_from_" + bone, pose);
+  if (poses.tracker_from_tool) readings.emplace_back("tracker_from_tool", *poses.tracker_from_tool);
+  return readings;
+}
+
 void refuse_metres_in(const guidance::Poses& poses, const std::string& where) {
-  for (const auto& [key, pose] : {std::pair{"tracker_from_calibrator", &poses.tracker_from_calibrator},
-                                  {"tracker_from_femur", &poses.tracker_from_femur},
-                                  {"tracker_from_tibia", &poses.tracker_from_tibia},
-                                  {"tracker_from_tool", &poses.tracker_from_tool}})
-    if (*pose && looks_like_metres(**pose))
+  for (const auto& [key, pose] : readings_of(poses))
+    if (looks_like_metres(pose))
       throw BadInput(
           {Reason::bad_value,
            fmt::format("case.json: {}: \"{}\" is {:.3g} mm from the tracker's origin, at least 10 mm are "
                        "expected: give translations in mm, not in metres",
-                       where, key, (*pose)->translation.norm()),
+                       where, key, pose.translation.norm()),
            {},
-           {{"distance_mm", (*pose)->translation.norm()}}});
+           {{"distance_mm", pose.translation.norm()}}});
 }
 
 /// Refuses poses in metres: no tracker measures within 10 mm of its origin, and all measure within 10 m.
@@ -113,9 +100,7 @@ void refuse_metres(const Case& read) {
   refuse_metres_in(read.poses_now, "poses_now");
   double farthest = 0;
   const auto update = [&](const guidance::Poses& poses) {
-    for (const auto* pose : {&poses.tracker_from_calibrator, &poses.tracker_from_femur,
-                             &poses.tracker_from_tibia, &poses.tracker_from_tool})
-      if (*pose) farthest = std::max(farthest, (*pose)->translation.norm());
+    for (const auto& [key, pose] : readings_of(poses)) farthest = std::max(farthest, pose.translation.norm());
   };
   for (const CaseView& view : read.views) update(view.poses);
   update(read.poses_now);
@@ -129,7 +114,8 @@ void refuse_metres(const Case& read) {
        {{"farthest_mm", farthest}, {"limit_mm", least_mm}}});
 }
 
-CaseView view_from(JsonReader reader, const fs::path& folder) {
+CaseView view_from(JsonReader reader, const Case& known) {
+  const fs::path& folder = known.folder;
   CaseView view;
   view.name = name_from(reader, "name");
   view.image = file_named(reader.text("image", 1000), reader, "image", folder);
@@ -142,19 +128,21 @@ CaseView view_from(JsonReader reader, const fs::path& folder) {
   view.pixel_mm = reader.optional_number("pixel_mm", {xray::min_pixel_mm, xray::max_pixel_mm});
   view.source_detector_mm = reader.optional_number(
       "source_detector_mm", {xray::min_source_detector_mm, xray::max_source_detector_mm});
-  if (!reader.raw("poses").is_null()) view.poses = poses_from(reader.object("poses"), false);
+  if (!reader.raw("poses").is_null())
+    view.poses = poses_from(reader.object("poses"), known.bones, OtherMarker::calibrator);
   reader.finish();
   return view;
 }
 
-BoneLabel bone_from(JsonReader reader) {
+BoneLabel bone_label_from(JsonReader reader) {
   BoneLabel bone{name_from(reader, "name")};
   if (!reader.raw("side").is_null()) bone.side = static_cast<Side>(reader.choice("side", {"left", "right"}));
   reader.finish();
   return bone;
 }
 
-Pick pick_from(JsonReader reader, const std::vector<CaseView>& views) {
+Pick pick_from(JsonReader reader, const std::vector<CaseView>& views,
+               const std::vector<guidance::Bone>& bones) {
   Pick pick;
   pick.name = name_from(reader, "name");
   pick.view = name_from(reader, "view");
@@ -164,19 +152,19 @@ Pick pick_from(JsonReader reader, const std::vector<CaseView>& views) {
   if (!reader.raw("snap").is_null()) pick.snap = static_cast<Snap>(reader.choice("snap", {"none", "ball"}));
   pick.diameter_mm = reader.optional_number("diameter_mm", {0.5, 30}).value_or(pick.diameter_mm);
   pick.sigma_px = reader.optional_number("sigma_px", {0, 100});
-  if (!reader.raw("moves_with").is_null())
-    pick.moves_with = static_cast<guidance::Bone>(reader.choice("moves_with", {"femur", "tibia"}));
-  if (!reader.raw("bone").is_null()) pick.bone = bone_from(reader.object("bone"));
+  if (!reader.raw("moves_with").is_null()) pick.moves_with = bone_from(reader, "moves_with", bones);
+  if (!reader.raw("bone").is_null()) pick.bone = bone_label_from(reader.object("bone"));
   reader.finish();
   return pick;
 }
 
 std::vector<Pick> picks_of(JsonReader& reader, const std::vector<CaseView>& views,
+                           const std::vector<guidance::Bone>& bones,
                            const std::vector<phantom::CalibratorTarget>& targets) {
   std::vector<Pick> picks;
   std::set<std::pair<std::string, std::string>> clicks;
   for (JsonReader& entry : reader.objects("picks", false, most_picks)) {
-    Pick pick = pick_from(entry, views);
+    Pick pick = pick_from(entry, views, bones);
     if (!clicks.emplace(pick.name, pick.view).second)
       entry.refuse(Reason::name_clash, "name",
                    fmt::format("\"{}\" is given twice in {}", pick.name, pick.view));
@@ -261,7 +249,7 @@ std::vector<CaseView> views_from(JsonReader& reader, const Case& known, std::siz
   std::vector<CaseView> views;
   std::set<std::string> names;
   for (JsonReader& entry : reader.objects("views", true, most_views)) {
-    views.push_back(view_from(entry, known.folder));
+    views.push_back(view_from(entry, known));
     take_name(entry, names, views.back().name);
     if (views.back().plate_image && !known.plate)
       entry.refuse(Reason::bad_value, "plate_image", "is given, but the case has no plate");
@@ -288,18 +276,20 @@ void warn_of_name(Case& read) {
 
 Case case_of(const Json& json, const std::string& origin, const fs::path& folder, Purpose purpose) {
   JsonReader reader(json, origin);
-  reader.choice("format", {"helicarm-case/1"});
+  reader.choice("format", {"helicarm-case/2", "helicarm-case/1"});
   reader.optional_text("notes", most_note_characters);
   reader.raw("models");  // of the registration
   Case read;
   read.folder = folder;
+  read.bones = bones_from(reader);
   read_calibrator_of(read, reader, purpose);
   if (const auto plate = reader.optional_text("plate", 1000))
     read.plate = value_or_throw(phantom::plate_named(*plate, folder));
   read.views = views_from(reader, read, purpose == Purpose::run ? least_views_of_run : 1);
-  if (!reader.raw("poses_now").is_null()) read.poses_now = poses_from(reader.object("poses_now"), true);
+  if (!reader.raw("poses_now").is_null())
+    read.poses_now = poses_from(reader.object("poses_now"), read.bones, OtherMarker::tool);
   if (!reader.raw("tracker").is_null()) read.tracker = tracker_from(reader.object("tracker"));
-  read.picks = picks_of(reader, read.views, read.calibrator.targets);
+  read.picks = picks_of(reader, read.views, read.bones, read.calibrator.targets);
   read.tunnels = tunnels_from(reader, read.picks);
   read.tool_lines = tool_lines_from(reader, read.tunnels);
   reader.finish();
@@ -321,7 +311,7 @@ Json to_json(const Pick& pick) {
   Json json = {{"name", pick.name}, {"view", pick.view}, {"uv", geometry::json_list(pick.uv_raw)}};
   if (pick.snap == Snap::ball) json["snap"] = "ball", json["diameter_mm"] = pick.diameter_mm;
   if (pick.sigma_px) json["sigma_px"] = *pick.sigma_px;
-  if (pick.moves_with) json["moves_with"] = *pick.moves_with == guidance::Bone::femur ? "femur" : "tibia";
+  if (pick.moves_with) json["moves_with"] = *pick.moves_with;
   if (pick.bone) {
     json["bone"] = {{"name", pick.bone->name}};
     if (pick.bone->side) json["bone"]["side"] = *pick.bone->side == Side::left ? "left" : "right";
@@ -330,11 +320,12 @@ Json to_json(const Pick& pick) {
 }
 
 Expected<std::vector<Pick>> picks_from(const Json& picks, const std::string& origin,
-                                       const std::vector<CaseView>& views) {
+                                       const std::vector<CaseView>& views,
+                                       const std::vector<guidance::Bone>& bones) {
   return guarded([&] {
     const Json json = {{"picks", picks}};
     JsonReader reader(json, origin);
-    return picks_of(reader, views, {});
+    return picks_of(reader, views, bones, {});
   });
 }
 

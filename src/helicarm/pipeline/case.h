@@ -58,7 +58,8 @@ struct Pick {
 Json to_json(const Pick& pick);
 /// Fails as `read_case`; `origin` begins each message.
 Expected<std::vector<Pick>> picks_from(const Json& picks, const std::string& origin,
-                                       const std::vector<CaseView>& views);
+                                       const std::vector<CaseView>& views,
+                                       const std::vector<guidance::Bone>& bones);
 
 /// A tunnel runs from the pick `start` to the pick `end`.
 struct TunnelPlan {
@@ -71,7 +72,8 @@ struct TunnelPlan {
 struct Case {
   std::filesystem::path folder;
   phantom::Calibrator calibrator;
-  std::optional<phantom::Plate> plate;  ///< nothing: flat panel
+  std::optional<phantom::Plate> plate;                         ///< nothing: flat panel
+  std::vector<guidance::Bone> bones = guidance::knee_bones();  ///< that markers may follow
   std::vector<CaseView> views;
   guidance::Poses poses_now;
   guidance::TrackerNoise tracker;

@@ -12,6 +12,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/poses_json.h"
 #include "helicarm/pipeline/run_case.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/xray/derived_image.h"
@@ -26,8 +27,8 @@ constexpr std::uintmax_t most_bundled_bytes = std::uintmax_t{256} << 20;
 using Renamed = std::map<std::string, std::string>;
 
 /// What of case.json and its views is packed; all else may name a person or a file.
-constexpr std::array packed_keys{"format", "calibrator", "plate",     "diameters_mm", "views",
-                                 "picks",  "tunnels",    "poses_now", "tracker",      "tool_lines"};
+constexpr std::array packed_keys{"format", "calibrator", "plate",     "bones",   "diameters_mm", "views",
+                                 "picks",  "tunnels",    "poses_now", "tracker", "tool_lines"};
 constexpr std::array packed_view_keys{"name",     "image", "frame",    "plate_image",       "map",
                                       "mirrored", "poses", "pixel_mm", "source_detector_mm"};
 
@@ -59,6 +60,9 @@ class Bundler {
     picks_ = numbered(json_, "picks", "pick");
     tunnels_ = numbered(json_, "tunnels", "tunnel");
     lines_ = numbered(json_, "tool_lines", "line");
+    if (json_.contains("bones") && !json_["bones"].is_null())
+      for (const guidance::Bone& bone : given_.bones)
+        tracked_.emplace(bone, fmt::format("tracked_bone{}", tracked_.size() + 1));
   }
 
   void write() {
@@ -66,10 +70,13 @@ class Bundler {
     keep_only(json_, packed_keys);
     for (Json& view : json_["views"]) keep_only(view, packed_view_keys);
     write_descriptions();
+    rename_tracked_bones();
     for (std::size_t i = 0; i < given_.views.size(); ++i) write_view(i);
     for (Json& pick : json_["picks"]) {
       rename(pick, "name", picks_);
       rename(pick, "view", views_);
+      if (!tracked_.empty() && pick.contains("moves_with") && !pick["moves_with"].is_null())
+        rename(pick, "moves_with", tracked_);
       if (pick.contains("bone") && pick["bone"].is_object()) {
         const auto name = pick["bone"]["name"].get<std::string>();
         pick["bone"]["name"] =
@@ -96,7 +103,7 @@ class Bundler {
   /// Every new name by the old one.
   Renamed names() const {
     Renamed all = views_;
-    for (const Renamed* some : {&picks_, &tunnels_, &lines_, &bones_, &models_})
+    for (const Renamed* some : {&picks_, &tunnels_, &lines_, &bones_, &tracked_, &models_})
       all.insert(some->begin(), some->end());
     return all;
   }
@@ -104,6 +111,25 @@ class Bundler {
  private:
   static void rename(Json& entry, const char* key, const Renamed& names) {
     entry[key] = names.at(entry[key].get<std::string>());
+  }
+
+  void rename_tracked_bones() {
+    if (tracked_.empty()) return;
+    Json bones = Json::array();
+    for (const guidance::Bone& bone : given_.bones) bones.push_back(tracked_.at(bone));
+    json_["bones"] = bones;
+    if (json_.contains("poses_now"))
+      json_["poses_now"] = to_json(renamed(given_.poses_now), OtherMarker::tool);
+    for (std::size_t i = 0; i < given_.views.size(); ++i)
+      if (Json& view = json_["views"][i]; view.contains("poses"))
+        view["poses"] = to_json(renamed(given_.views[i].poses), OtherMarker::calibrator);
+  }
+
+  guidance::Poses renamed(guidance::Poses poses) const {
+    std::map<guidance::Bone, geometry::RigidTransform> by_new_name;
+    for (const auto& [bone, pose] : poses.tracker_from_bone) by_new_name.emplace(tracked_.at(bone), pose);
+    poses.tracker_from_bone = std::move(by_new_name);
+    return poses;
   }
 
   void add_json(const std::string& name, const Json& json) {
@@ -185,7 +211,7 @@ class Bundler {
 
   const Case& given_;
   Json json_;
-  Renamed views_, picks_, tunnels_, lines_, bones_, models_;
+  Renamed views_, picks_, tunnels_, lines_, bones_, tracked_, models_;
   xray::DeIdentification de_identify_;
   TemporaryFolder folder_;
   CaseBundle bundle_;

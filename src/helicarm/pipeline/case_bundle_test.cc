@@ -92,6 +92,28 @@ TEST_F(BundleOfNamedCase, HoldsNothingOfItsModels) {
   EXPECT_EQ(parse_json(packed->bytes, "case.json")->at("picks")[0]["bone"]["name"], "bone1");
 }
 
+TEST_F(BundleOfNamedCase, NumbersTheBonesThatTheCaseNames) {
+  Json json = *read_json(folder_.path() / "case.json");
+  json["bones"] = {"doe_bone", "tibia"};
+  const auto rename = [](Json& poses) {
+    Json& bones = poses["tracker_from_bone"];
+    bones["doe_bone"] = bones["femur"];
+    bones.erase("femur");
+  };
+  rename(json["poses_now"]);
+  for (Json& view : json["views"]) rename(view["poses"]);
+  for (Json& pick : json["picks"])
+    if (pick["moves_with"] == "femur") pick["moves_with"] = "doe_bone";
+  ASSERT_TRUE(write_file(folder_.path() / "case.json", to_text(json)));
+  const CaseBundle made = bundle({});
+  for (const ArchivedFile& file : made.files)
+    EXPECT_EQ(file.bytes.find("doe"), std::string::npos) << file.name;
+  const auto result =
+      parse_json(std::ranges::find(made.files, "result.json", &ArchivedFile::name)->bytes, "result.json");
+  EXPECT_TRUE(result->at("points")[0]["in_bones"].contains("tracked_bone1"));
+  EXPECT_FALSE(result->at("points")[0]["in_tool"].is_null());
+}
+
 TEST_F(BundleOfNamedCase, KeepsWhatAViewStatesOfItsImage) {
   Json json = *read_json(folder_.path() / "case.json");
   const auto image = xray::read_xray_image(folder_.path() / "doe_AP.dcm", "AP", {});

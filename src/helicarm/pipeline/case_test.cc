@@ -120,7 +120,7 @@ TEST_F(CaseFile, ReadsAllValues) {
   EXPECT_EQ(read_back->views[0].poses.tracker_from_calibrator->translation, Eigen::Vector3d(5, 6, 7));
   EXPECT_FALSE(read_back->views[1].poses.tracker_from_calibrator);
   EXPECT_EQ(read_back->picks[0].snap, Snap::ball);
-  EXPECT_EQ(read_back->picks[0].moves_with, guidance::Bone::femur);
+  EXPECT_EQ(read_back->picks[0].moves_with, "femur");
   EXPECT_EQ(read_back->picks[1].sigma_px, 0.0);
   EXPECT_FALSE(read_back->picks[2].moves_with);
   EXPECT_EQ(read_back->tracker.samples, guidance::Samples::shared);
@@ -294,25 +294,25 @@ TEST_F(CaseFile, NegativeSigmaOfAPickIsRefused) {
 }
 
 TEST(Case, RoundTripOfPicks) {
-  std::vector<Pick> picks{{"FS", "AP", {512.25, 300.5}, Snap::ball, 3, {}, guidance::Bone::femur},
-                          {"FS", "LAT", {401, 299}, Snap::none, 3, 0.5, guidance::Bone::femur}};
+  std::vector<Pick> picks{{"FS", "AP", {512.25, 300.5}, Snap::ball, 3, {}, "femur"},
+                          {"FS", "LAT", {401, 299}, Snap::none, 3, 0.5, "femur"}};
   picks[0].bone = {"condyle", Side::right};
   picks[1].bone = {"femur"};
   Json json = Json::array();
   for (const Pick& pick : picks) json.push_back(to_json(pick));
   std::vector<CaseView> views(2);
   views[0].name = "AP", views[1].name = "LAT";
-  const auto again = picks_from(json, "plan", views).value();
+  const auto again = picks_from(json, "plan", views, guidance::knee_bones()).value();
   ASSERT_EQ(again.size(), 2U);
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_EQ(to_json(again[i]), to_json(picks[i]));
     EXPECT_EQ(again[i].bone, picks[i].bone);
   }
   json[0]["bone"]["side"] = "medial";
-  EXPECT_EQ(picks_from(json, "plan", views).error().reason, Reason::bad_value);
+  EXPECT_EQ(picks_from(json, "plan", views, guidance::knee_bones()).error().reason, Reason::bad_value);
   json[0]["bone"]["side"] = "left";
   views.pop_back();
-  EXPECT_EQ(picks_from(json, "plan", views).error().reason, Reason::bad_value);
+  EXPECT_EQ(picks_from(json, "plan", views, guidance::knee_bones()).error().reason, Reason::bad_value);
 }
 
 }  // namespace

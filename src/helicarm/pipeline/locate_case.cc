@@ -45,6 +45,7 @@ std::vector<Warning> warnings_of(const std::vector<ViewResult>& views) {
 Result initial_result(const Case& given, const RunOptions& options, std::vector<ViewResult> views) {
   Result result;
   result.options = options;
+  result.bones = given.bones;
   result.calibrator = {given.calibrator.name, given.calibrator.tolerance_mm, given.calibrator.scale_sigma,
                        given.calibrator.measured, given.calibrator.balls};
   result.views = std::move(views);

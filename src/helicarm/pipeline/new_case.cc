@@ -277,7 +277,7 @@ Expected<NewCase> new_case(std::vector<InspectedImage> images, const NewCaseOpti
     check_images(images);
     NewCase made;
     for (const InspectedImage& image : images) made.findings.push_back(description_of(image));
-    made.json = {{"format", "helicarm-case/1"}, {"notes", ""}};
+    made.json = {{"format", "helicarm-case/2"}, {"notes", ""}};
     set_calibrator(made, options.calibrator, folder);
     set_plate(made, images, options, folder);
     set_views(made, images, options, folder);

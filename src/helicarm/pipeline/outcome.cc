@@ -125,8 +125,8 @@ std::optional<double> tunnel_end_error_in_tool(const Result& result, const std::
   if (std::size_t(found) >= result.tunnel_ends.size()) return {};
   const TunnelEnds& ends = result.tunnel_ends[std::size_t(found)];
   const auto& place = result.points[start ? ends.start : ends.end].place;
-  if (!place || !place->covariance_in_tool) return {};
-  return localization::length_at_95(*place->covariance_in_tool);
+  if (!place || !place->in_tool) return {};
+  return localization::length_at_95(place->in_tool->covariance);
 }
 
 std::vector<Warning> reused_uids(const std::vector<ViewResult>& views) {
@@ -202,10 +202,10 @@ Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& poi
   std::vector<Warning> warnings;
   for (const PointResult& point : points) {
     if (!point.place) continue;
-    const auto& in_tool = point.place->covariance_in_tool;
+    const auto& in_tool = point.place->in_tool;
     double error = localization::length_at_95(point.place->covariance_in_calibrator);
-    const bool worse_in_tool = in_tool && localization::length_at_95(*in_tool) > error;
-    if (worse_in_tool) error = localization::length_at_95(*in_tool);
+    const bool worse_in_tool = in_tool && localization::length_at_95(in_tool->covariance) > error;
+    if (worse_in_tool) error = localization::length_at_95(in_tool->covariance);
     if (error <= limit) continue;
     std::string message = fmt::format("the 95 % error of \"{}\"{} is {:.3g} mm, over the limit of {:g} mm",
                                       point.name, worse_in_tool ? " in the tool's frame" : "", error, limit);

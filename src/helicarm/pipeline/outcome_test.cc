@@ -46,7 +46,8 @@ TEST(CheckPicksAgree, ContradictingPicksAloneMayBeMotion) {
 TEST(CheckCertain, LimitHoldsInTheToolsFrameToo) {
   std::vector<PointResult> points = {point("a", 0, false)};
   EXPECT_TRUE(check_certain(points, 0.5, {}));
-  points[0].place->covariance_in_tool = Eigen::Matrix3d::Identity();
+  points[0].place->in_tool = {{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero(), {}, {}},
+                              Eigen::Matrix3d::Identity()};
   const auto refused = check_certain(points, 0.5, {});
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::uncertain);

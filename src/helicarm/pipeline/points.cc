@@ -223,7 +223,7 @@ std::vector<Warning> locate_points(const Case& given, const calibration::Calibra
           {Reason::bone_taken_as_fixed,
            fmt::format("\"{}\" moves with the {}, but poses of it or of the calibrator are missing: it "
                        "is taken as fixed to the calibrator",
-                       point.name, *point.moves_with == guidance::Bone::femur ? "femur" : "tibia"),
+                       point.name, *point.moves_with),
            {},
            {}});
   }

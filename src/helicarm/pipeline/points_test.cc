@@ -26,13 +26,13 @@ class TwoViews : public testing::Test {
     const geometry::RigidTransform tracker_from_calibrator = motion(-80, -100, 750, 40, {1, 2, 3});
     const geometry::RigidTransform tracker_from_femur = motion(-40, -140, 770, 120, {3, -1, 1});
     given.views.resize(2);
-    given.views[0].poses = {tracker_from_calibrator, tracker_from_femur, {}, {}};
+    given.views[0].poses = {tracker_from_calibrator, {{"femur", tracker_from_femur}}, {}};
     given.views[1].poses = {
-        tracker_from_calibrator, tracker_from_femur * motion(2, 3, -1, 8, {1, 0, 0}), {}, {}};
+        tracker_from_calibrator, {{"femur", tracker_from_femur * motion(2, 3, -1, 8, {1, 0, 0})}}, {}};
   }
 
   Eigen::Vector3d in_calibrator(std::size_t view) const {
-    return *guidance::calibrator_from(guidance::Bone::femur, given.views[view].poses) * point_in_femur;
+    return *guidance::calibrator_from("femur", given.views[view].poses) * point_in_femur;
   }
 
   PointResult image_point(std::optional<guidance::Bone> moves_with) const {
@@ -50,10 +50,10 @@ class TwoViews : public testing::Test {
 };
 
 TEST_F(TwoViews, RaysMeetInTheFrameOfTheBoneThatMoved) {
-  std::vector<PointResult> points = {image_point(guidance::Bone::femur)};
+  std::vector<PointResult> points = {image_point("femur")};
   EXPECT_TRUE(locate_points(given, calibration, points).empty());
   ASSERT_TRUE(points[0].place);
-  EXPECT_LT((*points[0].place->in_femur - point_in_femur).norm(), 1e-6);
+  EXPECT_LT((points[0].place->in("femur")->point() - point_in_femur).norm(), 1e-6);
   EXPECT_LT((points[0].place->in_calibrator - in_calibrator(0)).norm(), 1e-6);
   EXPECT_LT(points[0].ray_gap_mm, 1e-6);
 }
@@ -68,9 +68,9 @@ TEST_F(TwoViews, RaysThatMissInflateTheCovariance) {
 
 TEST_F(TwoViews, TrackerNoiseExplainsARayGap) {
   // The second view's pose of the femur is 0.7 mm wrong: far more than the pixels explain.
-  given.views[1].poses.tracker_from_femur->translation += Eigen::Vector3d(0.4, 0.4, 0.4);
-  PointResult seen = image_point(guidance::Bone::femur);
-  given.views[1].poses.tracker_from_femur->translation -= Eigen::Vector3d(0.4, 0.4, 0.4);
+  given.views[1].poses.tracker_from_bone.at("femur").translation += Eigen::Vector3d(0.4, 0.4, 0.4);
+  PointResult seen = image_point("femur");
+  given.views[1].poses.tracker_from_bone.at("femur").translation -= Eigen::Vector3d(0.4, 0.4, 0.4);
   std::vector<PointResult> points = {seen};
   EXPECT_EQ(locate_points(given, calibration, points).size(), 1u);
   given.tracker.sigma_mm = 0.4;
@@ -84,7 +84,7 @@ TEST_F(TwoViews, TrackerNoiseExplainsARayGap) {
 
 TEST_F(TwoViews, BoneWithoutPosesIsTakenAsFixed) {
   given.views[1].poses = given.views[0].poses;
-  std::vector<PointResult> points = {image_point(guidance::Bone::femur)};
+  std::vector<PointResult> points = {image_point("femur")};
   given.views[1].poses = {};
   const auto warnings = locate_points(given, calibration, points);
   ASSERT_EQ(warnings.size(), 1u);
@@ -94,7 +94,7 @@ TEST_F(TwoViews, BoneWithoutPosesIsTakenAsFixed) {
 
 TEST_F(TwoViews, UntrackedPointHasANoteOfUnobservableMotion) {
   given.views[1].poses = given.views[0].poses;
-  std::vector<PointResult> points = {image_point(guidance::Bone::femur), image_point(std::nullopt)};
+  std::vector<PointResult> points = {image_point("femur"), image_point(std::nullopt)};
   points[1].name = "bare";
   locate_points(given, calibration, points);
   const auto notes = note_motion(given, calibration, points, 0);
@@ -114,7 +114,7 @@ TEST_F(TwoViews, MotionSigmaIsForUntrackedPointsOnly) {
     locate_points(given, calibration, points, sigma);
     return points[0].place->covariance_in_calibrator.trace();
   };
-  EXPECT_EQ(variance(guidance::Bone::femur, 2), variance(guidance::Bone::femur, 0));
+  EXPECT_EQ(variance("femur", 2), variance("femur", 0));
   EXPECT_GT(variance(std::nullopt, 2), 3.9);
 }
 
@@ -153,7 +153,7 @@ TEST_F(TwoViews, PickOnAFiducialsImageInOneViewIsAllowed) {
 }
 
 TEST_F(TwoViews, PointObservedOnceIsNotLocated) {
-  std::vector<PointResult> points = {image_point(guidance::Bone::femur)};
+  std::vector<PointResult> points = {image_point("femur")};
   points[0].seen[1].reset();
   locate_points(given, calibration, points);
   EXPECT_FALSE(points[0].place);

@@ -11,6 +11,7 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/pipeline/case_json.h"
+#include "helicarm/pipeline/poses_json.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -38,7 +39,8 @@ void read_start(JsonReader reader, const fs::path& folder, CaseModel& model) {
   reader.finish();
 }
 
-CaseModel model_from(JsonReader& reader, const fs::path& folder) {
+CaseModel model_from(JsonReader& reader, const Case& known) {
+  const fs::path& folder = known.folder;
   CaseModel model;
   model.name = reader.text("name", 100);
   if (model.name.empty()) reader.refuse(Reason::bad_value, "name", "is empty");
@@ -60,8 +62,7 @@ CaseModel model_from(JsonReader& reader, const fs::path& folder) {
   model.scale_sigma = reader.optional_number("scale_sigma", scale_sigma_range);
   if (!reader.raw("side").is_null())
     model.side = reader.choice("side", {"left", "right"}) == 0 ? "left" : "right";
-  if (!reader.raw("moves_with").is_null())
-    model.moves_with = static_cast<guidance::Bone>(reader.choice("moves_with", {"femur", "tibia"}));
+  if (!reader.raw("moves_with").is_null()) model.moves_with = bone_from(reader, "moves_with", known.bones);
   if (!reader.raw("start").is_null()) read_start(reader.object("start"), folder, model);
   model.plan = model_file(reader, "plan", folder);
   if (!model.volume && !model.surface && !model.landmarks)
@@ -137,7 +138,7 @@ Expected<RegistrationCase> read_with_models(const fs::path& path, Purpose purpos
     JsonReader reader(models, file.filename().string());
     std::set<std::string> names;
     for (JsonReader& entry : reader.objects("models", true, most_models)) {
-      read.models.push_back(model_from(entry, read.base.folder));
+      read.models.push_back(model_from(entry, read.base));
       if (!names.insert(read.models.back().name).second)
         entry.refuse(Reason::name_clash, "name",
                      fmt::format("\"{}\" is given twice", read.models.back().name));

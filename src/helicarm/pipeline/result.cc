@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/pipeline/result.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "helicarm/fiducials/status_words.h"
@@ -132,7 +133,8 @@ Json json_of(const ViewResult& view) {
   return json;
 }
 
-Json json_of(const PointResult& point, const std::vector<ViewResult>& views) {
+Json json_of(const PointResult& point, const std::vector<ViewResult>& views,
+             const std::vector<guidance::Bone>& bones) {
   Json json = {{"name", point.name},
                {"source", point.source == localization::PointSource::pick ? "pick" : "target"}};
   const auto& place = point.place;
@@ -156,7 +158,7 @@ Json json_of(const PointResult& point, const std::vector<ViewResult>& views) {
   json["message"] = point.reason ? Json(point.reason->message) : Json(nullptr);
   json["warnings"] = json_list_of(point.warnings);
   json["notes"] = json_list_of(point.notes);
-  json.update(in_frames(place ? &*place : nullptr));
+  json.update(in_frames(place ? &*place : nullptr, bones));
   return json;
 }
 
@@ -224,8 +226,34 @@ Json list_of(const std::vector<T>& items, const More&... more) {
 
 }  // namespace
 
+namespace {
+
+Json json_of(const guidance::Place& place) {
+  return {{"xyz_mm", vector(place.point())},
+          {"covariance_mm2", matrix(place.covariance)},
+          {"error_95_mm", number(localization::length_at_95(place.covariance))}};
+}
+
+Json json_of(const std::map<guidance::Bone, guidance::Place>& in_bones) {
+  Json json = Json::object();
+  for (const auto& [bone, place] : in_bones) json[bone] = json_of(place);
+  return json;
+}
+
+/// Bones in which both ends are known.
+Json ends_in_bones(const guidance::Tunnel& tunnel) {
+  Json json = Json::object();
+  for (const auto& [bone, start] : tunnel.start_in_bones)
+    if (const auto end = tunnel.end_in_bones.find(bone); end != tunnel.end_in_bones.end())
+      json[bone] = {{"start", json_of(start)}, {"end", json_of(end->second)}};
+  return json;
+}
+
+}  // namespace
+
 Json to_json(const guidance::Tunnel& tunnel) {
   return {{"name", tunnel.name},
+          {"in_bones", ends_in_bones(tunnel)},
           {"start_in_tool", optional_vector(tunnel.start_in_tool)},
           {"end_in_tool", optional_vector(tunnel.end_in_tool)},
           {"axis_in_tool", optional_vector(tunnel.axis_in_tool)},
@@ -235,16 +263,16 @@ Json to_json(const guidance::Tunnel& tunnel) {
           {"axis_covariance", optional_matrix(tunnel.axis_covariance)}};
 }
 
-Json in_frames(const guidance::PointInFrames* place) {
-  const auto at = [&](auto member) { return place ? optional_vector(place->*member) : Json(); };
-  const auto spread = [&](auto member) { return place ? optional_matrix(place->*member) : Json(); };
-  using Place = guidance::PointInFrames;
-  return {{"in_femur", at(&Place::in_femur)},
-          {"in_tibia", at(&Place::in_tibia)},
-          {"in_tool", at(&Place::in_tool)},
-          {"covariance_in_femur_mm2", spread(&Place::covariance_in_femur)},
-          {"covariance_in_tibia_mm2", spread(&Place::covariance_in_tibia)},
-          {"covariance_in_tool_mm2", spread(&Place::covariance_in_tool)}};
+Json in_frames(const guidance::PointInFrames* place, const std::vector<guidance::Bone>& bones) {
+  Json json = {{"in_bones", place ? json_of(place->in_bones) : Json::object()}};
+  const auto add = [&](const std::string& frame, const guidance::Place* at) {
+    json["in_" + frame] = at ? vector(at->point()) : Json();
+    json["covariance_in_" + frame + "_mm2"] = at ? matrix(at->covariance) : Json();
+  };
+  for (const guidance::Bone& bone : guidance::knee_bones())
+    if (std::ranges::find(bones, bone) != bones.end()) add(bone, place ? place->in(bone) : nullptr);
+  add("tool", place && place->in_tool ? &*place->in_tool : nullptr);
+  return json;
 }
 
 Json to_json(const Failure& failure) {
@@ -300,7 +328,7 @@ Json to_json(const Result& result) {
       {"dof", result.dof > 0 ? Json(result.dof) : Json(nullptr)},
       {"variance_scale", result.dof > 0 ? number(result.variance_scale) : Json(nullptr)}};
   json["machine"] = json_of(result.history);
-  json["points"] = list_of(result.points, result.views);
+  json["points"] = list_of(result.points, result.views, result.bones);
   json["accuracy"] = json_of(result.accuracy);
   json["tunnels"] = Json::array();
   for (const guidance::Tunnel& tunnel : result.tunnels) json["tunnels"].push_back(to_json(tunnel));

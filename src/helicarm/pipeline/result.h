@@ -106,6 +106,7 @@ struct Result {
   std::vector<Warning> warnings;
   std::vector<Warning> notes;  ///< valid for all data of this kind
   CalibratorSource calibrator;
+  std::vector<guidance::Bone> bones;  ///< of the case
   std::vector<ViewResult> views;
   Eigen::MatrixXd joint_covariance;  ///< of all views' parameters; as CalibratedView::covariance
   double chi2 = 0;                   ///< of all views together
@@ -133,8 +134,9 @@ Json to_json(const Failure& failure);
 /// As in result.json's "tunnels".
 Json to_json(const guidance::Tunnel& tunnel);
 
-/// As in result.json's "points": coordinates and covariances in bones and tool, null where not known.
-Json in_frames(const guidance::PointInFrames* place);
+/// As in result.json's "points": coordinates and covariances in bones and tool, null where not known. Of the
+/// knee's bones also by their own keys, if the case has them.
+Json in_frames(const guidance::PointInFrames* place, const std::vector<guidance::Bone>& bones);
 
 /// A list of them.
 Json json_list_of(std::span<const Failure> failures);

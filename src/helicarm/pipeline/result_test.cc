@@ -35,6 +35,7 @@ TEST(ResultJson, HasEveryKeyOfTheContract) {
       "FS", localization::PointSource::pick, {}, {fiducials::ImagePoint{{1, 2}, {3, 4}, 0.1}, {}}, {}, 0, {}};
   point.place = guidance::PointInFrames{};
   result.points.push_back(point);
+  result.bones = guidance::knee_bones();
   result.tunnels.push_back({"femur", {}, {}, {}, 30});
   result.verifications.push_back(
       {"drill", verification::LineError{{1.0, {}}, 1, 2, 3}, verification::LineError{{1.0, {}}, 1, 2, 3}});
@@ -57,16 +58,34 @@ TEST(ResultJson, HasEveryKeyOfTheContract) {
   EXPECT_EQ(json["views"][0]["projection"].size(), 3u);
   EXPECT_EQ(json["views"][0]["camera_from_calibrator"].size(), 4u);
   expect_keys(json["points"][0], {"name", "source", "xyz_mm", "frame", "covariance_mm2", "ray_gap_mm",
-                                  "views", "reason", "in_femur", "in_tibia", "in_tool"});
+                                  "views", "reason", "in_bones", "in_femur", "in_tibia", "in_tool"});
   EXPECT_EQ(json["points"][0]["views"], Json({"AP"}));
   expect_keys(json["accuracy"], {"fle_px", "fre_mm", "tre_mm", "targets"});
-  expect_keys(json["tunnels"][0], {"name", "start_in_tool", "end_in_tool", "axis_in_tool", "length_mm",
-                                   "length_sigma_mm", "axis_sigma_deg", "axis_covariance"});
+  expect_keys(json["tunnels"][0], {"name", "in_bones", "start_in_tool", "end_in_tool", "axis_in_tool",
+                                   "length_mm", "length_sigma_mm", "axis_sigma_deg", "axis_covariance"});
   expect_keys(json["verification"][0],
               {"name", "start_px", "end_px", "err_start_px", "err_end_px", "err_start_mm", "err_end_mm",
                "distance_start_mm", "distance_end_mm"});
   EXPECT_TRUE(json["verification"][0]["start_px"]["LAT"].is_null());
   expect_keys(json["timing_ms"], {"read", "rectify", "detect", "label", "calibrate", "locate", "total"});
+}
+
+TEST(ResultJson, PlacesInBonesAreNamedAsTheCaseNamesThem) {
+  Result result = two_views();
+  result.bones = {"L4", "pelvis"};
+  guidance::PointInFrames place;
+  place.in_bones["L4"] = {{{1, 2, 3}, Eigen::Matrix3d::Zero(), {}, {}}, 4 * Eigen::Matrix3d::Identity()};
+  result.points.push_back({"entry", localization::PointSource::pick, "L4", {}, place, 0, {}});
+  result.tunnels.push_back({"pedicle", {}, {}, {}, 30});
+  result.tunnels[0].start_in_bones = result.tunnels[0].end_in_bones = place.in_bones;
+  const Json json = to_json(result);
+  const Json& in_bone = json["points"][0]["in_bones"]["L4"];
+  EXPECT_EQ(in_bone["xyz_mm"], Json({1, 2, 3}));
+  EXPECT_EQ(in_bone["covariance_mm2"][1], Json({0, 4, 0}));
+  EXPECT_NEAR(in_bone["error_95_mm"].get<double>(), 2 * std::sqrt(7.815), 1e-3);
+  EXPECT_FALSE(json["points"][0]["in_bones"].contains("pelvis"));
+  EXPECT_FALSE(json["points"][0].contains("in_femur"));
+  EXPECT_EQ(json["tunnels"][0]["in_bones"]["L4"]["end"], in_bone);
 }
 
 TEST(ResultJson, FiducialNotFoundHasNoPixels) {

@@ -57,8 +57,8 @@ TEST_F(SimulatedNavigation, TunnelsAreMeasuredWithinTheirConfidenceRegions) {
     const auto point = std::ranges::find(result->points, real.name, &PointResult::name);
     ASSERT_TRUE(point->place) << real.name;
     EXPECT_LT((point->place->in_calibrator - real.in_calibrator).norm(), 0.3) << real.name;
-    const Eigen::Vector3d off = *point->place->in_tool - real.in_tool;
-    EXPECT_LT(off.dot(point->place->covariance_in_tool->ldlt().solve(off)), 16.3) << real.name;  // 99.9 %
+    const Eigen::Vector3d off = point->place->in_tool->point() - real.in_tool;
+    EXPECT_LT(off.dot(point->place->in_tool->covariance.ldlt().solve(off)), 16.3) << real.name;  // 99.9 %
   }
   ASSERT_EQ(result->verifications.size(), 2u);
   for (std::size_t i = 0; i < 2; ++i)

@@ -102,11 +102,12 @@ TEST_F(AttackedRecord, UnchangedRecordIsComplete) {
 
 TEST_F(AttackedRecord, EditedResultDiffers) {
   Json result = *read_json(session_ / "case-1" / "result.json");
-  double& x = result["points"][0]["in_femur"][0].get_ref<double&>();
+  double& x = result["points"][0]["in_bones"]["femur"]["xyz_mm"][0].get_ref<double&>();
   x += 5;
   ASSERT_TRUE(write_file(session_ / "case-1" / "result.json", to_text(result)));
   expect_differing_files("case-1/result.json was changed");
-  expect_differing_files("case-1/result.json differs from the recomputed result: /points/0/in_femur/0");
+  expect_differing_files(
+      "case-1/result.json differs from the recomputed result: /points/0/in_bones/femur/xyz_mm/0");
 }
 
 TEST_F(AttackedRecord, EveryRemovedFileDiffers) {
@@ -183,7 +184,8 @@ TEST_F(AttackedRecord, ChangedClosedLoopDiffers) {
 
 TEST_F(AttackedRecord, CaseOfOtherPosesDiffers) {
   const fs::path file = session_ / "case-1" / "case.json";
-  double& x = content("case")["case"]["views"][0]["poses"]["tracker_from_femur"][0][3].get_ref<double&>();
+  double& x =
+      content("case")["case"]["views"][0]["poses"]["tracker_from_bone"]["femur"][0][3].get_ref<double&>();
   x += 1;
   ASSERT_TRUE(write_file(file, to_text(content("case")["case"])));
   expect_difference("the case differs from the recorded value on recomputation");

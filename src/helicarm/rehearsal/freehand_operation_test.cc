@@ -46,7 +46,7 @@ class GuidedDrill : public testing::Test {
     options.freehand = true;
     virtual_or_ = VirtualDevices::open(options).value();
     operation::OperationPlan plan = plan_for(*virtual_or_, virtual_or_->tracker().port());
-    plan.check_points = {{"femur notch", guidance::Bone::femur, 1.5}};
+    plan.check_points = {{"femur notch", "femur", 1.5}};
     devices_ = std::make_unique<operation::Connections>(
         plan, receiver::Inbox::open(folder_.path() / "inbox").value());
     receiver::ReceiverOptions receiving;

@@ -191,8 +191,8 @@ operation::OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t trac
   else
     plan.drill = calibrated_drill(virtual_or.drill());
   // Both tunnels are drilled from outside the joint.
-  plan.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE", operation::TunnelEnd::end},
-                  {"tibia", guidance::Bone::tibia, "TS", "TE", operation::TunnelEnd::start}};
+  plan.tunnels = {{"femur", "femur", "FS", "FE", operation::TunnelEnd::end},
+                  {"tibia", "tibia", "TS", "TE", operation::TunnelEnd::start}};
   plan.tracker.pointer = operation::Pointer{virtual_devices::pointer_marker, virtual_devices::tip_in_pointer};
   plan.picks = clicks_of(virtual_or.simulated_scene().simulated_case());
   return plan;
@@ -237,8 +237,7 @@ Expected<Rehearsal> rehearse_freehand(std::uint64_t seed, const std::filesystem:
     if (options.move_bones) stir(stage.virtual_or->simulated_scene());
     Rehearsal done{seed, {}};
     for (const operation::PlannedTunnel& tunnel : operation.plan().tunnels) {
-      const std::string bone = tunnel.bone == guidance::Bone::femur ? "femur" : "tibia";
-      drill.move(bone, drill.on_tunnel(bone, -40, 4, 5), raise_s);
+      drill.move(tunnel.bone, drill.on_tunnel(tunnel.bone, -40, 4, 5), raise_s);
       std::this_thread::sleep_for(std::chrono::duration<double>(raise_s) + before_exposure);
       value_or_throw(operation.guide(tunnel.name));
       drill_by_guidance(operation, drill);

@@ -320,17 +320,17 @@ TEST_F(StalePlan, CreepingBoneStopsTheToolWhichIsThenWithdrawn) {
 class StalePlanToACheckedBone : public StalePlan {
  protected:
   std::vector<operation::PlannedCheck> check_points() const override {
-    return {{"femur notch", guidance::Bone::femur, 1.5}};
+    return {{"femur notch", "femur", 1.5}};
   }
 };
 
 TEST_F(StalePlanToACheckedBone, IsMadeAgainOnlyAfterTouchingTheCheckPointAgain) {
   ASSERT_TRUE(touch());
   const robot::RobotOrder order = plan();
-  EXPECT_TRUE(operation_->checks_to_come(guidance::Bone::femur).empty());
+  EXPECT_TRUE(operation_->checks_to_come("femur").empty());
   virtual_or_->simulated_scene().bump_marker("femur", {3, 0, 0});
   EXPECT_EQ(wait_until_stale(order).reason, Reason::plan_stale);
-  EXPECT_EQ(operation_->checks_to_come(guidance::Bone::femur), std::vector<std::string>{"femur notch"});
+  EXPECT_EQ(operation_->checks_to_come("femur"), std::vector<std::string>{"femur notch"});
   EXPECT_EQ(operation_->plan_tunnel("femur").error().reason, Reason::usage);
   EXPECT_EQ(touch().error().reason, Reason::residual_too_large);
 }

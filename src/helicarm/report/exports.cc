@@ -57,12 +57,9 @@ std::string points_csv(const pipeline::Result& result) {
   for (const ExportedPoint& point : exported_points(result)) {
     const guidance::PointInFrames& at = *point.place;
     rows += csv_row(point, "calibrator", at.in_calibrator, at.covariance_in_calibrator);
-    if (at.in_femur && at.covariance_in_femur)
-      rows += csv_row(point, "femur", *at.in_femur, *at.covariance_in_femur);
-    if (at.in_tibia && at.covariance_in_tibia)
-      rows += csv_row(point, "tibia", *at.in_tibia, *at.covariance_in_tibia);
-    if (at.in_tool && at.covariance_in_tool)
-      rows += csv_row(point, "tool", *at.in_tool, *at.covariance_in_tool);
+    for (const auto& [bone, place] : at.in_bones)
+      rows += csv_row(point, csv_field(bone), place.point(), place.covariance);
+    if (at.in_tool) rows += csv_row(point, "tool", at.in_tool->point(), at.in_tool->covariance);
   }
   if (rows.empty()) return rows;
   return std::string(points_header) + rows;

@@ -46,8 +46,8 @@ class Exports : public testing::Test {
       point.place->in_calibrator = {1.0 / 3, 2, -3};
       point.place->covariance_in_calibrator = Eigen::Vector3d(0.01, 0.04, 0.09).asDiagonal();
     }
-    result_.points[1].place->in_femur = Eigen::Vector3d(7, 8, 9);
-    result_.points[1].place->covariance_in_femur = Eigen::Matrix3d::Identity();
+    result_.points[1].place->in_bones["femur"] = {{{7, 8, 9}, Eigen::Matrix3d::Zero(), {}, {}},
+                                                  Eigen::Matrix3d::Identity()};
     pipeline::PointResult& lost = result_.points.emplace_back();
     lost.name = "lost";
     result_.tunnel_ends = {{0, 1}};

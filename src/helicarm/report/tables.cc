@@ -220,8 +220,8 @@ std::vector<TunnelRow> tunnel_rows(const pipeline::Result& result) {
                     pipeline::tunnel_end_error_in_tool(result, tunnel.name, true),
                     pipeline::tunnel_end_error_in_tool(result, tunnel.name, false)});
   const auto error = [&](std::size_t end) {
-    const auto& in_tool = result.model_points[end].place.covariance_in_tool;
-    return in_tool ? std::optional(localization::length_at_95(*in_tool)) : std::nullopt;
+    const auto& in_tool = result.model_points[end].place.in_tool;
+    return in_tool ? std::optional(localization::length_at_95(in_tool->covariance)) : std::nullopt;
   };
   for (const pipeline::ModelTunnel& planned : result.model_tunnels)
     rows.push_back({&planned.tunnel, planned.model, error(planned.ends.start), error(planned.ends.end)});

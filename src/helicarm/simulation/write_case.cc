@@ -29,17 +29,17 @@ std::string uid(const image::Image<std::uint16_t>& pixels, std::uint64_t item) {
   return xray::make_uid(random);
 }
 
-Json poses_json(const NavigationTruth& truth, std::initializer_list<const char*> frames) {
-  Json poses;
-  for (const char* frame : frames)
-    poses[std::string("tracker_from_") + frame] = matrix_json(truth.read.at(frame).matrix());
-  return poses;
+/// Of both bones and one more marker.
+Json poses_json(const NavigationTruth& truth, const std::string& marker) {
+  const auto pose = [&](const std::string& frame) { return matrix_json(truth.read.at(frame).matrix()); };
+  return {{"tracker_from_" + marker, pose(marker)},
+          {"tracker_from_bone", {{"femur", pose("femur")}, {"tibia", pose("tibia")}}}};
 }
 
 void add_navigation(Json& json, const SimulatedCase& simulated) {
   const NavigationTruth& truth = *simulated.navigation;
-  for (Json& view : json["views"]) view["poses"] = poses_json(truth, {"calibrator", "femur", "tibia"});
-  json["poses_now"] = poses_json(truth, {"femur", "tibia", "tool"});
+  for (Json& view : json["views"]) view["poses"] = poses_json(truth, "calibrator");
+  json["poses_now"] = poses_json(truth, "tool");
   json["tracker"] = {{"sigma_mm", truth.sigma_mm}, {"sigma_deg", truth.sigma_deg}, {"samples", "shared"}};
   for (const SimulatedView& view : simulated.views)
     for (std::size_t i = 0; i < view.clicks.size(); ++i)
@@ -104,7 +104,7 @@ xray::DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t number) 
 }
 
 Json case_json(const SimulatedCase& simulated) {
-  Json json = {{"format", "helicarm-case/1"},
+  Json json = {{"format", "helicarm-case/2"},
                {"calibrator", calibrator_file},
                {"plate", simulated.plate ? Json(plate_file) : Json(nullptr)},
                {"views", Json::array()}};

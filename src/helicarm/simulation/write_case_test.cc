@@ -102,7 +102,7 @@ TEST_F(WriteCase, TunnelCaseContainsPosesPicksTunnelsAndLines) {
   EXPECT_EQ(json["tunnels"].size(), 2u);
   EXPECT_EQ(json["tool_lines"].size(), 2u);
   EXPECT_TRUE(json["poses_now"].contains("tracker_from_tool"));
-  EXPECT_EQ(json["views"][0]["poses"]["tracker_from_femur"], json["poses_now"]["tracker_from_femur"]);
+  EXPECT_EQ(json["views"][0]["poses"]["tracker_from_bone"], json["poses_now"]["tracker_from_bone"]);
 }
 
 TEST_F(WriteCase, EarlierSimulationIsReplacedWithoutLeftovers) {

@@ -60,13 +60,13 @@ void write_biplane_case(const std::filesystem::path& folder, const simulation::S
     const auto biplane = read_pose(udcsc_from_biplane(view.true_view), options, random);
     json["views"][i]["poses"] = {
         {"tracker_from_calibrator", geometry::json_rows(biplane.matrix())},
-        {"tracker_from_femur", geometry::json_rows(Eigen::Matrix4d::Identity().eval())}};
+        {"tracker_from_bone", {{"femur", geometry::json_rows(Eigen::Matrix4d::Identity().eval())}}}};
     for (const auto* points : {&view.balls, &view.targets})
       for (const simulation::TruePoint& point : *points)
         json["picks"].push_back(pipeline::to_json(pipeline::Pick{
             point.name, view.true_view.name,
             point.raw + options.click_sigma_px * Eigen::Vector2d(random.normal(), random.normal()),
-            pipeline::Snap::none, 3, options.click_sigma_px, guidance::Bone::femur}));
+            pipeline::Snap::none, 3, options.click_sigma_px, "femur"}));
   }
   value_or_throw(write_file(folder / "case.json", to_text(json) + "\n"));
   value_or_throw(
@@ -105,8 +105,9 @@ BiplaneImageTest biplane_test_of(const pipeline::Case& given, const phantom::Cal
             from_ray(ball.centre_in_calibrator, geometry::ray_through(view.calibrated->view, ball.uv)));
   const auto error_of = [&](const std::string& name, const Eigen::Vector3d& place, auto& errors) {
     const auto point = std::ranges::find(result.points, name, &pipeline::PointResult::name);
-    if (point != result.points.end() && point->place && point->place->in_femur)
-      errors.push_back((*point->place->in_femur - place).norm());
+    if (point != result.points.end() && point->place)
+      if (const guidance::Place* in_femur = point->place->in("femur"))
+        errors.push_back((in_femur->point() - place).norm());
   };
   for (const phantom::CalibratorBall& ball : udcsc.balls)
     error_of(ball.label, ball.centre_in_calibrator, on_udcsc);
