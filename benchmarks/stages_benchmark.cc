@@ -10,7 +10,7 @@
 #include "helicarm/fiducials/label_fiducials.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/locate_case.h"
-#include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/measure.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/simulation/simulate_case.h"
 #include "helicarm/simulation/write_case.h"
@@ -93,7 +93,7 @@ BENCHMARK(resample_image)->Unit(benchmark::kMillisecond);
 void run_whole_case(benchmark::State& state) {
   pipeline::RunOptions options;
   options.threads = static_cast<unsigned>(state.range(0));
-  for (auto _ : state) benchmark::DoNotOptimize(pipeline::run_case(simulated_case(), options));
+  for (auto _ : state) benchmark::DoNotOptimize(pipeline::measure(simulated_case(), options));
 }
 BENCHMARK(run_whole_case)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 

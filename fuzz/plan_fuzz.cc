@@ -23,7 +23,7 @@ std::vector<std::string> seeds() {
   full.robot.approach.keep_outs = {{{0, 0, -200}, Eigen::Vector3d::UnitZ()}};
   full.tracker.pointer = operation::Pointer{"pointer", {0, 0, 120}};
   full.check_points = {{"divot", "tibia", 1}};
-  full.picks = Json::array({{{"name", "FS"}, {"view", "AP"}, {"uv", {10, 20}}}});
+  full.picks = {{.name = "FS", .view = "AP", .uv_raw = {10, 20}, .sigma_px = {}, .moves_with = {}}};
   full.plate.reset();
   return {write(plan).dump(), write(full).dump()};
 }

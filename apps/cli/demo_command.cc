@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/measure.h"
 #include "helicarm/report/earlier_results.h"
 #include "helicarm/simulation/write_case.h"
 #include "result_files.h"
@@ -77,7 +77,7 @@ CommandResult demo_command(const DemoArguments& arguments, Console& console) {
     pipeline::RunOptions run;
     run.threads = console.threads;
     const pipeline::Result result =
-        value_or_throw(pipeline::run_case(value_or_throw(pipeline::read_case(folder)), run));
+        value_or_throw(pipeline::measure(value_or_throw(pipeline::read_case(folder)), run)).result;
     if (!console.quiet) print_findings(result, console.progress);
     value_or_throw(write_result(result, out, false));
     if (result.failure) throw BadInput(*result.failure);

@@ -2,6 +2,7 @@
 #include "command_line.h"
 #include "detect_command.h"
 #include "export_command.h"
+#include "helicarm/case_registration/register_fields.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/rectification/distortion_model.h"
 #include "helicarm/report/exports.h"
@@ -25,16 +26,6 @@ void add_motion(CLI::App* command, double& motion_sigma_mm) {
       ->capture_default_str();
 }
 
-/// About the starts of the case's models.
-void add_search(CLI::App* command, case_registration::RegisterOptions& options) {
-  command->add_option("--search-mm", options.shift_mm, "Models: search about the start, mm per axis")
-      ->check(within(0, 100))
-      ->capture_default_str();
-  command->add_option("--search-deg", options.turn_deg, "Models: search about the start, degrees per axis")
-      ->check(within(0, 180))
-      ->capture_default_str();
-}
-
 void add_run(CLI::App& app, Action& action) {
   auto* command = add_command(
       app, "run", "Measure a case: points and tunnels with covariances from two or more X-ray images",
@@ -49,7 +40,7 @@ void add_run(CLI::App& app, Action& action) {
                    "each and summary.csv")
       ->capture_default_str();
   add_fields(command, a.options.run, pipeline::run_fields);
-  add_search(command, a.options);
+  add_fields(command, a.options.search, case_registration::search_fields);
   command->add_option("--machine", a.history,
                       "The C-arm's history (JSON): used as prior; this case's acquisitions are added");
   command->add_flag("--no-report", a.no_report, "Write result.json only");
@@ -72,7 +63,7 @@ void add_register(CLI::App& app, Action& action) {
   command->add_option("--out", a.run.out, "Folder for registration.json, report.html and the overlays")
       ->capture_default_str();
   add_fields(command, a.run.options.run, pipeline::run_fields);
-  add_search(command, a.run.options);
+  add_fields(command, a.run.options.search, case_registration::search_fields);
   command->add_option("--machine", a.run.history, "The C-arm's history (JSON), read only");
   command->add_option("--frames", a.frames,
                       "Follow the models through the frames A-B[:STEP] of files with several frames, or of "
@@ -94,7 +85,7 @@ void add_export(CLI::App& app, Action& action) {
       ->type_name("WORD")
       ->delimiter(',');
   add_fields(command, a.run.options.run, pipeline::run_fields);
-  add_search(command, a.run.options);
+  add_fields(command, a.run.options.search, case_registration::search_fields);
   command->add_option("--machine", a.run.history, "The C-arm's history (JSON), read only");
 }
 

@@ -45,9 +45,7 @@ void check_plan(const operation::OperationPlan& plan, const NavigateArguments& a
   if (!arguments.picks.empty()) return;
   for (const operation::PlannedTunnel& tunnel : plan.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end})
-      if (std::ranges::none_of(plan.picks, [&](const Json& pick) {
-            return pick.is_object() && pick.value("name", Json()) == Json(end);
-          }))
+      if (std::ranges::find(plan.picks, end, &pipeline::Pick::name) == plan.picks.end())
         refuse(Reason::bad_value, fmt::format("tunnel \"{}\": \"{}\" is not a pick", tunnel.name, end));
 }
 
@@ -91,10 +89,10 @@ void wait_for_devices(const operation::OperationPlan& plan, operation::Connectio
   ending.wait_until([&] { return std::chrono::steady_clock::now() > full; });
 }
 
-Json picks_of(const fs::path& file) {
+std::vector<pipeline::Pick> picks_in(const fs::path& file, const operation::OperationPlan& plan) {
   const Json json = value_or_throw(read_json(file));
   JsonReader reader(json, file.string());
-  return reader.has("picks") ? reader.raw("picks") : Json::array();
+  return value_or_throw(operation::picks_of(plan, reader.raw("picks"), file.string()));
 }
 
 void print_points(const pipeline::Result& result, Console& console) {
@@ -238,7 +236,7 @@ void carry_out(const operation::OperationPlan& plan, const NavigateArguments& ar
   take_images(operation, devices, ending, console);
   if (!arguments.picks.empty()) {
     ending.wait_until([&] { return fs::exists(arguments.picks); });
-    operation.pick(picks_of(arguments.picks));
+    operation.pick(picks_in(arguments.picks, plan));
   }
   value_or_throw(operation.measure());
   print_points(operation.result(), console);

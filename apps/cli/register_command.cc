@@ -43,12 +43,12 @@ void print(const RegisteredModel& model, std::ostream& out) {
 
 /// Every model through a sequence of images.
 void follow(const RegisterArguments& arguments, const case_registration::RegisterOptions& options,
-            Console& console) {
+            const case_registration::Progress& steps, Console& console) {
   const auto range = value_or_throw(case_registration::frame_range_from(arguments.frames));
   const auto given = value_or_throw(pipeline::read_registration_case(arguments.run.folder));
   ProgressLine progress(console);
-  const auto sequence = value_or_throw(
-      case_registration::follow_case(given, range, options, [&](double share) { progress.notify(share); }));
+  const auto sequence = value_or_throw(case_registration::follow_case(
+      given, range, options, [&](double share) { progress.notify(share); }, steps));
   if (!console.quiet)
     for (const Warning& warning : sequence.warnings)
       console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
@@ -87,14 +87,15 @@ std::string summary_of(const case_registration::CaseRegistration& registration) 
 CommandResult register_command(const RegisterArguments& arguments, Console& console) {
   return guarded([&] {
     report::forget_registration(arguments.run.out);
-    case_registration::RegisterOptions options = value_or_throw(options_of(arguments.run, console));
+    const case_registration::RegisterOptions options = value_or_throw(options_of(arguments.run, console));
+    case_registration::Progress progress;
     if (!console.quiet)
-      options.on_step = [&](const std::string& model, std::string_view step) {
+      progress.step = [&](const std::string& model, std::string_view step) {
         console.progress << fmt::format("helicarm: {}{}{}\n", model, model.empty() ? "" : ": ", step);
       };
-    if (!arguments.frames.empty()) return follow(arguments, options, console);
+    if (!arguments.frames.empty()) return follow(arguments, options, progress, console);
     const auto given = value_or_throw(pipeline::read_registration_case(arguments.run.folder));
-    const auto result = value_or_throw(case_registration::register_case(given, options));
+    const auto result = value_or_throw(case_registration::register_case(given, options, progress));
     value_or_throw(case_registration::write_registration(result, arguments.run.out));
     if (!console.quiet)
       for (const RegisteredModel& model : result.models)

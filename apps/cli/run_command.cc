@@ -34,9 +34,10 @@ Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pip
 
 /// A case whose description excludes an answer (a flat calibrator, for example) is refused like any other.
 Expected<Measurement> measurement_of(const std::filesystem::path& folder,
-                                     const case_registration::RegisterOptions& options) {
+                                     const case_registration::RegisterOptions& options,
+                                     const case_registration::Progress& progress) {
   const auto given = pipeline::read_measured_case(folder);
-  if (given) return case_registration::measure_case(*given, options);
+  if (given) return case_registration::measure_case(*given, options, progress);
   if (exit_code(given.error().reason) == 2) return tl::unexpected<Failure>(given.error());
   Measurement refused;
   refused.result.options = options.run;
@@ -70,12 +71,13 @@ Expected<case_registration::RegisterOptions> options_of(const RunArguments& argu
 
 Expected<Measurement> measure(const RunArguments& arguments, Console& console) {
   return options_of(arguments, console)
-      .and_then([&](case_registration::RegisterOptions options) {
+      .and_then([&](const case_registration::RegisterOptions& options) {
+        case_registration::Progress progress;
         if (!console.quiet)
-          options.on_step = [&](const std::string& model, std::string_view step) {
+          progress.step = [&](const std::string& model, std::string_view step) {
             if (!model.empty()) console.progress << fmt::format("helicarm: {}: {}\n", model, step);
           };
-        return measurement_of(arguments.folder, options);
+        return measurement_of(arguments.folder, options, progress);
       })
       .map([&](Measurement measured) {
         if (!console.quiet) print_findings(measured.result, console.progress);

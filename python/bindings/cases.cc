@@ -35,18 +35,15 @@ case_registration::Measurement run(const std::filesystem::path& folder, const st
                                    double search_mm, double search_deg, unsigned threads,
                                    const std::optional<std::filesystem::path>& history,
                                    const py::object& progress) {
-  case_registration::RegisterOptions options = measuring_options(
+  const case_registration::RegisterOptions options = measuring_options(
       "run_case", method, max_error_mm, motion_sigma_mm, search_mm, search_deg, threads, history);
   if (history) value_or_raise(calibration::check_history_file(*history));
   const RunHooks hooks = run_hooks(progress);
-  listen(hooks, options);
   case_registration::Measurement measured = value_or_raise(without_gil([&] {
     return pipeline::read_measured_case(folder).and_then([&](const pipeline::RegistrationCase& given) {
-      return case_registration::measure_case(given, options);
+      return case_registration::measure_case(given, options, progress_of(hooks));
     });
   }));
-  measured.result.options.on_stage = nullptr;
-  measured.result.options.on_view = nullptr;
   if (measured.result.failure) raise(*measured.result.failure, py::cast(measured));
   if (history) value_or_raise(calibration::add_to_history(*history, measured.result.entries));
   return measured;
@@ -284,7 +281,7 @@ void add_cases(py::module_& module) {
       "run_case", &run, py::arg("folder"), py::kw_only(),
       py::arg("method") = std::string(pipeline::method_words[std::size_t(usual.method)]),
       py::arg("max_error_mm") = usual.max_error_mm, py::arg("motion_sigma_mm") = usual.motion_sigma_mm,
-      py::arg("search_mm") = searched.shift_mm, py::arg("search_deg") = searched.turn_deg,
+      py::arg("search_mm") = searched.search.shift_mm, py::arg("search_deg") = searched.search.turn_deg,
       py::arg("threads") = usual.threads, py::arg("history") = py::none(), py::arg("progress") = py::none(),
       R"(Measures a case: two or more X-ray images to points with confidence regions, tunnels and diagnostics, as
 `helicarm run` does; a case's models are registered too.

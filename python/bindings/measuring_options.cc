@@ -2,6 +2,7 @@
 #include "measuring_options.h"
 
 #include "checks.h"
+#include "helicarm/case_registration/register_fields.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "options.h"
 
@@ -22,18 +23,18 @@ case_registration::RegisterOptions measuring_options(const char* function, const
   }
   options.run.threads = threads;
   value_or_raise(check_fields<pipeline::RunOptions>(pipeline::run_fields, options.run, function));
-  options.shift_mm = checked(search_mm, within({0, 100}), "search_mm");
-  options.turn_deg = checked(search_deg, within({0, 180}), "search_deg");
+  for (const auto& field : case_registration::search_fields)
+    field.set(options.search, checked(field.name == "search_mm" ? search_mm : search_deg, within(field.range),
+                                      std::string(field.name)));
   if (history) options.run.history = value_or_raise(calibration::history_at(*history));
   return options;
 }
 
-void listen(const RunHooks& hooks, case_registration::RegisterOptions& options) {
-  options.run.on_view = hooks.on_view;
-  options.interrupt = hooks.on_view;
-  options.on_step = [&hooks](const std::string& model, std::string_view step) {
-    hooks.on_stage(model.empty() ? std::string(step) : model + ": " + std::string(step));
-  };
+case_registration::Progress progress_of(const RunHooks& hooks) {
+  return {[&hooks](const std::string& model, std::string_view step) {
+            hooks.on_stage(model.empty() ? std::string(step) : model + ": " + std::string(step));
+          },
+          hooks.on_view};
 }
 
 }  // namespace helicarm::python

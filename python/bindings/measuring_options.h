@@ -18,7 +18,7 @@ case_registration::RegisterOptions measuring_options(const char* function, const
                                                      double search_deg, unsigned threads,
                                                      const std::optional<std::filesystem::path>& history);
 
-/// Hears of every stage and step, and may end the work between them. The options refer to `hooks`.
-void listen(const RunHooks& hooks, case_registration::RegisterOptions& options);
+/// Hears of every stage and step, and may end the work between them. Refers to `hooks`.
+case_registration::Progress progress_of(const RunHooks& hooks);
 
 }  // namespace helicarm::python

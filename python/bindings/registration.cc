@@ -22,14 +22,13 @@ py::object register_models(const std::filesystem::path& folder,
                            std::optional<double> max_error_mm, double motion_sigma_mm, double search_mm,
                            double search_deg, unsigned threads,
                            const std::optional<std::filesystem::path>& history, const py::object& progress) {
-  auto options = measuring_options("register", method, max_error_mm, motion_sigma_mm, search_mm, search_deg,
-                                   threads, history);
+  const auto options = measuring_options("register", method, max_error_mm, motion_sigma_mm, search_mm,
+                                         search_deg, threads, history);
   const RunHooks hooks = run_hooks(progress);
-  listen(hooks, options);
   const auto result = value_or_raise(without_gil([&] {
     return pipeline::read_registration_case(folder)
         .and_then([&](const pipeline::RegistrationCase& given) {
-          return case_registration::register_case(given, options);
+          return case_registration::register_case(given, options, progress_of(hooks));
         })
         .and_then([&](case_registration::CaseRegistration made) {
           const auto written = out ? case_registration::write_registration(made, *out) : Expected<void>{};
@@ -122,11 +121,10 @@ py::object register_sequence(const std::filesystem::path& folder, const Frames& 
                              double search_deg, unsigned threads,
                              const std::optional<std::filesystem::path>& history,
                              const py::object& progress) {
-  auto options = measuring_options("register_sequence", method, max_error_mm, motion_sigma_mm, search_mm,
-                                   search_deg, threads, history);
+  const auto options = measuring_options("register_sequence", method, max_error_mm, motion_sigma_mm,
+                                         search_mm, search_deg, threads, history);
   const auto range = frames_from(frames);
   const RunHooks hooks = run_hooks(py::none());
-  options.interrupt = hooks.on_view;
   const auto on_frame = [&](double share) {
     hooks.on_view();
     const py::gil_scoped_acquire acquire;
@@ -135,7 +133,7 @@ py::object register_sequence(const std::filesystem::path& folder, const Frames& 
   const auto sequence = value_or_raise(without_gil([&] {
     return pipeline::read_registration_case(folder)
         .and_then([&](const pipeline::RegistrationCase& given) {
-          return case_registration::follow_case(given, range, options, on_frame);
+          return case_registration::follow_case(given, range, options, on_frame, {{}, hooks.on_view});
         })
         .and_then([&](CaseSequence made) {
           const auto written =
@@ -168,7 +166,7 @@ void add_registration(py::module_& module) {
       "register", &register_models, py::arg("folder"), py::kw_only(), py::arg("out") = py::none(),
       py::arg("method") = std::string(pipeline::method_words[std::size_t(defaults.run.method)]),
       py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
-      py::arg("search_mm") = defaults.shift_mm, py::arg("search_deg") = defaults.turn_deg,
+      py::arg("search_mm") = defaults.search.shift_mm, py::arg("search_deg") = defaults.search.turn_deg,
       py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(),
       py::arg("progress") = py::none(),
       "Register the CT volumes and surfaces of a case (\"models\" of its case.json) to its views, as\n"
@@ -190,7 +188,7 @@ void add_registration(py::module_& module) {
       py::arg("out") = py::none(),
       py::arg("method") = std::string(pipeline::method_words[std::size_t(defaults.run.method)]),
       py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
-      py::arg("search_mm") = defaults.shift_mm, py::arg("search_deg") = defaults.turn_deg,
+      py::arg("search_mm") = defaults.search.shift_mm, py::arg("search_deg") = defaults.search.turn_deg,
       py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(),
       py::arg("progress") = py::none(),
       "Follow the models of a case through a sequence of images, as `helicarm register --frames` does.\n\n"

@@ -9,9 +9,8 @@
 #include "gui/controller/steps.h"
 #include "gui/replay/pdf_report.h"
 #include "helicarm/case_registration/measure_case.h"
+#include "helicarm/case_registration/register_fields.h"
 #include "helicarm/core/files.h"
-#include "helicarm/pipeline/run_case.h"
-#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/exports.h"
 #include "helicarm/report/report.h"
 
@@ -90,7 +89,7 @@ void Controller::meanwhile(Change change) {
       Qt::QueuedConnection);
 }
 
-void Controller::set_options(const pipeline::RunOptions& options) { options_ = options; }
+void Controller::set_options(const case_registration::RegisterOptions& options) { options_ = options; }
 
 void Controller::expect(const std::string& view) {
   state_.next_view = view;
@@ -125,11 +124,14 @@ Controller::Change Controller::came(Images images) {
 }
 
 Controller::Change Controller::measured(Equipment& equipment, const std::vector<pipeline::Pick>& picks) {
-  const bool calibrates = !equipment.calibration || equipment.calibrated_by != equipment.options.method;
-  const bool other_models =
-      calibrates ||
-      (equipment.registered_by && !pipeline::give_the_same(*equipment.registered_by, equipment.options));
+  const auto calibration = [&] {
+    return equipment.measurement ? equipment.measurement->calibration : nullptr;
+  };
+  const auto earlier = calibration();
   auto result = std::make_shared<const pipeline::Result>(value_or_throw(gui::measure(equipment, picks)));
+  const bool other_models = !earlier || calibration() != earlier ||
+                            (equipment.registered_by &&
+                             !case_registration::give_the_same(*equipment.registered_by, equipment.options));
   std::optional<operation::LiveTool> live;
   if (equipment.operation && !result->failure)
     if (auto follows = equipment.operation->live_tool()) live = *std::move(follows);

@@ -59,7 +59,7 @@ class Controller : public QObject {
   void set_virtual_freshness(const operation::FreshnessLimits& limits) { freshness_ = limits; }
 
   /// For the next measurement.
-  void set_options(const pipeline::RunOptions& options);
+  void set_options(const case_registration::RegisterOptions& options);
   void expect(const std::string& view);        ///< view of the next image
   void shoot(const std::string& view);         ///< with the virtual C-arm
   void touch(const std::string& check_point);  ///< with the pointer
@@ -133,7 +133,7 @@ class Controller : public QObject {
   void picks_changed(bool measurable);
   bool has_all_images() const;
   Change measured(Equipment& equipment, const std::vector<pipeline::Pick>& picks);
-  static Change with_plan(const operation::OperationPlan& plan, const Json& offered);
+  static Change with_plan(const operation::OperationPlan& plan, const std::vector<pipeline::Pick>& offered);
   Change with_case(pipeline::Case given, Equipment& equipment, std::optional<Picks> unsaved = {});
   void keep_unsaved_picks();
   void outline_nudged();
@@ -148,7 +148,7 @@ class Controller : public QObject {
   bool outlining_ = false;                          ///< of the nudged model
   bool picks_came_ = false;                         ///< during the measurement
   std::function<void()> next_source_;               ///< opened as soon as the work in progress has ended
-  pipeline::RunOptions options_;
+  case_registration::RegisterOptions options_;
   std::optional<operation::FreshnessLimits> freshness_;
   QTimer images_;
   QThreadPool faults_;  ///< of the virtual devices

@@ -14,17 +14,16 @@ Expected<CaseRegistration> register_models(Equipment& equipment, const std::vect
     pipeline::RegistrationCase given = value_or_throw(*equipment.with_models);
     given.base.picks = picks;
     if (from) given.models.at(from->model).world_from_model = from->world_from_model;
-    case_registration::RegisterOptions options;
-    options.run = equipment.options;
-    equipment.registered_by = equipment.options;
-    options.on_step = [&](const std::string& model, std::string_view step) {
-      tell(model + ": " + std::string(step));
-    };
-    options.interrupt = [&] {
-      if (equipment.stopped) throw BadInput(Reason::interrupted, "cancelled");
-    };
+    const case_registration::RegisterOptions& options = equipment.options;
+    equipment.registered_by = options;
+    const case_registration::Progress progress{
+        [&](const std::string& model, std::string_view step) { tell(model + ": " + std::string(step)); },
+        [&] {
+          if (equipment.stopped) throw BadInput(Reason::interrupted, "cancelled");
+        }};
     return value_or_throw(case_registration::register_loaded(
-        given, case_registration::views_of_calibration(given, *equipment.calibration), options));
+        given, case_registration::views_of_calibration(given, *equipment.measurement->calibration), options,
+        progress));
   });
 }
 

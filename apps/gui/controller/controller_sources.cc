@@ -77,7 +77,7 @@ void Controller::open_virtual_or(const virtual_devices::VirtualDevicesOptions& o
         rehearsal::plan_for(*equipment.virtual_or, equipment.virtual_or->tracker().port());
     for (const auto& field : operation::plan_fields)
       if (field.get(wished) != field.get(operation::OperationPlan())) field.set(plan, field.get(wished));
-    const Json offered = std::exchange(plan.picks, Json::array());
+    const auto offered = std::exchange(plan.picks, {});
     equipment.devices = std::make_unique<operation::Connections>(
         plan, value_or_throw(receiver::Inbox::open(folder / "inbox")),
         freshness.value_or(operation::freshness_limits(plan.tracker)));
@@ -101,7 +101,7 @@ void Controller::open_devices(const fs::path& file, const receiver::ReceiverOpti
   open(Source::devices, folder, "connecting", [=, this](Equipment& equipment) -> Change {
     operation::OperationPlan plan =
         value_or_throw(operation::plan_from(value_or_throw(read_json(file)), file.string()));
-    const Json offered = std::exchange(plan.picks, Json::array());
+    const auto offered = std::exchange(plan.picks, {});
     equipment.devices = std::make_unique<operation::Connections>(
         plan, value_or_throw(receiver::Inbox::open(folder / "inbox")));
     value_or_throw(equipment.devices->listen(receiver));
@@ -110,18 +110,15 @@ void Controller::open_devices(const fs::path& file, const receiver::ReceiverOpti
   });
 }
 
-Controller::Change Controller::with_plan(const operation::OperationPlan& plan, const Json& offered) {
-  std::vector<pipeline::CaseView> views(plan.views.size());
-  for (std::size_t i = 0; i < views.size(); ++i) views[i].name = plan.views[i];
+Controller::Change Controller::with_plan(const operation::OperationPlan& plan,
+                                         const std::vector<pipeline::Pick>& offered) {
   const phantom::Calibrator calibrator = value_or_throw(phantom::calibrator_named(plan.calibrator, "."));
-  const std::vector<pipeline::Pick> picks =
-      value_or_throw(pipeline::picks_from(offered, "plan", views, plan.bones));
   return [=](ApplicationState& state) {
     state.views = plan.views;
     state.calibrator = calibrator;
     state.tunnels = plan.tunnels;
     for (const auto& point : plan.check_points) state.check_points.push_back(point.name);
-    state.offered_picks = picks;
+    state.offered_picks = offered;
     Images none(plan.views.size());
     for (std::size_t i = 0; i < none.size(); ++i) none[i].name = plan.views[i];
     state.result = result_with(std::move(none));

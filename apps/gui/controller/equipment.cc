@@ -88,20 +88,15 @@ pipeline::Case with_picks(pipeline::Case given, const std::vector<pipeline::Pick
 
 Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipeline::Pick>& picks) {
   if (equipment.given) {
-    if (!equipment.calibration || equipment.calibrated_by != equipment.options.method) {
-      auto calibration = pipeline::calibrate_case(*equipment.given, equipment.options);
-      if (!calibration)
-        return pipeline::result_of_refusal(*equipment.given, std::move(calibration).error(),
-                                           equipment.options);
-      equipment.calibration = *std::move(calibration);
-      equipment.calibrated_by = equipment.options.method;
-    }
-    return pipeline::locate_case(with_picks(*equipment.given, picks), *equipment.calibration,
-                                 equipment.options);
+    const pipeline::Case picked = with_picks(*equipment.given, picks);
+    auto measured = equipment.measurement
+                        ? pipeline::measure_again(*equipment.measurement, picked, equipment.options.run)
+                        : pipeline::measure(picked, equipment.options.run);
+    if (!measured) return tl::unexpected<Failure>(measured.error());
+    equipment.measurement = *std::move(measured);
+    return equipment.measurement->result;
   }
-  Json json = Json::array();
-  for (const pipeline::Pick& pick : picks) json.push_back(helicarm::pipeline::to_json(pick));
-  equipment.operation->pick(std::move(json));
+  equipment.operation->pick(picks);
   const auto done = equipment.operation->measure();
   if (const auto& result = equipment.operation->newest_result()) return *result;
   return tl::unexpected<Failure>(done.error());

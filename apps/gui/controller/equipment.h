@@ -7,7 +7,7 @@
 #include "gui/controller/application_state.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/operation/connections.h"
-#include "helicarm/pipeline/locate_case.h"
+#include "helicarm/pipeline/measure.h"
 #include "helicarm/virtual_devices/virtual_devices.h"
 
 namespace helicarm::gui {
@@ -25,11 +25,10 @@ struct Equipment {
   std::unique_ptr<operation::Operation> operation;
   operation::TrackerPlan tracker;  ///< of the operation; any thread may read it
   std::optional<pipeline::Case> given;
-  std::optional<pipeline::CaseCalibration> calibration;             ///< of `given`
+  std::optional<pipeline::Measurement> measurement;                 ///< of `given`
   std::optional<Expected<pipeline::RegistrationCase>> with_models;  ///< `given`, if it names models
-  rectification::Method calibrated_by = rectification::Method::best;
-  pipeline::RunOptions options;
-  std::optional<pipeline::RunOptions> registered_by;  ///< of the registered models
+  case_registration::RegisterOptions options;
+  std::optional<case_registration::RegisterOptions> registered_by;  ///< of the registered models
   std::optional<robot::RobotOrder> last_order;
   robot::RobotState rest;             ///< the robot's state before the order
   std::atomic<bool> stopped = false;  ///< no further move of a tour, no wait for an image

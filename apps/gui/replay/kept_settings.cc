@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gui/replay/kept_settings.h"
 
+#include "helicarm/case_registration/register_fields.h"
 #include "helicarm/devices/receiver/receiver_fields.h"
 #include "helicarm/operation/plan_fields.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -13,6 +14,7 @@ namespace {
 template <class Visit>
 void for_each_part(const Visit& visit) {
   visit(&Settings::run, pipeline::run_fields, "run");
+  visit(&Settings::search, case_registration::search_fields, "search");
   visit(&Settings::plan, operation::plan_fields, "plan");
   visit(&Settings::receiver, receiver::receiver_fields, "receiver");
   visit(&Settings::virtual_or, virtual_devices::virtual_devices_fields, "virtual_devices");

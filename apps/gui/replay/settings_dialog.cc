@@ -11,6 +11,7 @@
 #include <algorithm>
 
 #include "gui/replay/field_box.h"
+#include "helicarm/case_registration/register_fields.h"
 #include "helicarm/devices/receiver/receiver_fields.h"
 #include "helicarm/operation/plan_fields.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -39,6 +40,7 @@ SettingsDialog::SettingsDialog(Settings settings, QWidget* parent)
   setWindowTitle(tr("Settings"));
   auto* pages = new QTabWidget(this);
   add_page(*pages, tr("&Measurement"), &Settings::run, pipeline::run_fields);
+  add_page(*pages, tr("R&egistration"), &Settings::search, case_registration::search_fields);
   add_page(*pages, tr("&Operation"), &Settings::plan, operation::plan_fields);
   add_page(*pages, tr("&Receiver"), &Settings::receiver, receiver::receiver_fields);
   add_page(*pages, tr("&Virtual devices"), &Settings::virtual_or, virtual_devices::virtual_devices_fields);

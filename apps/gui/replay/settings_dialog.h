@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "helicarm/case_registration/register_case.h"
 #include "helicarm/core/field.h"
 #include "helicarm/devices/receiver/receiver.h"
 #include "helicarm/operation/plan.h"
@@ -19,6 +20,7 @@ namespace helicarm::gui {
 /// All options that have lists of fields.
 struct Settings {
   pipeline::RunOptions run = {};
+  case_registration::SearchRange search = {};
   operation::OperationPlan plan = {};
   receiver::ReceiverOptions receiver = {};
   virtual_devices::VirtualDevicesOptions virtual_or = {};

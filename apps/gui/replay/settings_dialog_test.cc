@@ -15,6 +15,7 @@
 #include "gui/replay/application_test.h"
 #include "gui/replay/field_box.h"
 #include "gui/replay/kept_settings.h"
+#include "helicarm/case_registration/register_fields.h"
 #include "helicarm/operation/plan_fields.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/virtual_devices/virtual_devices_fields.h"
@@ -46,6 +47,8 @@ TEST_F(Dialog, ReturnsUneditedValuesUnchanged) {
 TEST_F(Dialog, HasABoxForEveryField) {
   SettingsDialog dialog({});
   for (const auto& field : pipeline::run_fields)
+    EXPECT_FALSE(box(dialog, field.name.data()).toolTip().isEmpty());
+  for (const auto& field : case_registration::search_fields)
     EXPECT_FALSE(box(dialog, field.name.data()).toolTip().isEmpty());
   for (const auto& field : operation::plan_fields)
     EXPECT_FALSE(dialog.findChildren<FieldBox*>(field.name.data()).isEmpty()) << field.name;

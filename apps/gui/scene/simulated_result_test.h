@@ -7,7 +7,7 @@
 
 #include <unistd.h>
 
-#include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/measure.h"
 #include "helicarm/simulation/write_case.h"
 
 namespace helicarm::gui {
@@ -30,7 +30,7 @@ inline const Simulated& simulated() {
     Simulated fresh{*simulation::simulate_case(options), {}, nullptr};
     if (!simulation::write_case(folder, fresh.truth)) std::abort();
     fresh.given = *pipeline::read_case(folder);
-    fresh.result = std::make_shared<const pipeline::Result>(*pipeline::run_case(fresh.given, {}));
+    fresh.result = std::make_shared<const pipeline::Result>(pipeline::measure(fresh.given, {})->result);
     std::filesystem::remove_all(folder);
     return fresh;
   }();

@@ -51,7 +51,7 @@ MainWindow::MainWindow(std::filesystem::path sessions, QWidget* parent)
   setWindowTitle(tr("helicarm"));
   setAcceptDrops(true);
   settings_ = kept_settings(recent_);
-  controller_.set_options(settings_.run);
+  controller_.set_options({settings_.run, settings_.search});
   focus_ = new FocusKeeper(this);
   build();
   build_menus();

@@ -9,7 +9,6 @@
 #include "gui/controller/steps.h"
 #include "gui/window/ask_files.h"
 #include "gui/window/main_window.h"
-#include "helicarm/pipeline/run_case.h"
 
 namespace helicarm::gui {
 namespace fs = std::filesystem;
@@ -190,7 +189,7 @@ void MainWindow::ask_settings() {
   connect(dialog, &QDialog::accepted, this, [this, dialog] {
     settings_ = dialog->settings();
     keep_settings(recent_, settings_);
-    controller_.set_options(settings_.run);
+    controller_.set_options({settings_.run, settings_.search});
     statusBar()->showMessage(
         tr("Measurement settings apply to the next measurement; the others to the next rehearsal or "
            "connection."));

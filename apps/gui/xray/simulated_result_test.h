@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/measure.h"
 #include "helicarm/simulation/write_case.h"
 
 namespace helicarm::gui {
@@ -24,7 +24,7 @@ inline std::shared_ptr<const pipeline::Result> simulated_result() {
         !written)
       throw std::runtime_error(written.error().message);
     return std::make_shared<const pipeline::Result>(
-        pipeline::run_case(pipeline::read_case(path).value(), {}).value());
+        pipeline::measure(pipeline::read_case(path).value(), {}).value().result);
   }();
   return result;
 }

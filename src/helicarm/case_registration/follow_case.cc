@@ -49,7 +49,7 @@ struct Followed {
 
 std::vector<std::unique_ptr<Followed>> followed_models(const pipeline::RegistrationCase& given,
                                                        const RegisterOptions& options,
-                                                       const LoadedViews& loaded,
+                                                       const Progress& progress, const LoadedViews& loaded,
                                                        std::vector<Warning>& warnings) {
   std::vector<std::unique_ptr<Followed>> bodies;
   std::vector<std::optional<Plan>> plans = read_plans(given);
@@ -68,7 +68,8 @@ std::vector<std::unique_ptr<Followed>> followed_models(const pipeline::Registrat
     auto body = std::make_unique<Followed>(
         Followed{std::move(*model), {}, std::move(start), fault, std::move(plans[i])});
     const std::vector<geometry::RigidTransform>& poses = body->start.poses;
-    body->follower.emplace(body->model, poses, search_options(options, loaded, asked, poses.size()));
+    body->follower.emplace(body->model, poses,
+                           search_options(options, progress, loaded, asked, poses.size()));
     bodies.push_back(std::move(body));
   }
   return bodies;
@@ -149,12 +150,13 @@ std::optional<Failure> CaseSequence::refusal() const {
 
 Expected<CaseSequence> follow_case(const pipeline::RegistrationCase& given, const FrameRange& range,
                                    const RegisterOptions& options,
-                                   const std::function<void(double share)>& on_frame) {
+                                   const std::function<void(double share)>& on_frame,
+                                   const Progress& progress) {
   return guarded([&] {
     CaseSequence sequence;
     sequence.warnings = given.base.warnings;
     const auto first = value_or_throw(pipeline::at_frame(given, range.first));
-    const auto loaded = load_views(first, with_steps(options));
+    const auto loaded = load_views(first, options.run, progress.of_views());
     if (!loaded) {
       if (exit_code(loaded.error().reason) == 2) throw BadInput(loaded.error());
       sequence.failure = loaded.error();
@@ -162,7 +164,7 @@ Expected<CaseSequence> follow_case(const pipeline::RegistrationCase& given, cons
     }
     sequence.warnings.insert(sequence.warnings.end(), loaded->warnings.begin(), loaded->warnings.end());
     check_frames(given, range);
-    const auto bodies = followed_models(first, options, *loaded, sequence.warnings);
+    const auto bodies = followed_models(first, options, progress, *loaded, sequence.warnings);
     const auto begun = std::chrono::steady_clock::now();
     for (int i = 0; i < range.count(); ++i) {
       const int frame = range.first + i * range.step;

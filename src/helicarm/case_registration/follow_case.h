@@ -42,7 +42,8 @@ struct CaseSequence {
 /// result.
 Expected<CaseSequence> follow_case(const pipeline::RegistrationCase& given, const FrameRange& range,
                                    const RegisterOptions& options,
-                                   const std::function<void(double share)>& on_frame);
+                                   const std::function<void(double share)>& on_frame,
+                                   const Progress& progress = {});
 
 /// registration.csv: frame, model, decision, world_from_model, sigmas, code (docs/formats.md).
 std::string poses_csv(const CaseSequence& sequence);

@@ -165,14 +165,15 @@ LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
   return loaded;
 }
 
-Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const pipeline::RunOptions& run) {
+Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const pipeline::RunOptions& run,
+                                 const pipeline::Progress& progress) {
   return guarded([&] {
     if (!given.cameras.empty()) {
-      if (run.on_stage) run.on_stage("read");
+      progress.begin("read");
       return views_of_cameras(given);
     }
     const double least_angle_deg = given.base.views.size() > 1 ? calibration::least_view_angle_deg : 0;
-    const auto calibration = pipeline::calibrate_case(given.base, run, least_angle_deg);
+    const auto calibration = pipeline::calibrate_case(given.base, run, progress, least_angle_deg);
     if (!calibration) throw BadInput(calibration.error().failure);
     return views_of_calibration(given, *calibration);
   });

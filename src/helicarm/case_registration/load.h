@@ -27,7 +27,8 @@ struct LoadedViews {
 /// or with cameras of other programs, then the images are taken as free of distortion. Fails as
 /// `read_xray_image`, `import_matrix` and `calibrate_case`, with patient_mismatch for images of two patients,
 /// and with bad_size for a camera of another image size.
-Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const pipeline::RunOptions& run);
+Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const pipeline::RunOptions& run,
+                                 const pipeline::Progress& progress = {});
 
 /// The views of a case that is calibrated already. Of the paper's method, which has no covariance, each
 /// view's follows from its residuals.

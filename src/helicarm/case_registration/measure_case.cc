@@ -3,7 +3,7 @@
 
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
-#include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/measure.h"
 #include "helicarm/report/earlier_results.h"
 
 namespace helicarm::case_registration {
@@ -40,13 +40,13 @@ pipeline::Result with_models(pipeline::Result result, const CaseRegistration& re
   return result;
 }
 
-Expected<Measurement> measure_case(const pipeline::RegistrationCase& given, const RegisterOptions& options) {
+Expected<Measurement> measure_case(const pipeline::RegistrationCase& given, const RegisterOptions& options,
+                                   const Progress& progress) {
   return guarded([&] {
-    auto done = value_or_throw(pipeline::run_and_keep(given.base, with_steps(options)));
-    done.result.options = options.run;
+    auto done = value_or_throw(pipeline::measure(given.base, options.run, progress.of_views()));
     if (done.result.failure || given.models.empty()) return Measurement{std::move(done.result), {}};
-    auto registration =
-        value_or_throw(register_loaded(given, views_of_calibration(given, *done.calibration), options));
+    auto registration = value_or_throw(
+        register_loaded(given, views_of_calibration(given, *done.calibration), options, progress));
     pipeline::Result result = with_models(std::move(done.result), registration);
     return Measurement{std::move(result), std::move(registration)};
   });

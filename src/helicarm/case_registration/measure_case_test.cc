@@ -6,7 +6,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/localization/error_bound.h"
-#include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/measure.h"
 #include "helicarm/simulation/write_case.h"
 
 namespace helicarm::case_registration {
@@ -101,7 +101,7 @@ TEST_F(MeasureCase, EveryOptionReachesTheModels) {
   pipeline::RunOptions fresh;
   fresh.history.emplace();
   calibration::CArmHistory learned;
-  const pipeline::Result acquired = pipeline::run_case(given_.base, fresh).value();
+  const pipeline::Result acquired = pipeline::measure(given_.base, fresh).value().result;
   for (int i = 0; i < 3; ++i)
     for (calibration::HistoryEntry entry : acquired.entries) {
       entry.image += std::to_string(i);

@@ -95,9 +95,9 @@ void add_warnings_of_files(const registration::Model& model, registration::Regis
 
 class Registrar {
  public:
-  Registrar(const pipeline::RegistrationCase& given, const RegisterOptions& options,
+  Registrar(const pipeline::RegistrationCase& given, const RegisterOptions& options, const Progress& progress,
             const LoadedViews& loaded)
-      : given_(given), options_(options), loaded_(loaded) {}
+      : given_(given), options_(options), progress_(progress), loaded_(loaded) {}
 
   RegisteredModel registered(const pipeline::CaseModel& asked, const std::optional<Plan>& plan) const {
     RegisteredModel made;
@@ -149,9 +149,10 @@ class Registrar {
                                                   const std::optional<registration::LandmarkFault>& fault,
                                                   const std::vector<RegistrationView>& views,
                                                   double motion_sigma_mm) const {
-    registration::RegistrationOptions how = search_options(options_, loaded_, asked, start.poses.size());
+    registration::RegistrationOptions how =
+        search_options(options_, progress_, loaded_, asked, start.poses.size());
     how.motion_sigma_mm = motion_sigma_mm;
-    if (options_.on_step) how.on_step = [&](std::string_view step) { options_.on_step(asked.name, step); };
+    if (progress_.step) how.on_step = [&](std::string_view step) { progress_.step(asked.name, step); };
     auto result = registration::register_model(model, views, start.poses, how);
     compare_with_landmarks(start, fault, result);
     return result;
@@ -168,6 +169,7 @@ class Registrar {
 
   const pipeline::RegistrationCase& given_;
   const RegisterOptions& options_;
+  const Progress& progress_;
   const LoadedViews& loaded_;
 };
 
@@ -182,10 +184,10 @@ std::vector<std::vector<Eigen::Vector2d>> outlines(const registration::Model& mo
   return made;
 }
 
-pipeline::RunOptions with_steps(const RegisterOptions& options) {
-  pipeline::RunOptions run = options.run;
-  if (options.on_step) run.on_stage = [&](std::string_view stage) { options.on_step("", stage); };
-  return run;
+pipeline::Progress Progress::of_views() const {
+  pipeline::Progress progress{.view = interrupt};
+  if (step) progress.stage = [this](std::string_view stage) { step("", stage); };
+  return progress;
 }
 
 bool CaseRegistration::refused() const {
@@ -195,7 +197,7 @@ bool CaseRegistration::refused() const {
 }
 
 Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given,
-                                         const RegisterOptions& options) {
+                                         const RegisterOptions& options, const Progress& progress) {
   return guarded([&] {
     CaseRegistration result;
     result.bones = given.base.bones;
@@ -203,18 +205,18 @@ Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given
     if (pipeline::is_sequence(given))
       throw BadInput(Reason::bad_value,
                      "views: \"image\" holds {frame}: name the frames with --frames, such as --frames 1-100");
-    auto loaded = load_views(given, with_steps(options));
+    auto loaded = load_views(given, options.run, progress.of_views());
     if (!loaded) {
       if (exit_code(loaded.error().reason) == 2) throw BadInput(loaded.error());
       result.failure = loaded.error();
       return result;
     }
-    return value_or_throw(register_loaded(given, *std::move(loaded), options));
+    return value_or_throw(register_loaded(given, *std::move(loaded), options, progress));
   });
 }
 
 Expected<CaseRegistration> register_loaded(const pipeline::RegistrationCase& given, LoadedViews loaded,
-                                           const RegisterOptions& options) {
+                                           const RegisterOptions& options, const Progress& progress) {
   return guarded([&] {
     CaseRegistration result;
     result.bones = given.base.bones;
@@ -223,7 +225,7 @@ Expected<CaseRegistration> register_loaded(const pipeline::RegistrationCase& giv
     result.warnings.insert(result.warnings.end(), result.loaded.warnings.begin(),
                            result.loaded.warnings.end());
     const auto plans = read_plans(given);
-    const Registrar registrar(given, options, result.loaded);
+    const Registrar registrar(given, options, progress, result.loaded);
     for (std::size_t i = 0; i < given.models.size(); ++i)
       result.models.push_back(registrar.registered(given.models[i], plans[i]));
     return result;

@@ -18,15 +18,30 @@
 
 namespace helicarm::case_registration {
 
+/// Searched about each start of a model.
+struct SearchRange {
+  double shift_mm = 15;
+  double turn_deg = 15;
+
+  bool operator==(const SearchRange&) const = default;
+};
+
 struct RegisterOptions {
   /// Of the calibration and the limits, as for a run. `max_error_mm` also holds for the models and their
   /// plans, `motion_sigma_mm` for models that are not tracked.
   pipeline::RunOptions run = {};
-  double shift_mm = 15;  ///< searched about each start
-  double turn_deg = 15;
-  std::function<void()> interrupt = {};  ///< as registration::SearchOptions
-  /// Called with the model's name (empty: the views) and the step.
-  std::function<void(const std::string& model, std::string_view step)> on_step = {};
+  SearchRange search = {};
+};
+
+/// What a registration calls; an exception ends it.
+struct Progress {
+  /// With the model's name (empty: the views) and the step.
+  std::function<void(const std::string& model, std::string_view step)> step = {};
+  /// Often, from the threads that work.
+  std::function<void()> interrupt = {};
+
+  /// Of the views' calibration. Refers to this object.
+  pipeline::Progress of_views() const;
 };
 
 /// A point of a plan carried to the world, bones and tool.
@@ -68,16 +83,13 @@ std::vector<std::vector<Eigen::Vector2d>> outlines(const registration::Model& mo
                                                    const std::vector<geometry::View>& views,
                                                    const geometry::RigidTransform& world_from_model);
 
-/// The options of the views' calibration, which tells its stages to `on_step`. Refers to `options`.
-pipeline::RunOptions with_steps(const RegisterOptions& options);
-
 /// Registers every model of a case. Unreadable input is a failure; refusals are in the result.
 Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given,
-                                         const RegisterOptions& options);
+                                         const RegisterOptions& options, const Progress& progress = {});
 
 /// Registers every model to views that are loaded already. Fails as `register_case`.
 Expected<CaseRegistration> register_loaded(const pipeline::RegistrationCase& given, LoadedViews loaded,
-                                           const RegisterOptions& options);
+                                           const RegisterOptions& options, const Progress& progress = {});
 
 /// registration.json (docs/formats.md).
 Json to_json(const CaseRegistration& result);

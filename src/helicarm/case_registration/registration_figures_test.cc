@@ -102,8 +102,7 @@ class Report : public testing::Test {
     given.models = {asked};
     RegisterOptions options;
     options.run.threads = 1;
-    options.shift_mm = 3;
-    options.turn_deg = 3;
+    options.search = {3, 3};
     const auto model = *registration::model_from("implant", surface());
     volume::Volume volume{model.density.size, model.density.values, model.density.model_from_voxel, {}};
     for (float& voxel : volume.voxels) voxel = voxel > 0 ? 3000.0F : -1024.0F;

@@ -109,15 +109,17 @@ std::vector<Warning> places_outside(const pipeline::CaseModel& asked,
   return warnings;
 }
 
-registration::RegistrationOptions search_options(const RegisterOptions& options, const LoadedViews& loaded,
-                                                 const pipeline::CaseModel& asked, std::size_t starts) {
+registration::RegistrationOptions search_options(const RegisterOptions& options, const Progress& progress,
+                                                 const LoadedViews& loaded, const pipeline::CaseModel& asked,
+                                                 std::size_t starts) {
   registration::RegistrationOptions how;
   how.max_error_mm = options.run.max_error_mm;
   how.motion_sigma_mm = options.run.motion_sigma_mm;
   how.scale_sigma = asked.scale_sigma.value_or(registration::usual_scale_sigma);
   how.threads = options.run.threads;
   how.camera_covariance = loaded.camera_covariance;
-  how.search = {options.shift_mm, options.turn_deg, starts > 1 ? 150 * int(starts) : 600, options.interrupt};
+  how.search = {options.search.shift_mm, options.search.turn_deg, starts > 1 ? 150 * int(starts) : 600,
+                progress.interrupt};
   return how;
 }
 

@@ -38,7 +38,8 @@ std::vector<Warning> places_outside(const pipeline::CaseModel& asked,
                                     const std::optional<Plan>& plan);
 
 /// The options of an untracked model's registration from that many starts.
-registration::RegistrationOptions search_options(const RegisterOptions& options, const LoadedViews& loaded,
-                                                 const pipeline::CaseModel& asked, std::size_t starts);
+registration::RegistrationOptions search_options(const RegisterOptions& options, const Progress& progress,
+                                                 const LoadedViews& loaded, const pipeline::CaseModel& asked,
+                                                 std::size_t starts);
 
 }  // namespace helicarm::case_registration

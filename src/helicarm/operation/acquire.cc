@@ -49,7 +49,7 @@ void Operation::weigh_delay(const std::string& view, const xray::Acquisition& he
     const Failure why = held_back(earlier.name, held);
     record("refused", {{"view", earlier.name}, {"why", code(why.reason)}, {"figures", why.figures}});
     notify_(Step::acquire, fmt::format("{}; acquire it again", why.message));
-    result_.reset();
+    forget_measurement();
     return true;
   });
   if (const double held = held_s(header, arrival_s); held > longest_held_s)
@@ -139,7 +139,7 @@ Expected<void> Operation::take(const std::string& wanted, const receiver::Arriva
     std::erase_if(views_, [&](const View& other) { return other.name == view; });
     views_.push_back({view, arrival.path, arrival.digest, *acquisition, arrival_s, poses});
     std::ranges::sort(views_, {}, [&](const View& v) { return std::ranges::find(plan_.views, v.name); });
-    result_.reset();
+    forget_measurement();
   });
 }
 

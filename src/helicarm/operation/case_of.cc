@@ -7,8 +7,6 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/private_files.h"
-#include "helicarm/geometry/view_json.h"
-#include "helicarm/pipeline/poses_json.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/report/report.h"
 #include "helicarm/xray/digest.h"
@@ -20,27 +18,50 @@ namespace {
 
 constexpr std::uintmax_t most_file_bytes = std::uintmax_t{256} << 20;
 
-Json without(Json json, const char* key) {
-  json.erase(key);
-  return json;
+/// Reads what a plan names: a file where there is one, else a built-in.
+class NamedFiles {
+ public:
+  explicit NamedFiles(fs::path folder) : folder_(std::move(folder)) {}
+
+  template <class Read, class Named>
+  auto read(const fs::path& file, const std::string& name, std::string& name_in_case, Read from_json,
+            Named built_in) {
+    if (!fs::is_regular_file(folder_ / file)) {
+      name_in_case = name;
+      return value_or_throw(built_in(name, folder_));
+    }
+    name_in_case = file.filename().string();
+    std::string bytes = value_or_throw(read_file(folder_ / file, most_file_bytes));
+    auto read = value_or_throw(from_json(value_or_throw(parse_json(bytes, name_in_case)), name_in_case));
+    if (!files.emplace(name_in_case, std::move(bytes)).second)
+      throw BadInput(Reason::name_clash,
+                     fmt::format("{}: calibrator and plate have the same file name", name_in_case));
+    return read;
+  }
+
+  std::map<std::string, std::string> files;
+
+ private:
+  fs::path folder_;
+};
+
+PlanFiles read_files(const OperationPlan& plan, const fs::path& folder, bool by_name_alone) {
+  const auto place_of = [&](const std::string& name) {
+    return by_name_alone ? fs::path(name).filename() : fs::path(name);
+  };
+  NamedFiles named(folder);
+  PlanFiles read;
+  read.calibrator = named.read(place_of(plan.calibrator), plan.calibrator, read.calibrator_name,
+                               phantom::calibrator_from_json, phantom::calibrator_named);
+  if (plan.plate)
+    read.plate = named.read(place_of(*plan.plate), *plan.plate, read.plate_name.emplace(),
+                            phantom::plate_from_json, phantom::plate_named);
+  read.files = std::move(named.files);
+  return read;
 }
 
-Json image_json(const CaseImage& image) {
-  return {{"name", image.name},
-          {"image", image.name + ".dcm"},
-          {"poses", pipeline::to_json(image.poses, pipeline::OtherMarker::calibrator)}};
-}
-
-Json tool_line_json(const verification::ToolLine& line) {
-  return {{"name", line.name},
-          {"tunnel", line.tunnel},
-          {"p1_in_calibrator", geometry::json_list(line.p1_in_calibrator)},
-          {"p2_in_calibrator", geometry::json_list(line.p2_in_calibrator)}};
-}
-
-bool is_picked(const Json& picks, const std::string& name) {
-  return std::ranges::any_of(
-      picks, [&](const Json& pick) { return pick.is_object() && pick.value("name", Json()) == Json(name); });
+bool is_picked(const OperationPlan& plan, const std::string& name) {
+  return std::ranges::find(plan.picks, name, &pipeline::Pick::name) != plan.picks.end();
 }
 
 /// Writes the files of a case and keeps their digests.
@@ -58,13 +79,6 @@ class CaseFolder {
     value_or_throw(write_private_file(folder_ / name, bytes));
     files[name] = xray::digest(bytes);
   }
-  /// The name of a built-in is kept; a file is copied into the case.
-  std::string bring(const std::string& name_or_file) {
-    const fs::path file(name_or_file);
-    if (!fs::exists(file)) return name_or_file;
-    add(file.filename().string(), value_or_throw(read_file(file, most_file_bytes)));
-    return file.filename().string();
-  }
 
   Digests files;
 
@@ -74,26 +88,40 @@ class CaseFolder {
 
 }  // namespace
 
-Json operation_case_json(const OperationPlan& plan, const std::vector<CaseImage>& images,
-                         const guidance::Poses& now, const std::vector<verification::ToolLine>& tool_lines) {
-  const guidance::TrackerNoise noise = plan.tracker.noise();
-  Json json = {
-      {"format", "helicarm-case/2"},
-      {"calibrator", plan.calibrator},
-      {"plate", plan.plate ? Json(*plan.plate) : Json()},
-      {"bones", plan.bones},
-      {"views", Json::array()},
-      {"poses_now", pipeline::to_json(now, pipeline::OtherMarker::tool)},
-      {"tracker", {{"sigma_mm", noise.sigma_mm}, {"sigma_deg", noise.sigma_deg}, {"samples", "independent"}}},
-      {"picks", plan.picks},
-      {"tunnels", Json::array()},
-      {"tool_lines", Json::array()}};
-  for (const CaseImage& image : images) json["views"].push_back(image_json(image));
+Expected<PlanFiles> files_of(const OperationPlan& plan) {
+  return guarded([&] { return read_files(plan, ".", false); });
+}
+
+Expected<PlanFiles> files_of_case(const OperationPlan& plan, const fs::path& folder) {
+  return guarded([&] { return read_files(plan, folder, true); });
+}
+
+Expected<pipeline::Case> operation_case(const fs::path& folder, const OperationPlan& plan,
+                                        const PlanFiles& files, const std::vector<CaseImage>& images,
+                                        const guidance::Poses& now,
+                                        const std::vector<verification::ToolLine>& tool_lines) {
+  pipeline::Case made;
+  made.folder = folder;
+  made.calibrator_name = files.calibrator_name;
+  made.calibrator = files.calibrator;
+  made.plate_name = files.plate_name;
+  made.plate = files.plate;
+  made.bones = plan.bones;
+  for (const CaseImage& image : images) {
+    pipeline::CaseView view;
+    view.name = image.name;
+    view.image = folder / (image.name + ".dcm");
+    view.poses = image.poses;
+    made.views.push_back(std::move(view));
+  }
+  made.poses_now = now;
+  made.tracker = plan.tracker.noise();
+  made.picks = plan.picks;
   for (const PlannedTunnel& tunnel : plan.tunnels)
-    if (is_picked(plan.picks, tunnel.start) && is_picked(plan.picks, tunnel.end))
-      json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
-  for (const verification::ToolLine& line : tool_lines) json["tool_lines"].push_back(tool_line_json(line));
-  return json;
+    if (is_picked(plan, tunnel.start) && is_picked(plan, tunnel.end))
+      made.tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
+  made.tool_lines = tool_lines;
+  return pipeline::checked_case(std::move(made));
 }
 
 Expected<std::string> received_image(const fs::path& image, const std::string& digest) {
@@ -108,17 +136,14 @@ Expected<std::string> received_image(const fs::path& image, const std::string& d
   });
 }
 
-Expected<Digests> write_operation_case(const fs::path& folder, const OperationPlan& plan,
-                                       const std::vector<CaseImage>& images, const guidance::Poses& now,
-                                       const std::vector<verification::ToolLine>& tool_lines) {
+Expected<Digests> write_operation_case(const pipeline::Case& written, const PlanFiles& files,
+                                       const std::vector<CaseImage>& images) {
   return guarded([&] {
-    CaseFolder made(folder);
-    OperationPlan brought = plan;
-    brought.calibrator = made.bring(plan.calibrator);
-    if (plan.plate) brought.plate = made.bring(*plan.plate);
+    CaseFolder made(written.folder);
+    for (const auto& [name, bytes] : files.files) made.add(name, bytes);
     for (const CaseImage& image : images)
       made.add(image.name + ".dcm", value_or_throw(received_image(image.image, image.digest)));
-    made.add("case.json", to_text(operation_case_json(brought, images, now, tool_lines)));
+    made.add("case.json", to_text(pipeline::to_json(written)));
     return made.files;
   });
 }
@@ -134,30 +159,30 @@ Expected<void> check_digests(const fs::path& folder, const Digests& files) {
   });
 }
 
-Expected<CaseRun> recompute_case(const fs::path& folder, const OperationPlan& plan,
-                                 pipeline::CalibrationCache& cache) {
-  return guarded([&] {
-    const pipeline::Case given = value_or_throw(pipeline::read_case(folder));
-    pipeline::RunOptions options;
-    options.max_error_mm = plan.max_error_mm;
-    CaseRun run{value_or_throw(cache.run(given, options)), {}, {}};
-    run.digest = xray::digest(to_text(without(pipeline::to_json(run.result), "timing_ms")));
-    return run;
-  });
+Expected<pipeline::Measurement> measure_case(const pipeline::Case& given, const OperationPlan& plan,
+                                             const std::optional<pipeline::Measurement>& earlier) {
+  pipeline::RunOptions options;
+  options.max_error_mm = plan.max_error_mm;
+  return earlier ? pipeline::measure_again(*earlier, given, options) : pipeline::measure(given, options);
 }
 
-Expected<CaseRun> run_operation_case(const fs::path& folder, const OperationPlan& plan,
-                                     pipeline::CalibrationCache& cache) {
+std::string digest_of(const pipeline::Result& result) {
+  Json json = pipeline::to_json(result);
+  json.erase("timing_ms");
+  return xray::digest(to_text(json));
+}
+
+Expected<Digests> write_result(const pipeline::Result& result, const fs::path& folder) {
   return guarded([&] {
-    CaseRun run = value_or_throw(recompute_case(folder, plan, cache));
-    value_or_throw(report::write_report(run.result, folder));
-    value_or_throw(write_file(folder / "result.json", to_text(pipeline::to_json(run.result))));
+    value_or_throw(report::write_report(result, folder));
+    value_or_throw(write_file(folder / "result.json", to_text(pipeline::to_json(result))));
     std::vector<std::string> names{"result.json", "report.html"};
-    for (std::size_t i = 0; i < run.result.views.size(); ++i)
-      if (run.result.views[i].xray_image) names.push_back(report::overlay_name(run.result.views[i].name, i));
+    for (std::size_t i = 0; i < result.views.size(); ++i)
+      if (result.views[i].xray_image) names.push_back(report::overlay_name(result.views[i].name, i));
+    Digests files;
     for (const std::string& name : names)
-      run.files[name] = xray::digest(value_or_throw(read_file(folder / name, most_file_bytes)));
-    return run;
+      files[name] = xray::digest(value_or_throw(read_file(folder / name, most_file_bytes)));
+    return files;
   });
 }
 

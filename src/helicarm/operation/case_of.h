@@ -3,13 +3,12 @@
 
 #include <map>
 
-#include "helicarm/guidance/poses.h"
 #include "helicarm/operation/plan.h"
-#include "helicarm/pipeline/calibration_cache.h"
+#include "helicarm/pipeline/measure.h"
 
 namespace helicarm::operation {
 
-/// A view in the form of case.json.
+/// An accepted image.
 struct CaseImage {
   std::string name;
   std::filesystem::path image;
@@ -20,35 +19,49 @@ struct CaseImage {
 /// Digest of each file by its name.
 using Digests = std::map<std::string, std::string>;
 
-/// case.json; calibrator and plate as the plan names them.
-Json operation_case_json(const OperationPlan& plan, const std::vector<CaseImage>& images,
-                         const guidance::Poses& now, const std::vector<verification::ToolLine>& tool_lines);
+/// Calibrator and plate of a plan, as a case of the operation holds them.
+struct PlanFiles {
+  std::string calibrator_name;  ///< of a built-in, or a file of `files`
+  phantom::Calibrator calibrator;
+  std::optional<std::string> plate_name;
+  std::optional<phantom::Plate> plate;
+  std::map<std::string, std::string> files;  ///< contents by name
+};
+
+/// As the plan names them. Fails as `read_calibrator` and `read_plate`, and with name_clash for two files of
+/// one name.
+Expected<PlanFiles> files_of(const OperationPlan& plan);
+/// The same of a case's folder, where files lie by their names alone.
+Expected<PlanFiles> files_of_case(const OperationPlan& plan, const std::filesystem::path& folder);
+
+/// The case of a measurement, in `folder`. Tunnels without picks for both ends are left out. Fails as
+/// `checked_case`.
+Expected<pipeline::Case> operation_case(const std::filesystem::path& folder, const OperationPlan& plan,
+                                        const PlanFiles& files, const std::vector<CaseImage>& images,
+                                        const guidance::Poses& now,
+                                        const std::vector<verification::ToolLine>& tool_lines);
 
 /// The bytes of a received image. Refuses as `read_file`, and (image_changed) a file that is no longer the
 /// one that was received.
 Expected<std::string> received_image(const std::filesystem::path& image, const std::string& digest);
 
-/// Makes `folder` a self-contained case (docs/formats.md) that only the owner can read: images, calibrator,
-/// plate, case.json; returns their digests. Tunnels without picks for both ends are left out. Refuses
-/// cannot_write, also for a folder that exists; missing_file; and as `received_image`.
-Expected<Digests> write_operation_case(const std::filesystem::path& folder, const OperationPlan& plan,
-                                       const std::vector<CaseImage>& images, const guidance::Poses& now,
-                                       const std::vector<verification::ToolLine>& tool_lines);
+/// Makes the case's folder, self-contained (docs/formats.md), which only the owner can read: images,
+/// calibrator, plate, case.json; returns their digests. Refuses cannot_write, also for a folder that exists,
+/// and as `received_image`.
+Expected<Digests> write_operation_case(const pipeline::Case& written, const PlanFiles& files,
+                                       const std::vector<CaseImage>& images);
 
 /// Refuses (image_changed) a folder whose files are not those.
 Expected<void> check_digests(const std::filesystem::path& folder, const Digests& files);
 
-/// The digest excludes the timing, so equal cases have equal digests.
-struct CaseRun {
-  pipeline::Result result;
-  std::string digest;
-  Digests files = {};  ///< that were written
-};
-/// Reads the case and runs it; writes nothing.
-Expected<CaseRun> recompute_case(const std::filesystem::path& folder, const OperationPlan& plan,
-                                 pipeline::CalibrationCache& cache);
-/// As above, and writes result.json and the report.
-Expected<CaseRun> run_operation_case(const std::filesystem::path& folder, const OperationPlan& plan,
-                                     pipeline::CalibrationCache& cache);
+/// Measures by the calibration of `earlier`, if there is one: of the same images.
+Expected<pipeline::Measurement> measure_case(const pipeline::Case& given, const OperationPlan& plan,
+                                             const std::optional<pipeline::Measurement>& earlier);
+
+/// Of result.json without its timing: equal cases have equal digests.
+std::string digest_of(const pipeline::Result& result);
+
+/// Writes result.json and the report into the case's folder; returns their digests.
+Expected<Digests> write_result(const pipeline::Result& result, const std::filesystem::path& folder);
 
 }  // namespace helicarm::operation

@@ -76,6 +76,7 @@ Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const 
       throw BadInput(Reason::cannot_write,
                      fmt::format("{}: already holds the record of another operation; choose an empty folder",
                                  folder.string()));
+    operation->files_ = value_or_throw(files_of(operation->plan_));
     operation->record("plan", to_json(operation->plan_));
     return operation;
   });
@@ -133,16 +134,25 @@ pipeline::Result Operation::run(const guidance::Poses& now,
   const std::string name = fmt::format("case-{}", ++measurements_);
   std::vector<CaseImage> images;
   for (const View& view : views_) images.push_back({view.name, view.image, view.digest, view.poses});
-  const Digests files = value_or_throw(write_operation_case(folder_ / name, plan_, images, now, tool_lines));
-  record("case", {{"folder", name},
-                  {"case", value_or_throw(read_json(folder_ / name / "case.json"))},
-                  {"files", files}});
-  CaseRun run = value_or_throw(run_operation_case(folder_ / name, plan_, cache_));
-  value_or_throw(check_digests(folder_ / name, files));
-  record("result", {{"folder", name}, {"digest", run.digest}, {"files", run.files}});
-  newest_ = std::move(run.result);
+  const pipeline::Case given =
+      value_or_throw(operation_case(folder_ / name, plan_, files_, images, now, tool_lines));
+  const Digests files = value_or_throw(write_operation_case(given, files_, images));
+  record("case", {{"folder", name}, {"case", pipeline::to_json(given)}, {"files", files}});
+  const auto earlier = measurement_ ? measurement_->calibration : nullptr;
+  measurement_ = value_or_throw(measure_case(given, plan_, measurement_));
+  if (measurement_->calibration != earlier || !earlier) ++calibrations_;
+  const Digests written = value_or_throw(write_result(measurement_->result, given.folder));
+  value_or_throw(check_digests(given.folder, files));
+  record("result", {{"folder", name}, {"digest", digest_of(measurement_->result)}, {"files", written}});
+  newest_ = measurement_->result;
   if (newest_->failure) throw BadInput(*newest_->failure);
   return *newest_;
+}
+
+/// The images are others now.
+void Operation::forget_measurement() {
+  result_.reset();
+  measurement_.reset();
 }
 
 Expected<void> Operation::measure() {

@@ -12,12 +12,12 @@
 
 #include "helicarm/devices/receiver/inbox.h"
 #include "helicarm/devices/robot/robot_link.h"
+#include "helicarm/operation/case_of.h"
 #include "helicarm/operation/freehand.h"
 #include "helicarm/operation/image_delays.h"
 #include "helicarm/operation/live_tool.h"
 #include "helicarm/operation/orders.h"
 #include "helicarm/operation/plan_watch.h"
-#include "helicarm/pipeline/calibration_cache.h"
 #include "helicarm/session/session_log.h"
 #include "helicarm/xray/xray_image.h"
 
@@ -82,8 +82,8 @@ class Operation {
   /// The accepted images by view.
   std::map<std::string, std::filesystem::path> images() const;
 
-  /// Picks as in case.json; they replace those of the plan.
-  void pick(Json picks) { plan_.picks = std::move(picks); }
+  /// They replace those of the plan.
+  void pick(std::vector<pipeline::Pick> picks) { plan_.picks = std::move(picks); }
 
   /// Rectifies, calibrates, locates; fails with the refusal of the case, and (image_changed) if an image is
   /// no longer the one that was received. The calibration is kept until the next image.
@@ -92,7 +92,7 @@ class Operation {
   /// The last measurement, also a refused one.
   const std::optional<pipeline::Result>& newest_result() const { return newest_; }
   /// Number of calibrations.
-  int calibrations() const { return cache_.calibrations(); }
+  int calibrations() const { return calibrations_; }
   /// Poses at each view's acquisition, in the plan's order.
   std::vector<guidance::Poses> exposures() const;
 
@@ -193,6 +193,7 @@ class Operation {
   std::vector<robot::Miss> carry_out(const robot::RobotOrder& order, const std::string& token,
                                      const robot::Measure& measure, const robot::Watch& watch);
   TunnelOutcome check(const PlannedTunnel& tunnel);
+  void forget_measurement();
   void draw_preview(const robot::RobotOrder& order);
 
   OperationPlan plan_;
@@ -210,7 +211,9 @@ class Operation {
   std::map<std::string, Eigen::Vector3d> touched_in_bone_;  ///< first touch of each check point
   std::set<std::string> in_place_;                          ///< check points touched since the last order
   int measurements_ = 0;
-  pipeline::CalibrationCache cache_;
+  PlanFiles files_;
+  std::optional<pipeline::Measurement> measurement_;  ///< of the present images
+  int calibrations_ = 0;
   std::optional<pipeline::Result> result_, newest_;
   std::optional<tracker::HandEye> hand_eye_;
   std::map<std::string, Planned> planned_;  ///< by tunnel

@@ -9,7 +9,6 @@
 
 #include "helicarm/devices/robot/robot_registry.h"
 #include "helicarm/devices/tracker/tracker_registry.h"
-#include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/plan_fields.h"
 #include "helicarm/pipeline/poses_json.h"
@@ -21,14 +20,9 @@ constexpr const char* plan_format = "helicarm-plan/2";
 constexpr const char* earlier_plan_format = "helicarm-plan/1";
 constexpr Range millimetres{-100000, 100000};
 
-/// Orthonormalised if written with few digits; otherwise unchanged to the last bit, for replay.
 geometry::RigidTransform pose_from(JsonReader& reader, const char* key) {
-  const Eigen::Matrix4d given = geometry::matrix_from(reader, key, millimetres);
-  const geometry::RigidTransform corrected =
-      value_or_throw(geometry::rigid_transform_from(given, reader.where() + ": " + key));
-  constexpr double rounding = 1e-9;
-  return (corrected.matrix() - given).cwiseAbs().maxCoeff() > rounding ? corrected
-                                                                       : geometry::exact_pose(given);
+  return value_or_throw(pipeline::pose_as_written(geometry::matrix_from(reader, key, millimetres),
+                                                  reader.where() + ": " + key));
 }
 
 /// Within the limits that plan_fields.h sets for the key.
@@ -236,6 +230,13 @@ guidance::TrackerNoise TrackerPlan::noise() const {
   return {std::hypot(sigma_mm, mount_mm), std::hypot(sigma_deg, mount_deg), guidance::Samples::independent};
 }
 
+Expected<std::vector<pipeline::Pick>> picks_of(const OperationPlan& plan, const Json& picks,
+                                               const std::string& origin) {
+  std::vector<pipeline::CaseView> views(plan.views.size());
+  for (std::size_t i = 0; i < views.size(); ++i) views[i].name = plan.views[i];
+  return pipeline::picks_from(picks, origin, views, plan.bones);
+}
+
 Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(json, origin);
@@ -266,7 +267,8 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
     }
     if (!plan.check_points.empty() && !plan.tracker.pointer)
       reader.refuse(Reason::bad_value, "check_points", "need \"pointer\" in \"tracker\"");
-    if (const Json& picks = reader.raw("picks"); picks.is_array()) plan.picks = picks;
+    if (const Json& picks = reader.raw("picks"); !picks.is_null())
+      plan.picks = value_or_throw(picks_of(plan, picks, origin));
     for (const auto& [key, number] : {std::pair{"max_error_mm", &plan.max_error_mm},
                                       {"plan_stale_mm", &plan.limits.distance_mm},
                                       {"plan_stale_deg", &plan.limits.turn_deg},
@@ -290,6 +292,8 @@ Json to_json(const OperationPlan& plan) {
   Json check_points = Json::array();
   for (const PlannedCheck& check : plan.check_points)
     check_points.push_back({{"name", check.name}, {"bone", check.bone}, {"limit_mm", check.limit_mm}});
+  Json picks = Json::array();
+  for (const pipeline::Pick& pick : plan.picks) picks.push_back(pipeline::to_json(pick));
   return {{"format", plan_format},
           {"calibrator", plan.calibrator},
           {"plate", plan.plate ? Json(*plan.plate) : Json()},
@@ -300,7 +304,7 @@ Json to_json(const OperationPlan& plan) {
           {"drill", plan.drill ? json_of(*plan.drill) : Json()},
           {"tunnels", std::move(tunnels)},
           {"check_points", std::move(check_points)},
-          {"picks", plan.picks},
+          {"picks", std::move(picks)},
           {"max_error_mm", plan.max_error_mm},
           {"plan_stale_mm", plan.limits.distance_mm},
           {"plan_stale_deg", plan.limits.turn_deg},

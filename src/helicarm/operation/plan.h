@@ -13,6 +13,7 @@
 #include "helicarm/devices/tracker/check_point.h"
 #include "helicarm/devices/tracker/facets.h"
 #include "helicarm/guidance/poses.h"
+#include "helicarm/pipeline/case.h"
 
 namespace helicarm::operation {
 
@@ -100,14 +101,17 @@ struct OperationPlan {
   std::optional<HandDrill> drill;  ///< if given, no robot is used
   std::vector<PlannedTunnel> tunnels;
   std::vector<PlannedCheck> check_points;
-  Json picks = Json::array();  ///< as in case.json; may be set after the acquisition
-  double max_error_mm = 2;     ///< limit of a point's 95 % error for robot motion
+  std::vector<pipeline::Pick> picks;  ///< may be set after the acquisition
+  double max_error_mm = 2;            ///< limit of a point's 95 % error for robot motion
   PlanLimits limits;
 };
 
-/// Strict; fails as JsonReader, and with name_clash for two tunnels or facets of one name. Picks are checked
-/// when the case is written.
+/// Strict; fails as JsonReader and `picks_of`, and with name_clash for two tunnels or facets of one name.
 Expected<OperationPlan> plan_from(const Json& json, const std::string& origin);
 Json to_json(const OperationPlan& plan);
+
+/// Picks in the plan's views, as case.json's. Fails as `picks_from`.
+Expected<std::vector<pipeline::Pick>> picks_of(const OperationPlan& plan, const Json& picks,
+                                               const std::string& origin);
 
 }  // namespace helicarm::operation

@@ -23,13 +23,19 @@ namespace {
 constexpr std::uintmax_t most_image_bytes = std::uintmax_t{256} << 20;
 
 /// The case of an operation of an earlier version in the present form; `present` has its format and bones.
-Json case_in_present_form(const Json& recorded, const Json& present) {
+Json case_in_present_form(const Json& recorded, const Json& present, const OperationPlan& plan) {
   if (recorded.value("format", "") != "helicarm-case/1") return recorded;
   Json json = present;
   for (const auto& [key, value] : recorded.items())
     if (key != "format") json[key] = value;
   for (Json& view : json.at("views")) view.at("poses") = pipeline::in_present_form(view.at("poses"));
-  json.at("poses_now") = pipeline::in_present_form(json.at("poses_now"));
+  json.at("picks") = Json::array();
+  for (const pipeline::Pick& pick : value_or_throw(picks_of(plan, recorded.at("picks"), "case.json")))
+    json.at("picks").push_back(pipeline::to_json(pick));
+  if (present.contains("poses_now"))
+    json.at("poses_now") = pipeline::in_present_form(recorded.at("poses_now"));
+  else
+    json.erase("poses_now");
   return json;
 }
 
@@ -121,12 +127,16 @@ class Replay {
     const bool accepted = poses && std::ranges::all_of(plan_.tunnels, [&](const PlannedTunnel& tunnel) {
                             return poses->tracker_from(tunnel.bone).has_value();
                           });
-    if (accepted) views_[view] = {view, {}, digest, *poses};
+    if (!accepted) return;
+    views_[view] = {view, {}, digest, *poses};
+    measurement_.reset();
   }
 
   /// An earlier image that turned out to be delayed has no digest.
   void refused(const session::SessionRecord& record) {
-    if (!record.content.contains("picture")) views_.erase(record.content.at("view").get<std::string>());
+    if (record.content.contains("picture")) return;
+    views_.erase(record.content.at("view").get<std::string>());
+    measurement_.reset();
   }
 
   /// Digests of all files of an inbox.
@@ -177,21 +187,20 @@ class Replay {
       if (record.content.value("files", Json::object()).value(file, Json()) != Json(image.digest))
         differ(origin, fmt::format("{}/{} is not the recorded image", folder, file));
     }
-    const auto derived = guarded([&] { return derived_case(recorded); });
+    derived_.reset();
+    const auto derived =
+        guarded([&] { return derived_case(recorded, value_or_throw(path_inside(session_, folder))); });
     if (!derived) return differ(origin, fmt::format("{}: {}", name, derived.error().message));
-    compare(case_in_present_form(recorded, *derived), *derived, origin, "case");
+    derived_ = *derived;
+    const Json now_written = pipeline::to_json(*derived);
+    compare(case_in_present_form(recorded, now_written, plan_), now_written, origin, "case");
   }
 
   /// From the records before it; the picks are the user's.
-  Json derived_case(const Json& recorded) {
+  pipeline::Case derived_case(const Json& recorded, const std::filesystem::path& folder) {
     OperationPlan plan = plan_;
-    plan.picks = recorded.at("picks");
-    const auto brought = [](const std::string& planned, const Json& used) {
-      const std::string file = std::filesystem::path(planned).filename().string();
-      return used == file ? file : planned;
-    };
-    plan.calibrator = brought(plan_.calibrator, recorded.at("calibrator"));
-    if (plan_.plate) plan.plate = brought(*plan_.plate, recorded.at("plate"));
+    plan.picks = value_or_throw(picks_of(plan_, recorded.at("picks"), "case.json"));
+    const PlanFiles files = value_or_throw(files_of_case(plan_, folder));
     std::vector<CaseImage> images;
     for (const std::string& view : plan_.views)
       if (const auto taken = views_.find(view); taken != views_.end()) images.push_back(taken->second);
@@ -210,7 +219,7 @@ class Replay {
       lines.push_back(
           value_or_throw(tool_line(name, tunnel->bone, images.front().poses, now, tool->marker_from_tip)));
     }
-    return operation_case_json(plan, images, now, lines);
+    return value_or_throw(operation_case(folder, plan, files, images, now, lines));
   }
 
   void result(const session::SessionRecord& record, const std::string& origin) {
@@ -218,14 +227,16 @@ class Replay {
     const std::string folder = record.content.at("folder").get<std::string>();
     list_files(record, folder, origin);
     const std::filesystem::path inside = value_or_throw(path_inside(session_, folder));
-    const auto run = recompute_case(inside, plan_, cache_);
-    if (!run) return differ(origin, run.error().message);
-    newest_ = run->result;
+    if (!derived_) return differ(origin, fmt::format("{}: its case does not follow from the record", folder));
+    const auto measured = measure_case(*derived_, plan_, measurement_);
+    if (!measured) return differ(origin, measured.error().message);
+    measurement_ = *measured;
+    newest_ = measured->result;
     if (!verifies_) result_ = newest_;
-    if (record.content.at("digest") != run->digest)
+    if (record.content.at("digest") != digest_of(*newest_))
       differ(origin, fmt::format("{}: the result differs from the recorded one on recomputation", folder));
     const auto then = read_json(inside / "result.json");
-    const Json now = without_timing(pipeline::to_json(run->result));
+    const Json now = without_timing(pipeline::to_json(*newest_));
     if (!then) return differ(origin, then.error().message);
     if (const Json written = without_timing(*then); written != now)
       differ(origin, fmt::format("{}/result.json differs from the recomputed result{}", folder,
@@ -259,7 +270,8 @@ class Replay {
   std::optional<pipeline::Result> newest_;  ///< also of a verification
   bool verifies_ = false;                   ///< the last case is that of a verification
   std::optional<FreehandGuide> guide_;
-  pipeline::CalibrationCache cache_;
+  std::optional<pipeline::Case> derived_;             ///< of the last case record
+  std::optional<pipeline::Measurement> measurement_;  ///< of the accepted images
   OrderReplay orders_;
   std::map<std::string, CaseImage> views_;  ///< the accepted images, without their paths
   std::map<std::string, std::set<std::string>> inboxes_;

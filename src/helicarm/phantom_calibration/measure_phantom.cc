@@ -305,10 +305,8 @@ Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const Phant
                    {{"views", double(given.views.size())}, {"needed", double(least_views)}}});
   pipeline::RunOptions stages;
   stages.threads = options.threads;
-  stages.on_stage = options.on_stage;
-  stages.on_view = options.on_view;
   for (Warning& warning : sizes_stated_twice(given)) result.warnings.push_back(std::move(warning));
-  const auto detected = pipeline::detected_views(given, stages);
+  const auto detected = pipeline::detected_views(given, stages, {options.on_stage, options.on_view});
   if (!detected) return refuse(detected.error().failure);
   if (options.on_stage) options.on_stage("adjust");
   const auto begin = std::chrono::steady_clock::now();

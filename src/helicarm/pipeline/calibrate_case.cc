@@ -156,23 +156,21 @@ void add_guesses(Refusal& refusal, const Case& given, const RunOptions& options)
 }  // namespace
 
 OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options,
-                                          double least_angle_deg) {
+                                          const Progress& progress, double least_angle_deg) {
   Timing time;
-  const auto announce = [&](std::string_view name) {
-    if (options.on_stage) options.on_stage(name);
-  };
   const auto stage = [&](std::string_view name, std::optional<double>& ms, auto work) {
     return [&, name, work](auto views) {
-      announce(name);
+      progress.begin(name);
       const Stopwatch watch(ms);
-      return work(std::move(views), given, options);
+      return work(std::move(views), given, options, progress);
     };
   };
-  const auto calibrate_apart = [least_angle_deg](LabelledViews views, const Case& of, const RunOptions& how) {
+  const auto calibrate_apart = [least_angle_deg](LabelledViews views, const Case& of, const RunOptions& how,
+                                                 const Progress&) {
     return calibrate_views(std::move(views), of, how, least_angle_deg);
   };
-  announce("read");
-  return timed(time.read, [&] { return read_views(given, options); })
+  progress.begin("read");
+  return timed(time.read, [&] { return read_views(given, options, progress); })
       .and_then(stage("rectify", time.rectify, rectify_views))        // 2.1, Eq. 1-3
       .and_then(stage("detect", time.detect, detect_in_views))        // 2.1
       .and_then(stage("label", time.label, label_views))              // 2.3.4

@@ -242,7 +242,8 @@ void read_calibrator_of(Case& read, JsonReader& reader, Purpose purpose) {
       reader.refuse(Reason::bad_value, "diameters_mm", "is missing: required where \"calibrator\" is null");
     return;
   }
-  read.calibrator = value_or_throw(phantom::calibrator_named(reader.text("calibrator", 1000), read.folder));
+  read.calibrator_name = reader.text("calibrator", 1000);
+  read.calibrator = value_or_throw(phantom::calibrator_named(read.calibrator_name, read.folder));
 }
 
 std::vector<CaseView> views_from(JsonReader& reader, const Case& known, std::size_t least_views) {
@@ -277,14 +278,15 @@ void warn_of_name(Case& read) {
 Case case_of(const Json& json, const std::string& origin, const fs::path& folder, Purpose purpose) {
   JsonReader reader(json, origin);
   reader.choice("format", {"helicarm-case/2", "helicarm-case/1"});
-  reader.optional_text("notes", most_note_characters);
+  const auto notes = reader.optional_text("notes", most_note_characters);
   reader.raw("models");  // of the registration
   Case read;
   read.folder = folder;
+  read.notes = notes.value_or("");
   read.bones = bones_from(reader);
   read_calibrator_of(read, reader, purpose);
-  if (const auto plate = reader.optional_text("plate", 1000))
-    read.plate = value_or_throw(phantom::plate_named(*plate, folder));
+  read.plate_name = reader.optional_text("plate", 1000);
+  if (read.plate_name) read.plate = value_or_throw(phantom::plate_named(*read.plate_name, folder));
   read.views = views_from(reader, read, purpose == Purpose::run ? least_views_of_run : 1);
   if (!reader.raw("poses_now").is_null())
     read.poses_now = poses_from(reader.object("poses_now"), read.bones, OtherMarker::tool);
@@ -306,6 +308,74 @@ Case case_from(const fs::path& path, Purpose purpose) {
 }
 
 }  // namespace
+
+namespace {
+
+template <class T>
+void put(Json& json, const char* key, const std::optional<T>& value) {
+  if (value) json[key] = *value;
+}
+
+Json json_of(const CaseView& view, const fs::path& folder) {
+  const auto name_of = [&](const fs::path& file) { return file.lexically_relative(folder).generic_string(); };
+  Json json = {{"name", view.name}, {"image", name_of(view.image)}};
+  put(json, "frame", view.frame);
+  if (view.plate_image) json["plate_image"] = name_of(*view.plate_image);
+  if (view.map) json["map"] = name_of(*view.map);
+  put(json, "mirrored", view.mirrored);
+  put(json, "pixel_mm", view.pixel_mm);
+  put(json, "source_detector_mm", view.source_detector_mm);
+  if (!readings_of(view.poses).empty()) json["poses"] = to_json(view.poses, OtherMarker::calibrator);
+  return json;
+}
+
+Json json_of(const guidance::TrackerNoise& noise) {
+  return {{"sigma_mm", noise.sigma_mm},
+          {"sigma_deg", noise.sigma_deg},
+          {"samples", noise.samples == guidance::Samples::shared ? "shared" : "independent"}};
+}
+
+Json json_of(const verification::ToolLine& line) {
+  return {{"name", line.name},
+          {"tunnel", line.tunnel},
+          {"p1_in_calibrator", geometry::json_list(line.p1_in_calibrator)},
+          {"p2_in_calibrator", geometry::json_list(line.p2_in_calibrator)}};
+}
+
+}  // namespace
+
+Json to_json(const Case& written) {
+  Json json = {{"format", "helicarm-case/2"},
+               {"calibrator", written.calibrator_name.empty() ? Json() : Json(written.calibrator_name)},
+               {"plate", written.plate_name ? Json(*written.plate_name) : Json()},
+               {"bones", written.bones},
+               {"views", Json::array()}};
+  for (const CaseView& view : written.views) json["views"].push_back(json_of(view, written.folder));
+  if (!readings_of(written.poses_now).empty())
+    json["poses_now"] = to_json(written.poses_now, OtherMarker::tool);
+  if (written.tracker.sigma_mm > 0 || written.tracker.sigma_deg > 0)
+    json["tracker"] = json_of(written.tracker);
+  for (const char* list : {"picks", "tunnels", "tool_lines"}) json[list] = Json::array();
+  for (const Pick& pick : written.picks) json["picks"].push_back(to_json(pick));
+  for (const TunnelPlan& tunnel : written.tunnels)
+    json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
+  for (const verification::ToolLine& line : written.tool_lines) json["tool_lines"].push_back(json_of(line));
+  if (!written.diameters_mm.empty()) json["diameters_mm"] = written.diameters_mm;
+  if (!written.notes.empty()) json["notes"] = written.notes;
+  return json;
+}
+
+Expected<Case> checked_case(Case given) {
+  return guarded([&] {
+    for (const Pick& pick : given.picks)
+      if (find_named(given.calibrator.targets, pick.name, &phantom::CalibratorTarget::name))
+        throw BadInput(Reason::name_clash,
+                       fmt::format("pick \"{}\": is the name of a target of the calibrator", pick.name));
+    refuse_metres(given);
+    warn_of_name(given);
+    return std::move(given);
+  });
+}
 
 Json to_json(const Pick& pick) {
   Json json = {{"name", pick.name}, {"view", pick.view}, {"uv", geometry::json_list(pick.uv_raw)}};

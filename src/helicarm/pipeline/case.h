@@ -71,7 +71,9 @@ struct TunnelPlan {
 /// Input of `helicarm run`: case.json and the files it names (docs/formats.md).
 struct Case {
   std::filesystem::path folder;
+  std::string calibrator_name;  ///< of a built-in, or a file in the folder; empty: none
   phantom::Calibrator calibrator;
+  std::optional<std::string> plate_name;                       ///< likewise
   std::optional<phantom::Plate> plate;                         ///< nothing: flat panel
   std::vector<guidance::Bone> bones = guidance::knee_bones();  ///< that markers may follow
   std::vector<CaseView> views;
@@ -81,12 +83,20 @@ struct Case {
   std::vector<TunnelPlan> tunnels;
   std::vector<verification::ToolLine> tool_lines;
   std::vector<double> diameters_mm;  ///< of the fiducials of a phantom without a file
+  std::string notes;
   std::vector<Warning> warnings;
 };
 
 /// Reads a case from its folder or its case.json, with the calibrator and plate that it names; images are not
 /// read. Fails with missing_file, bad_json, not_finite, unknown_key, path_outside, name_clash or bad_value.
 Expected<Case> read_case(const std::filesystem::path& path);
+
+/// case.json, the inverse of `read_case`. Its images, calibrator and plate must lie in the folder.
+Json to_json(const Case& written);
+
+/// What `read_case` checks of values that do not come from a file: poses that look like metres and picks
+/// named as targets are refused (bad_value, name_clash); adds the warnings.
+Expected<Case> checked_case(Case given);
 
 /// The case.json of a case given by its folder or by that file, and its folder.
 std::filesystem::path case_file(const std::filesystem::path& path);

@@ -12,8 +12,8 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/measure.h"
 #include "helicarm/pipeline/poses_json.h"
-#include "helicarm/pipeline/run_case.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/xray/derived_image.h"
 
@@ -238,7 +238,7 @@ std::string line_of(const char* kind, const Failure& failure) {
 
 /// result.json of the bundled case without times, which differ from run to run.
 Json measured(const Case& bundled, const RunOptions& options, std::string& log) {
-  const Result result = value_or_throw(run_case(bundled, options));
+  const Result result = value_or_throw(measure(bundled, options)).result;
   if (result.failure) log += line_of("refused", *result.failure);
   for (const Warning& warning : result.warnings) log += line_of("warning", warning);
   Json json = to_json(result);

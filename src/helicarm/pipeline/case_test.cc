@@ -63,6 +63,32 @@ TEST_F(CaseFile, PixelSizeAndSourceDistanceOfAViewAreRead) {
   EXPECT_EQ(failure().reason, Reason::bad_value);
 }
 
+TEST_F(CaseFile, WrittenCaseReadsBackEqual) {
+  json_["bones"] = {"L4", "pelvis"};
+  for (Json& pick : json_["picks"]) pick.erase("moves_with");
+  json_["picks"][2].update({{"moves_with", "L4"}, {"bone", {{"name", "vertebra"}, {"side", "left"}}}});
+  json_["notes"] = "lumbar spine";
+  const Json pose = Json::parse("[[0,-1,0,105.25],[1,0,0,6],[0,0,1,700],[0,0,0,1]]");
+  json_["views"][0].update(
+      {{"mirrored", true}, {"pixel_mm", 0.21}, {"source_detector_mm", 1000}, {"map", "m/AP.json"}});
+  json_["views"][1].update(
+      {{"plate_image", "grid/LAT.dcm"},
+       {"poses", {{"tracker_from_calibrator", pose}, {"tracker_from_bone", {{"L4", pose}}}}}});
+  json_["poses_now"] = {{"tracker_from_bone", {{"pelvis", pose}}}, {"tracker_from_tool", pose}};
+  json_["tracker"] = {{"sigma_mm", 0.1}, {"sigma_deg", 0}, {"samples", "shared"}};
+  const auto first = read();
+  ASSERT_TRUE(first) << first.error().message;
+  const Json written = to_json(*first);
+  EXPECT_EQ(written["views"][1]["poses"]["tracker_from_bone"]["L4"], pose);
+  EXPECT_EQ(written["views"][0]["map"], "m/AP.json");
+  EXPECT_EQ(written["picks"][2]["bone"]["side"], "left");
+  EXPECT_EQ(written["tracker"]["samples"], "shared");
+  json_ = written;
+  const auto second = read();
+  ASSERT_TRUE(second) << second.error().message;
+  EXPECT_EQ(to_json(*second), written);
+}
+
 TEST_F(CaseFile, NotesAreIgnoredAndMirroredIsRead) {
   json_["notes"] = "left knee of the phantom";
   json_["views"][1]["mirrored"] = true;

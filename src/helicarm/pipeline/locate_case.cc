@@ -90,10 +90,10 @@ Expected<void> check_tunnel_ends(const Case& given) {
 
 }  // namespace
 
-Expected<Result> locate_case(const Case& given, const CaseCalibration& calibration,
-                             const RunOptions& options) {
+Expected<Result> locate_case(const Case& given, const CaseCalibration& calibration, const RunOptions& options,
+                             const Progress& progress) {
   if (auto valid = check_tunnel_ends(given); !valid) return tl::unexpected<Failure>(std::move(valid).error());
-  if (options.on_stage) options.on_stage("locate");
+  progress.begin("locate");
   Result result = initial_result(given, calibration, options);
   const auto located = timed(result.timing_ms.locate, [&] {
     return observe_points(given, calibration, options.threads).map([&](std::vector<PointResult> points) {

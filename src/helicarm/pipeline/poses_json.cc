@@ -30,8 +30,7 @@ std::optional<geometry::RigidTransform> pose_from(JsonReader& reader, const std:
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
   for (std::size_t i = 0; i < numbers.size(); ++i)
     matrix(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) = numbers[i];
-  return value_or_throw(
-      geometry::rigid_transform_from(matrix, fmt::format("{}: \"{}\"", reader.where(), key)));
+  return value_or_throw(pose_as_written(matrix, fmt::format("{}: \"{}\"", reader.where(), key)));
 }
 
 Json pose_json(const std::optional<geometry::RigidTransform>& pose) {
@@ -95,6 +94,14 @@ guidance::Poses poses_from(JsonReader reader, const std::vector<guidance::Bone>&
   if (by_name) by_name->finish();
   reader.finish();
   return poses;
+}
+
+Expected<geometry::RigidTransform> pose_as_written(const Eigen::Matrix4d& matrix, const std::string& what) {
+  constexpr double rounding = 1e-9;
+  return geometry::rigid_transform_from(matrix, what).map([&](const geometry::RigidTransform& corrected) {
+    return (corrected.matrix() - matrix).cwiseAbs().maxCoeff() > rounding ? corrected
+                                                                          : geometry::exact_pose(matrix);
+  });
 }
 
 Json to_json(const guidance::Poses& poses) {

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -35,10 +33,6 @@ struct RunOptions {
   std::optional<calibration::CArmHistory> history = {};  ///< C-arm history, used as prior
   /// Motion of an untracked bone between the acquisitions, per axis; in the covariance of its points.
   double motion_sigma_mm = 0;
-  /// Called before each stage, in the calling thread, with its name as in Timing. An exception ends the run.
-  std::function<void(std::string_view stage)> on_stage = {};
-  /// Called before each view of a stage, in the thread that works on it. An exception ends the run.
-  std::function<void()> on_view = {};
 };
 
 /// Results of the stages for one view; absent if not reached.

@@ -16,11 +16,11 @@ namespace {
 
 /// A stage's result for each view, or its failure.
 template <class Work>
-auto of_each(std::size_t count, const RunOptions& options, Work&& work) {
+auto of_each(std::size_t count, const RunOptions& options, const Progress& progress, Work&& work) {
   using Given = std::invoke_result_t<Work, std::size_t>;
   std::vector<Given> given(count, Given(tl::unexpect, Failure{Reason::interrupted, {}}));
   parallel_for(count, options.threads, [&](std::size_t i) {
-    if (options.on_view) options.on_view();
+    if (progress.view) progress.view();
     given[i] = work(i);
   });
   return given;
@@ -154,10 +154,11 @@ Expected<void> check_images_belong_together(const std::vector<ReadView>& views) 
   return {};
 }
 
-OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions& options) {
+OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions& options,
+                                            const Progress& progress) {
   std::vector<NamedView> views;
   for (const CaseView& view : given.views) views.push_back({view.name});
-  auto images = of_each(views.size(), options, [&](std::size_t i) {
+  auto images = of_each(views.size(), options, progress, [&](std::size_t i) {
     return image_of(given.views[i]).map([](xray::XrayImage xray_image) {
       return std::make_shared<const xray::XrayImage>(std::move(xray_image));
     });
@@ -173,31 +174,33 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
 }
 
 OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views, const Case& given,
-                                                    const RunOptions& options) {
-  auto rectified = of_each(views.size(), options, [&](std::size_t i) {
+                                                    const RunOptions& options, const Progress& progress) {
+  auto rectified = of_each(views.size(), options, progress, [&](std::size_t i) {
     return rectify_view(*views[i].xray_image, given.views[i], given.plate, options.method);
   });
   return joined<RectifiedView>(std::move(views), std::move(rectified));
 }
 
 OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case& given,
-                                                     const RunOptions& options) {
-  auto candidates = of_each(views.size(), options, [&](std::size_t i) -> Expected<fiducials::Candidates> {
-    return fiducials::detect_candidates(*views[i].xray_image, views[i].rectification,
-                                        least_radius_px(given, views[i].rectification.map));
-  });
+                                                     const RunOptions& options, const Progress& progress) {
+  auto candidates =
+      of_each(views.size(), options, progress, [&](std::size_t i) -> Expected<fiducials::Candidates> {
+        return fiducials::detect_candidates(*views[i].xray_image, views[i].rectification,
+                                            least_radius_px(given, views[i].rectification.map));
+      });
   return joined<DetectedView>(std::move(views), std::move(candidates));
 }
 
-OrRefusal<std::vector<DetectedView>> detected_views(const Case& given, const RunOptions& options) {
+OrRefusal<std::vector<DetectedView>> detected_views(const Case& given, const RunOptions& options,
+                                                    const Progress& progress) {
   const auto stage = [&](std::string_view name, auto work) {
     return [&, name, work](auto views) {
-      if (options.on_stage) options.on_stage(name);
-      return work(std::move(views), given, options);
+      progress.begin(name);
+      return work(std::move(views), given, options, progress);
     };
   };
-  if (options.on_stage) options.on_stage("read");
-  return read_views(given, options)
+  progress.begin("read");
+  return read_views(given, options, progress)
       .and_then(stage("rectify", rectify_views))
       .and_then(stage("detect", detect_in_views));
 }
@@ -212,7 +215,7 @@ calibration::ViewFiducials fiducials_of(const LabelledView& view) {
 }
 
 OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views, const Case& given,
-                                                 const RunOptions& options) {
+                                                 const RunOptions& options, const Progress& progress) {
   const auto label = [&](std::size_t i, std::optional<double> radius_bias) {
     const fiducials::FiducialOptions how{options.method, radius_bias, given.views[i].mirrored};
     auto labels = fiducials::label_fiducials(*views[i].xray_image, views[i].rectification,
@@ -224,9 +227,9 @@ OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views
                     "plate's file");
     return labels;
   };
-  auto labels = of_each(views.size(), options, [&](std::size_t i) { return label(i, {}); });
+  auto labels = of_each(views.size(), options, progress, [&](std::size_t i) { return label(i, {}); });
   if (const auto radius_bias = common_radius_bias(labels))
-    labels = of_each(views.size(), options, [&](std::size_t i) {
+    labels = of_each(views.size(), options, progress, [&](std::size_t i) {
       return is_ambiguous(labels[i]) ? label(i, radius_bias) : std::move(labels[i]);
     });
   return joined<LabelledView>(std::move(views), std::move(labels));

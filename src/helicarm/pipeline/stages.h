@@ -9,6 +9,7 @@
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/fiducials/label_fiducials.h"
 #include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/progress.h"
 #include "helicarm/pipeline/result.h"
 
 namespace helicarm::pipeline {
@@ -48,21 +49,24 @@ using OrRefusal = tl::expected<T, Refusal>;
 
 /// Reads the image files. Refuses `patient_mismatch` for images of different patients or studies, and
 /// `views_too_close` for two copies of one image; fails as `read_xray_image`.
-OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions& options);
+OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions& options,
+                                            const Progress& progress = {});
 
 /// As `read_views` refuses.
 Expected<void> check_images_belong_together(const std::vector<ReadView>& views);
 
 /// 2.1, Eq. 1-3: by the plate in the image, a separate plate image, a known map, or none (flat panel).
 OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views, const Case& given,
-                                                    const RunOptions& options);
+                                                    const RunOptions& options, const Progress& progress = {});
 
 /// 2.1: candidates, once per image.
 OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case& given,
-                                                     const RunOptions& options);
+                                                     const RunOptions& options,
+                                                     const Progress& progress = {});
 
-/// These three stages, announced by `on_stage`.
-OrRefusal<std::vector<DetectedView>> detected_views(const Case& given, const RunOptions& options);
+/// These three stages, announced by `progress`.
+OrRefusal<std::vector<DetectedView>> detected_views(const Case& given, const RunOptions& options,
+                                                    const Progress& progress = {});
 
 /// The calibration's input from a labelled view.
 calibration::ViewFiducials fiducials_of(const LabelledView& view);
@@ -70,6 +74,6 @@ calibration::ViewFiducials fiducials_of(const LabelledView& view);
 /// 2.3.4. Ambiguous labels of a view are tried again with the radius bias of the view with the largest
 /// margin.
 OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views, const Case& given,
-                                                 const RunOptions& options);
+                                                 const RunOptions& options, const Progress& progress = {});
 
 }  // namespace helicarm::pipeline

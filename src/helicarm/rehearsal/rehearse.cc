@@ -34,16 +34,17 @@ constexpr double drill_sigma_mm = 0.1;
 constexpr double kept_sigma_mm = 0.114;
 constexpr double kept_sigma_deg = 0.03;
 
-Json clicks_of(const simulation::SimulatedCase& virtual_or) {
-  Json picks = Json::array();
+std::vector<pipeline::Pick> clicks_of(const simulation::SimulatedCase& virtual_or) {
+  std::vector<pipeline::Pick> picks;
   for (const simulation::SimulatedView& view : virtual_or.views)
     for (std::size_t i = 0; i < view.clicks.size(); ++i)
-      picks.push_back({{"name", view.clicks[i].point},
-                       {"view", view.true_view.name},
-                       {"uv", geometry::json_list(view.clicks[i].raw)},
-                       {"snap", "ball"},
-                       {"diameter_mm", simulation::tunnel_ball_mm},
-                       {"moves_with", virtual_or.navigation->points[i].bone}});
+      picks.push_back({.name = view.clicks[i].point,
+                       .view = view.true_view.name,
+                       .uv_raw = view.clicks[i].raw,
+                       .snap = pipeline::Snap::ball,
+                       .diameter_mm = simulation::tunnel_ball_mm,
+                       .sigma_px = {},
+                       .moves_with = virtual_or.navigation->points[i].bone});
   return picks;
 }
 

@@ -16,7 +16,7 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/pipeline/case.h"
-#include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/measure.h"
 #include "helicarm/simulation/calibrator_body.h"
 #include "helicarm/simulation/knee.h"
 #include "helicarm/simulation/streams.h"
@@ -95,7 +95,7 @@ BiplaneImageTest biplane_test_of(const pipeline::Case& given, const phantom::Cal
   pipeline::RunOptions options;
   options.method = method;
   options.threads = 1;
-  const pipeline::Result result = value_or_throw(pipeline::run_case(given, options));
+  const pipeline::Result result = value_or_throw(pipeline::measure(given, options)).result;
   if (result.failure) return {1, no_errors, no_errors, no_errors};
   std::vector<double> fre, centre, on_udcsc;
   for (const pipeline::ViewResult& view : result.views)

@@ -9,7 +9,7 @@
 
 #include "helicarm/core/random.h"
 #include "helicarm/pipeline/case.h"
-#include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/measure.h"
 #include "helicarm/report/chart.h"
 #include "helicarm/simulation/calibrator_body.h"
 #include "helicarm/simulation/simulate_case.h"
@@ -62,7 +62,7 @@ CalibrationTest measured(const pipeline::Case& given, const phantom::Calibrator&
   pipeline::RunOptions options;
   options.method = method;
   options.threads = 1;
-  const pipeline::Result result = value_or_throw(pipeline::run_case(given, options));
+  const pipeline::Result result = value_or_throw(pipeline::measure(given, options)).result;
   if (result.failure) return test;
   test.refused = 0;
   const localization::Statistics& fre = result.accuracy.fre_mm;

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/measure.h"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "helicarm/pipeline/calibration_cache.h"
 #include "helicarm/pipeline/causes.h"
 #include "helicarm/pipeline/locate_case.h"
 #include "helicarm/pipeline/outcome.h"
@@ -15,6 +14,10 @@
 
 namespace helicarm::pipeline {
 namespace {
+
+Expected<Result> result_of(const Case& given, const RunOptions& options, const Progress& progress = {}) {
+  return measure(given, options, progress).map([](Measurement measured) { return std::move(measured.result); });
+}
 
 /// One simulated case for all tests: 512 x 512 pixels, tunnels, tracker and tool lines.
 class SimulatedNavigation : public testing::Test {
@@ -50,7 +53,7 @@ TEST_F(SimulatedNavigation, TunnelThatHasLostAnEndsPicksIsRefused) {
 }
 
 TEST_F(SimulatedNavigation, TunnelsAreMeasuredWithinTheirConfidenceRegions) {
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_TRUE(result.has_value()) << result.error().message;
   ASSERT_FALSE(result->failure) << result->failure->message;
   for (const simulation::TunnelPoint& real : truth_.navigation->points) {
@@ -73,7 +76,7 @@ const Warning* find_reason(const std::vector<Warning>& warnings, Reason reason) 
 
 TEST_F(SimulatedNavigation, MirroredCalibratorFileIsRefused) {
   for (phantom::CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_TRUE(result.has_value());
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::ambiguous_handedness);
@@ -83,20 +86,20 @@ TEST_F(SimulatedNavigation, MirroredCalibratorFileIsRefused) {
 TEST_F(SimulatedNavigation, MirroredCalibratorFileThatACaseStatesToBeMirroredImagesIsNoted) {
   for (phantom::CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
   for (CaseView& view : given_.views) view.mirrored = true;
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_TRUE(result.has_value());
   ASSERT_FALSE(result->failure) << result->failure->message;
   EXPECT_TRUE(find_reason(result->notes, Reason::ambiguous_handedness));
 }
 
 TEST_F(SimulatedNavigation, ImagesThatAreNotMirroredHaveNoNoteOfHandedness) {
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_TRUE(result.has_value());
   EXPECT_FALSE(find_reason(result->notes, Reason::ambiguous_handedness));
 }
 
 TEST_F(SimulatedNavigation, ScaledCalibratorIsWarnedOf) {
-  const auto untouched = run_case(given_, {});
+  const auto untouched = result_of(given_, {});
   ASSERT_TRUE(untouched.has_value());
   EXPECT_FALSE(find_reason(untouched->warnings, Reason::scale_disagrees));
   const Warning* note = find_reason(untouched->notes, Reason::scale_unverified);
@@ -105,14 +108,14 @@ TEST_F(SimulatedNavigation, ScaledCalibratorIsWarnedOf) {
   EXPECT_GT(note->figures.at("source_distance_mm AP"), 300);
 
   for (phantom::CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator *= 1.07;
-  const auto scaled = run_case(given_, {});
+  const auto scaled = result_of(given_, {});
   ASSERT_TRUE(scaled.has_value());
   const Warning* warning = find_reason(scaled->warnings, Reason::scale_disagrees);
   ASSERT_TRUE(warning);
   EXPECT_NEAR(warning->figures.at("file_over_true") / note->figures.at("file_over_true"), 1.07, 0.01);
 
   given_.calibrator.scale_sigma = 0.001;
-  const auto measured = run_case(given_, {});
+  const auto measured = result_of(given_, {});
   ASSERT_TRUE(measured.has_value());
   EXPECT_FALSE(find_reason(measured->notes, Reason::scale_unverified));
 }
@@ -121,7 +124,7 @@ TEST_F(SimulatedNavigation, DisplacedBallIsWarnedOf) {
   phantom::CalibratorBall& ball = given_.calibrator.balls[4];
   const Eigen::Vector3d seen = ball.centre_in_calibrator;
   ball.centre_in_calibrator += Eigen::Vector3d(1.5, -1, 1.2);
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_TRUE(result.has_value());
   ASSERT_FALSE(result->failure) << result->failure->message;
   const Warning* warning = find_reason(result->warnings, Reason::ball_displaced);
@@ -134,66 +137,74 @@ TEST_F(SimulatedNavigation, DisplacedBallIsWarnedOf) {
 
 TEST_F(SimulatedNavigation, StagesAreAnnouncedInOrderAndMayBeStopped) {
   std::vector<std::string> stages;
-  RunOptions options;
-  options.on_stage = [&](std::string_view stage) { stages.emplace_back(stage); };
-  ASSERT_TRUE(run_case(given_, options).has_value());
+  Progress progress;
+  progress.stage = [&](std::string_view stage) { stages.emplace_back(stage); };
+  ASSERT_TRUE(result_of(given_, {}, progress).has_value());
   EXPECT_EQ(stages, (std::vector<std::string>{"read", "rectify", "detect", "label", "calibrate", "locate"}));
-  options.on_stage = [&](std::string_view stage) {
+  progress.stage = [&](std::string_view stage) {
     if (stage == "rectify") throw std::runtime_error("stopped");
   };
-  EXPECT_THROW((void)run_case(given_, options), std::runtime_error);
+  EXPECT_THROW((void)result_of(given_, {}, progress), std::runtime_error);
 }
 
-TEST_F(SimulatedNavigation, CachedCalibrationGivesTheSameResult) {
-  CalibrationCache cache;
+Json without_timing(const Result& result) {
+  Json json = to_json(result);
+  json.erase("timing_ms");
+  return json;
+}
+
+TEST_F(SimulatedNavigation, MeasuredAgainEqualsMeasuredAtOnce) {
   Case picked_later = given_;
   picked_later.picks.clear();
   picked_later.tunnels.clear();
   picked_later.tool_lines.clear();
-  ASSERT_TRUE(cache.run(picked_later, {}));
-  const auto held = cache.run(given_, {});
-  const auto whole = run_case(given_, {});
-  ASSERT_TRUE(held && whole);
-  const auto without_timing = [](const Result& result) {
-    Json json = to_json(result);
-    json.erase("timing_ms");
-    return json;
-  };
-  EXPECT_EQ(without_timing(*held), without_timing(*whole));
-  EXPECT_EQ(cache.calibrations(), 1);
+  const auto earlier = measure(picked_later, {});
+  ASSERT_TRUE(earlier);
+  const auto again = measure_again(*earlier, given_, {});
+  const auto whole = measure(given_, {});
+  ASSERT_TRUE(again && whole);
+  EXPECT_EQ(again->calibration, earlier->calibration);
+  EXPECT_EQ(without_timing(again->result), without_timing(whole->result));
 }
 
-TEST_F(SimulatedNavigation, OtherImageOrCalibratorIsCalibratedAgain) {
-  CalibrationCache cache;
-  ASSERT_TRUE(cache.run(given_, {}));
-  given_.calibrator.tolerance_mm = 0.01;
-  ASSERT_TRUE(cache.run(given_, {}));
-  EXPECT_EQ(cache.calibrations(), 2);
-  std::swap(given_.views[0].image, given_.views[1].image);
-  ASSERT_TRUE(cache.run(given_, {}));
-  EXPECT_EQ(cache.calibrations(), 3);
-  given_.views[0].source_detector_mm = 1;  // of another C-arm: refused, not taken from the cache
-  const auto contradicted = cache.run(given_, {});
-  EXPECT_TRUE(!contradicted || contradicted->failure);
-  EXPECT_EQ(cache.calibrations(), 4);
+TEST_F(SimulatedNavigation, AnotherMethodIsCalibratedAgain) {
+  const auto earlier = measure(given_, {});
+  ASSERT_TRUE(earlier);
+  RunOptions paper;
+  paper.method = rectification::Method::paper;
+  const auto again = measure_again(*earlier, given_, paper);
+  ASSERT_TRUE(again);
+  EXPECT_NE(again->calibration, earlier->calibration);
+  EXPECT_EQ(without_timing(again->result), without_timing(measure(given_, paper)->result));
+}
+
+TEST_F(SimulatedNavigation, AHistoryIsCalibratedAgain) {
+  const auto earlier = measure(given_, {});
+  ASSERT_TRUE(earlier);
+  RunOptions by_history;
+  by_history.history = calibration::CArmHistory{};
+  const auto again = measure_again(*earlier, given_, by_history);
+  ASSERT_TRUE(again);
+  EXPECT_NE(again->calibration, earlier->calibration);
+  EXPECT_TRUE(again->result.history);
 }
 
 TEST_F(SimulatedNavigation, KnownHandednessIsTheOnlyOneTried) {
   for (CaseView& view : given_.views) view.mirrored = false;
-  const auto right = run_case(given_, {});
+  const auto right = result_of(given_, {});
   ASSERT_TRUE(right.has_value());
   EXPECT_FALSE(right->failure);
   given_.views[0].mirrored = true;
-  const auto wrong = run_case(given_, {});
+  const auto wrong = result_of(given_, {});
   ASSERT_TRUE(wrong.has_value());
   ASSERT_TRUE(wrong->failure);
   EXPECT_EQ(wrong->failure->view, "AP");
 }
 
 TEST_F(SimulatedNavigation, ScaleErrorIsInEveryCovariance) {
-  const auto exact = run_case(given_, {});
+  const auto exact = result_of(given_, {});
   given_.calibrator.scale_sigma = 0.01;
-  const auto scaled = run_case(given_, {});
+  const auto scaled = result_of(given_, {});
   ASSERT_TRUE(exact && scaled);
   for (std::size_t i = 0; i < exact->points.size(); ++i) {
     const auto& place = exact->points[i].place;
@@ -208,15 +219,15 @@ TEST_F(SimulatedNavigation, ScaleErrorIsInEveryCovariance) {
 }
 
 TEST_F(SimulatedNavigation, ResultDoesNotDependOnTheThreads) {
-  const auto one = run_case(given_, {rectification::Method::best, {}, 1});
-  const auto two = run_case(given_, {rectification::Method::best, {}, 2});
+  const auto one = result_of(given_, {rectification::Method::best, {}, 1});
+  const auto two = result_of(given_, {rectification::Method::best, {}, 2});
   for (std::size_t i = 0; i < one->points.size(); ++i)
     EXPECT_EQ(one->points[i].place->in_calibrator, two->points[i].place->in_calibrator);
 }
 
 TEST_F(SimulatedNavigation, SameImageTwiceIsRefused) {
   given_.views[1].image = given_.views[0].image;
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_TRUE(result.has_value());
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::views_too_close);
@@ -252,7 +263,7 @@ TEST(CheckImages, DifferentImagesOfOneUidAreAcceptedWithAWarning) {
 
 TEST_F(SimulatedNavigation, PlateOfTheOtherKindIsRefused) {
   given_.plate->kind = phantom::DotKind::holes;
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_TRUE(result.has_value());
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::plate_mismatch) << result->failure->message;
@@ -262,12 +273,12 @@ TEST_F(SimulatedNavigation, ExchangedImagesAreWarnedOf) {
   const auto named = [](const Result& result) {
     return std::ranges::count(result.warnings, Reason::tag_disagrees, &Warning::reason);
   };
-  EXPECT_EQ(named(*run_case(given_, {})), 0);
+  EXPECT_EQ(named(*result_of(given_, {})), 0);
   std::swap(given_.views[0].image, given_.views[1].image);
   given_.picks.clear();
   given_.tunnels.clear();
   given_.tool_lines.clear();
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_TRUE(result.has_value());
   EXPECT_EQ(named(*result), 2);
 }
@@ -282,7 +293,7 @@ TEST_F(SimulatedNavigation, WrongSourceDistanceIsRefusedWithTheOneThatFits) {
       given_.views[i].image = folder_ / (given_.views[i].name + "_wrong_distance.dcm");
       ASSERT_TRUE(xray::write_dicom(given_.views[i].image, image));
     }
-    const auto result = run_case(given_, {});
+    const auto result = result_of(given_, {});
     ASSERT_TRUE(result && result->failure) << factor;
     const Failure& failure = *result->failure;
     EXPECT_EQ(failure.reason, Reason::calibrator_mismatch) << failure.message;
@@ -311,13 +322,13 @@ TEST_F(SimulatedNavigation, RefusalThatNoTagExplainsIsUnchanged) {
   given_.calibrator = *phantom::calibrator_named("udcsc", folder_);
   for (phantom::CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
   for (CaseView& view : given_.views) view.mirrored = false;
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_TRUE(result && result->failure);
   EXPECT_FALSE(result->failure->figures.contains("fitting_source_detector_mm")) << result->failure->message;
 }
 
 TEST_F(SimulatedNavigation, LimitOnTheErrorRefusesButKeepsThePoints) {
-  const auto result = run_case(given_, {rectification::Method::best, 1e-4, 0});
+  const auto result = result_of(given_, {rectification::Method::best, 1e-4, 0});
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::uncertain);
   EXPECT_FALSE(result->points.empty());
@@ -325,14 +336,14 @@ TEST_F(SimulatedNavigation, LimitOnTheErrorRefusesButKeepsThePoints) {
 
 TEST_F(SimulatedNavigation, TunnelFromAPointToItselfIsRefused) {
   given_.tunnels[0].end = given_.tunnels[0].start;
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::bad_tunnel);
 }
 
 TEST_F(SimulatedNavigation, ClickOutsideTheImageIsBadInput) {
   given_.picks[0].uv_raw = {700, 100};
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_FALSE(result.has_value());
   EXPECT_EQ(result.error().reason, Reason::bad_value);
   EXPECT_EQ(result.error().view, given_.picks[0].view);
@@ -340,7 +351,7 @@ TEST_F(SimulatedNavigation, ClickOutsideTheImageIsBadInput) {
 
 TEST_F(SimulatedNavigation, MissingImageIsBadInput) {
   given_.views[1].image = folder_ / "nowhere.dcm";
-  const auto result = run_case(given_, {});
+  const auto result = result_of(given_, {});
   ASSERT_FALSE(result.has_value());
   EXPECT_EQ(result.error().reason, Reason::missing_file);
   EXPECT_EQ(result.error().view, "LAT");

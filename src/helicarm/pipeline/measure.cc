@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/measure.h"
+
+#include <algorithm>
+
+#include "helicarm/pipeline/locate_case.h"
+#include "helicarm/pipeline/stopwatch.h"
+
+namespace helicarm::pipeline {
+namespace {
+
+/// With the wall-clock time of `work`.
+template <class Work>
+Expected<Measurement> in_total(Work work) {
+  std::optional<double> total;
+  auto done = timed(total, work);
+  if (done) done->result.timing_ms.total = total;
+  return done;
+}
+
+Expected<Measurement> located(const Case& given, std::shared_ptr<const CaseCalibration> calibration,
+                              const RunOptions& options, const Progress& progress) {
+  return locate_case(given, *calibration, options, progress).map([&](Result result) {
+    return Measurement{std::move(calibration), std::move(result)};
+  });
+}
+
+}  // namespace
+
+Expected<Measurement> measure(const Case& given, const RunOptions& options, const Progress& progress) {
+  return in_total([&]() -> Expected<Measurement> {
+    auto calibration = calibrate_case(given, options, progress);
+    if (!calibration)
+      return result_of_refusal(given, std::move(calibration).error(), options).map([](Result result) {
+        return Measurement{nullptr, std::move(result)};
+      });
+    return located(given, std::make_shared<const CaseCalibration>(*std::move(calibration)), options,
+                   progress);
+  });
+}
+
+Expected<Measurement> measure_again(const Measurement& earlier, const Case& changed,
+                                    const RunOptions& options, const Progress& progress) {
+  if (!earlier.calibration || !ask_for_one_calibration(earlier.result.options, options))
+    return measure(changed, options, progress);
+  return in_total([&] { return located(changed, earlier.calibration, options, progress); });
+}
+
+bool ask_for_one_calibration(const RunOptions& a, const RunOptions& b) {
+  const auto same = [](const calibration::HistoryEntry& one, const calibration::HistoryEntry& other) {
+    return one.image == other.image && one.estimate_mm == other.estimate_mm &&
+           one.information == other.information;
+  };
+  return a.method == b.method && a.history.has_value() == b.history.has_value() &&
+         (!a.history || std::ranges::equal(a.history->entries, b.history->entries, same));
+}
+
+}  // namespace helicarm::pipeline

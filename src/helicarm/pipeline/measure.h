@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "helicarm/pipeline/calibrate_case.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/result.h"
+
+namespace helicarm::pipeline {
+
+/// A case's calibration, and what follows from it.
+struct Measurement {
+  std::shared_ptr<const CaseCalibration> calibration;  ///< null: refused before
+  Result result;
+};
+
+/// The paper's method from images to tunnels. A refusal is in `Result::failure`, with all results before it;
+/// unreadable input (exit code 2) fails.
+Expected<Measurement> measure(const Case& given, const RunOptions& options, const Progress& progress = {});
+
+/// As `measure`, of the same images, calibrator and plate, by the earlier calibration: picks, tunnels, tool
+/// lines, present poses and the tracker's noise may differ. Calibrates again where there is no calibration,
+/// or one by another method or C-arm history than `options` ask for.
+Expected<Measurement> measure_again(const Measurement& earlier, const Case& changed,
+                                    const RunOptions& options, const Progress& progress = {});
+
+/// Whether a calibration by the one options serves the others.
+bool ask_for_one_calibration(const RunOptions& a, const RunOptions& b);
+
+}  // namespace helicarm::pipeline
