@@ -18,7 +18,8 @@ void add_new(CLI::App& app, Action& action) {
   auto& a = arguments_of(command, action, new_command);
   command
       ->add_option("IMAGE", a.images,
-                   "[VIEW=]FILE[:FRAME], two or more: DICOM, PNG, TIFF, JPEG or BMP. Without VIEW the views "
+                   "[VIEW=]FILE[:FRAME]; points need two or more: DICOM, PNG, TIFF, JPEG or BMP. Without "
+                   "VIEW the views "
                    "are AP and LAT "
                    "by their positioner angles, or named as the files")
       ->required();

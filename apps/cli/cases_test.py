@@ -43,7 +43,7 @@ class OwnFiles(SimulatedCase):
 
     def test_new_names_the_option_that_is_missing_and_writes_nothing(self):
         out = self.root / "open"
-        for words, said in ((self.images, "--calibrator"), (self.images[:1], "two or more")):
+        for words, said in ((self.images, "--calibrator"), ([], "IMAGE")):
             done = run("new", *words, "--out", out)
             self.assertEqual(done.returncode, 2)
             self.assertIn(said, done.stderr)

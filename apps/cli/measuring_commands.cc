@@ -28,7 +28,8 @@ void add_motion(CLI::App* command, double& motion_sigma_mm) {
 
 void add_run(CLI::App& app, Action& action) {
   auto* command = add_command(
-      app, "run", "Measure a case: points and tunnels with covariances from two or more X-ray images",
+      app, "run",
+      "Measure a case: cameras with covariances from X-ray images, and from two or more points and tunnels",
       "helicarm run my-case --out my-result\n"
       "  helicarm run study/* --out results    each case in results/NAME, all in results/summary.csv");
   auto& [cases, a] = arguments_of(command, action, run_cases_command);

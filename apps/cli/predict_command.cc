@@ -74,6 +74,9 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
     std::vector<Eigen::Vector3d> places;
     for (const std::string& word : arguments.at) places.push_back(place_from(word));
     const pipeline::Case given = value_or_throw(pipeline::read_case(arguments.folder));
+    if (given.views.size() < 2)
+      throw BadInput(Reason::too_few_views,
+                     "one view locates no point: the case needs a second view, of another direction");
     const Eigen::Vector3d middle = phantom::middle_of(given.calibrator);
     if (places.empty()) places.push_back(middle);
     pipeline::RunOptions options;

@@ -283,7 +283,7 @@ void add_cases(py::module_& module) {
       py::arg("max_error_mm") = usual.max_error_mm, py::arg("motion_sigma_mm") = usual.motion_sigma_mm,
       py::arg("search_mm") = searched.search.shift_mm, py::arg("search_deg") = searched.search.turn_deg,
       py::arg("threads") = usual.threads, py::arg("history") = py::none(), py::arg("progress") = py::none(),
-      R"(Measures a case: two or more X-ray images to points with confidence regions, tunnels and diagnostics, as
+      R"(Measures a case: X-ray images to cameras, and of two or more to points with confidence regions, tunnels and diagnostics, as
 `helicarm run` does; a case's models are registered too.
 
 folder: holds case.json. method: best, or paper. max_error_mm: refuse (uncertain) where a point, or a point of a model

@@ -12,8 +12,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t least_views = 2;
-
 std::string found_in(const pipeline::InspectedImage& image) {
   const xray::Acquisition& a = image.xray_image.acquisition;
   std::string text =
@@ -32,9 +30,8 @@ bool has_all_maps(const CaseDraft& draft) {
 }
 
 void name_missing_parts(const CaseDraft& draft, CheckedDraft& checked) {
-  if (draft.images.size() < least_views)
-    checked.images_lack = draft.images.empty() ? "Add two or more images, of different directions."
-                                               : "A point needs a second image, of another direction.";
+  if (draft.images.empty())
+    checked.images_lack = "Add an image; points need two or more, of different directions.";
   else if (std::ranges::any_of(checked.images, [](const auto& image) { return image.failure.has_value(); }))
     checked.images_lack = "Remove the images that cannot be used.";
   if (draft.calibrator.empty())

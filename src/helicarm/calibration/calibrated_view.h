@@ -30,6 +30,9 @@ struct CalibratedView {
   bool by_paper = false;  ///< by Eq. 7 alone (`--method paper`); points of such views are those of Eq. 8
 };
 
+/// Of the source in the calibrator's frame, mm^2. Zero: not computed.
+Eigen::Matrix3d source_covariance(const CalibratedView& view);
+
 /// Views calibrated together.
 struct Calibration {
   std::vector<CalibratedView> views;

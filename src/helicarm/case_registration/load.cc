@@ -172,8 +172,7 @@ Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const 
       progress.begin("read");
       return views_of_cameras(given);
     }
-    const double least_angle_deg = given.base.views.size() > 1 ? calibration::least_view_angle_deg : 0;
-    const auto calibration = pipeline::calibrate_case(given.base, run, progress, least_angle_deg);
+    const auto calibration = pipeline::calibrate_case(given.base, run, progress);
     if (!calibration) throw BadInput(calibration.error().failure);
     return views_of_calibration(given, *calibration);
   });

@@ -83,6 +83,7 @@ constexpr ReasonEntry entries[] = {
     {Reason::unobservable_motion, "unobservable_motion", refused},
     {Reason::pick_on_fiducial, "pick_on_fiducial", refused},
     {Reason::intrinsics_inconsistent, "intrinsics_inconsistent", refused},
+    {Reason::intrinsics_weak, "intrinsics_weak", refused},
     {Reason::residual_distortion, "residual_distortion", refused},
     {Reason::calibrator_strained, "calibrator_strained", refused},
     {Reason::calibrator_deviates, "calibrator_deviates", refused},

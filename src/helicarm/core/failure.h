@@ -85,6 +85,7 @@ enum class Reason {
   unobservable_motion,
   pick_on_fiducial,
   intrinsics_inconsistent,
+  intrinsics_weak,
   residual_distortion,
   calibrator_strained,
   calibrator_deviates,

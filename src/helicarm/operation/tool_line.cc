@@ -6,6 +6,8 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/rotation.h"
+
 namespace helicarm::operation {
 namespace {
 
@@ -15,14 +17,10 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 /// Distance of the second point of a tool's line behind the tip.
 constexpr double line_mm = 100;
 
-Eigen::Matrix3d cross_matrix(const Vector3d& v) {
-  return (Eigen::Matrix3d() << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0).finished();
-}
-
 /// Effect of a pose's error (position, rotation) on a point at `lever` from the origin.
 Matrix6d carried(const Vector3d& lever) {
   Matrix6d effect = Matrix6d::Identity();
-  effect.topRightCorner<3, 3>() = -cross_matrix(lever);
+  effect.topRightCorner<3, 3>() = -geometry::cross_matrix(lever);
   return effect;
 }
 
@@ -75,11 +73,11 @@ TrackedTool tracked_tool(const HandDrill& drill) {
       Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), along).toRotationMatrix(), drill.tip_in_tool};
   // Errors e_t, e_b of tip and back along the tip's axes turn the axis by w = z x (e_t - e_b) / length and
   // move a point x of the tip's frame by -e_t - w x x.
-  const Eigen::Matrix3d turn = cross_matrix(Vector3d::UnitZ()) / along.norm();
+  const Eigen::Matrix3d turn = geometry::cross_matrix(Vector3d::UnitZ()) / along.norm();
   const Vector3d marker = marker_from_tip.inverse().translation;
   Matrix6d effect;
-  effect << -Eigen::Matrix3d::Identity() + cross_matrix(marker) * turn, -cross_matrix(marker) * turn, -turn,
-      turn;
+  effect << -Eigen::Matrix3d::Identity() + geometry::cross_matrix(marker) * turn,
+      -geometry::cross_matrix(marker) * turn, -turn, turn;
   return {marker_from_tip, drill.sigma_mm * drill.sigma_mm * effect * effect.transpose()};
 }
 

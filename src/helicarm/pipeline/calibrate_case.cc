@@ -64,10 +64,10 @@ Eigen::Vector3d centre_of(const calibration::CalibrationResult& calibration) {
 
 /// As `check_views_apart`, in the calibrator's frame or in the tracker's: a calibrator on the receiver turns
 /// with the C-arm and looks alike in all views.
-Expected<void> check_apart(const calibration::CalibrationResult& calibration, const Case& given,
-                           double least_deg) {
+Expected<void> check_apart(const calibration::CalibrationResult& calibration, const Case& given) {
+  if (calibration.views.size() < 2) return {};
   const Eigen::Vector3d centre = centre_of(calibration);
-  auto apart = calibration::check_views_apart(calibration.views, centre, least_deg);
+  auto apart = calibration::check_views_apart(calibration.views, centre);
   const auto pose = [](const CaseView& view) { return view.poses.tracker_from_calibrator; };
   if (apart ||
       !std::ranges::all_of(given.views, [&](const CaseView& view) { return pose(view).has_value(); }))
@@ -77,11 +77,11 @@ Expected<void> check_apart(const calibration::CalibrationResult& calibration, co
     geometry::RigidTransform& camera_from_world = views[i].view.camera_from_world;
     camera_from_world = camera_from_world * pose(given.views[i])->inverse();
   }
-  return calibration::check_views_apart(views, *pose(given.views.front()) * centre, least_deg);
+  return calibration::check_views_apart(views, *pose(given.views.front()) * centre);
 }
 
-Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& given, const RunOptions& options,
-                                     double least_angle_deg) {
+Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& given,
+                                     const RunOptions& options) {
   std::optional<calibration::LearnedIntrinsics> history;
   if (options.history) {
     const auto prior = prior_from_history(views, *options.history);
@@ -101,7 +101,7 @@ Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& giv
   return (options.method == rectification::Method::paper ? calibration::calibrate_paper(fiducials, how)
                                                          : calibration::calibrate(fiducials, how))
       .and_then([&](calibration::CalibrationResult result) {
-        return check_apart(result, given, least_angle_deg).map([&] {
+        return check_apart(result, given).map([&] {
           return CaseCalibration{std::move(result), {}, history, {}, {}};
         });
       });
@@ -125,10 +125,10 @@ Expected<CaseCalibration> with_explanations(CaseCalibration calibration, const L
 }
 
 /// 2.2, Eq. 4-7: all views jointly, or each alone by the paper's method.
-OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& given, const RunOptions& options,
-                                           double least_angle_deg) {
+OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& given,
+                                           const RunOptions& options) {
   auto calibration =
-      calibrated(views, given, options, least_angle_deg)
+      calibrated(views, given, options)
           .and_then([&](CaseCalibration done) { return check_calibrator(std::move(done), views, given); })
           .and_then([&](CaseCalibration done) {
             return with_explanations(std::move(done), views, given, options);
@@ -156,7 +156,7 @@ void add_guesses(Refusal& refusal, const Case& given, const RunOptions& options)
 }  // namespace
 
 OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options,
-                                          const Progress& progress, double least_angle_deg) {
+                                          const Progress& progress) {
   Timing time;
   const auto stage = [&](std::string_view name, std::optional<double>& ms, auto work) {
     return [&, name, work](auto views) {
@@ -165,16 +165,15 @@ OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& o
       return work(std::move(views), given, options, progress);
     };
   };
-  const auto calibrate_apart = [least_angle_deg](LabelledViews views, const Case& of, const RunOptions& how,
-                                                 const Progress&) {
-    return calibrate_views(std::move(views), of, how, least_angle_deg);
+  const auto calibrate_all = [](LabelledViews views, const Case& of, const RunOptions& by, const Progress&) {
+    return calibrate_views(std::move(views), of, by);
   };
   progress.begin("read");
   return timed(time.read, [&] { return read_views(given, options, progress); })
-      .and_then(stage("rectify", time.rectify, rectify_views))        // 2.1, Eq. 1-3
-      .and_then(stage("detect", time.detect, detect_in_views))        // 2.1
-      .and_then(stage("label", time.label, label_views))              // 2.3.4
-      .and_then(stage("calibrate", time.calibrate, calibrate_apart))  // 2.2, Eq. 4-7
+      .and_then(stage("rectify", time.rectify, rectify_views))      // 2.1, Eq. 1-3
+      .and_then(stage("detect", time.detect, detect_in_views))      // 2.1
+      .and_then(stage("label", time.label, label_views))            // 2.3.4
+      .and_then(stage("calibrate", time.calibrate, calibrate_all))  // 2.2, Eq. 4-7
       .map([&](CaseCalibration calibration) {
         calibration.timing_ms = time;
         return calibration;

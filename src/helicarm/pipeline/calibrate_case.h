@@ -20,9 +20,8 @@ struct CaseCalibration : calibration::CalibrationResult {
 };
 
 /// From image files to calibrated views (2.1, 2.2, 2.3.4; Eq. 1-7). Refuses `views_too_close` unless two of
-/// them differ by `least_angle_deg`: what is located in them needs it. 0: any views, also a single one.
+/// several differ by `least_view_angle_deg`: what is located in them needs it.
 OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options,
-                                          const Progress& progress = {},
-                                          double least_angle_deg = calibration::least_view_angle_deg);
+                                          const Progress& progress = {});
 
 }  // namespace helicarm::pipeline

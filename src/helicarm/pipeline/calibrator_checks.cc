@@ -172,6 +172,24 @@ std::vector<Warning> handedness_notes(const CaseCalibration& calibration) {
   return {mirrored_as_stated()};
 }
 
+std::vector<Warning> one_view_notes(const CaseCalibration& calibration) {
+  if (calibration.views.size() != 1 || calibration.views.front().covariance.isZero(0)) return {};
+  const calibration::CalibratedView& view = calibration.views.front();
+  const auto sigma = [&](Eigen::Index i) { return std::sqrt(view.covariance(i, i)); };
+  const double focal_percent = 100 * sigma(0) / std::abs(view.view.intrinsics.fx);
+  const double principal_px = std::hypot(sigma(2), sigma(3));
+  const double source_mm = std::sqrt(calibration::source_covariance(view).trace());
+  return {
+      {Reason::intrinsics_weak,
+       fmt::format("one view alone determines its focal length to {:.2g} %, its principal point to {:.2g} px "
+                   "and its source to {:.2g} mm (one standard deviation). These errors belong together: "
+                   "what it projects near the calibrator is known far better. A second view or the C-arm's "
+                   "history (--machine) determines them",
+                   focal_percent, principal_px, source_mm),
+       view.name,
+       {{"focal_percent", focal_percent}, {"principal_px", principal_px}, {"source_mm", source_mm}}}};
+}
+
 Warning mirrored_as_stated() {
   return {
       Reason::ambiguous_handedness,

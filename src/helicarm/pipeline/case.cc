@@ -18,7 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t least_views_of_run = 2;
 constexpr std::size_t most_views = 50;
 constexpr std::size_t most_picks = 1000;
 constexpr std::size_t most_note_characters = 100000;
@@ -246,7 +245,7 @@ void read_calibrator_of(Case& read, JsonReader& reader, Purpose purpose) {
   read.calibrator = value_or_throw(phantom::calibrator_named(read.calibrator_name, read.folder));
 }
 
-std::vector<CaseView> views_from(JsonReader& reader, const Case& known, std::size_t least_views) {
+std::vector<CaseView> views_from(JsonReader& reader, const Case& known) {
   std::vector<CaseView> views;
   std::set<std::string> names;
   for (JsonReader& entry : reader.objects("views", true, most_views)) {
@@ -255,9 +254,7 @@ std::vector<CaseView> views_from(JsonReader& reader, const Case& known, std::siz
     if (views.back().plate_image && !known.plate)
       entry.refuse(Reason::bad_value, "plate_image", "is given, but the case has no plate");
   }
-  if (views.size() < least_views)
-    reader.refuse(Reason::bad_value, "views",
-                  fmt::format("{} views, at least {} are required", views.size(), least_views));
+  if (views.empty()) reader.refuse(Reason::bad_value, "views", "is empty: at least one view is required");
   return views;
 }
 
@@ -287,7 +284,7 @@ Case case_of(const Json& json, const std::string& origin, const fs::path& folder
   read_calibrator_of(read, reader, purpose);
   read.plate_name = reader.optional_text("plate", 1000);
   if (read.plate_name) read.plate = value_or_throw(phantom::plate_named(*read.plate_name, folder));
-  read.views = views_from(reader, read, purpose == Purpose::run ? least_views_of_run : 1);
+  read.views = views_from(reader, read);
   if (!reader.raw("poses_now").is_null())
     read.poses_now = poses_from(reader.object("poses_now"), read.bones, OtherMarker::tool);
   if (!reader.raw("tracker").is_null()) read.tracker = tracker_from(reader.object("tracker"));

@@ -196,14 +196,22 @@ TEST_F(CaseFile, UnknownKeysAreRefusedAtEveryLevel) {
 }
 
 TEST_F(CaseFile, AnotherFormatIsRefused) {
-  json_["format"] = "helicarm-case/2";
+  json_["format"] = "helicarm-case/3";
   EXPECT_EQ(failure().reason, Reason::bad_value);
 }
 
-TEST_F(CaseFile, OneViewIsTooFew) {
+TEST_F(CaseFile, OneViewIsEnough) {
   json_["views"].erase(1);
   json_["picks"].erase(1);
-  EXPECT_THAT(failure().message, HasSubstr("1 views, at least 2"));
+  EXPECT_TRUE(read());
+}
+
+TEST_F(CaseFile, NoViewIsTooFew) {
+  json_["views"].clear();
+  json_["picks"].clear();
+  json_["tunnels"].clear();
+  json_["tool_lines"].clear();
+  EXPECT_THAT(failure().message, HasSubstr("at least one view"));
 }
 
 TEST_F(CaseFile, TwoViewsOfOneNameClash) {

@@ -108,6 +108,7 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
   result.accuracy = measure_accuracy(given.calibrator, calibration, result.points);  // Eq. 10-12
   append(result.warnings, diagnose(given, result));
   append(result.notes, handedness_notes(calibration));
+  append(result.notes, one_view_notes(calibration));
   append(result.notes, scale_notes(given, calibration, result.points));
   result.tunnel_ends = tunnel_ends(given.tunnels, result.points);
   const auto done =

@@ -16,7 +16,9 @@ namespace helicarm::pipeline {
 namespace {
 
 Expected<Result> result_of(const Case& given, const RunOptions& options, const Progress& progress = {}) {
-  return measure(given, options, progress).map([](Measurement measured) { return std::move(measured.result); });
+  return measure(given, options, progress).map([](Measurement measured) {
+    return std::move(measured.result);
+  });
 }
 
 /// One simulated case for all tests: 512 x 512 pixels, tunnels, tracker and tool lines.
@@ -187,6 +189,29 @@ TEST_F(SimulatedNavigation, AHistoryIsCalibratedAgain) {
   ASSERT_TRUE(again);
   EXPECT_NE(again->calibration, earlier->calibration);
   EXPECT_TRUE(again->result.history);
+}
+
+TEST_F(SimulatedNavigation, OneViewIsCalibratedAndLocatesNothing) {
+  given_.views.resize(1);
+  std::erase_if(given_.picks, [&](const Pick& pick) { return pick.view != given_.views[0].name; });
+  const auto result = result_of(given_, {});
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_FALSE(result->failure) << result->failure->message;
+  for (const PointResult& point : result->points) {
+    EXPECT_FALSE(point.place) << point.name;
+    EXPECT_EQ(point.reason->reason, Reason::not_seen) << point.name;
+  }
+  ASSERT_TRUE(result->views[0].calibrated);
+  const calibration::CalibratedView& view = *result->views[0].calibrated;
+  const Eigen::Vector3d off = view.view.source_in_world() - truth_.views[0].true_view.view.source_in_world();
+  EXPECT_LT(off.dot(calibration::source_covariance(view).ldlt().solve(off)), 16.3);  // 99.9 %
+  const Json parameters = to_json(*result)["views"][0]["parameters"];
+  EXPECT_EQ(parameters["order"].size(), 11u);
+  EXPECT_EQ(parameters["covariance"][10].size(), 11u);
+  EXPECT_NEAR(parameters["sigma"]["fx_px"], std::sqrt(view.covariance(0, 0)), 1e-12);
+  const auto note = std::ranges::find(result->notes, Reason::intrinsics_weak, &Warning::reason);
+  ASSERT_NE(note, result->notes.end());
+  EXPECT_GT(note->figures.at("source_mm"), off.norm() / 4);
 }
 
 TEST_F(SimulatedNavigation, KnownHandednessIsTheOnlyOneTried) {

@@ -87,8 +87,7 @@ const InspectedImage& image_named(const std::vector<InspectedImage>& images, con
 }
 
 void check_images(const std::vector<InspectedImage>& images) {
-  if (images.size() < 2)
-    throw BadInput(Reason::usage, fmt::format("{} image given, a case needs two or more", images.size()));
+  if (images.empty()) throw BadInput(Reason::usage, "no image given");
   std::set<std::string> names;
   std::vector<ReadView> views;
   for (const InspectedImage& image : images) {

@@ -2,7 +2,9 @@
 #include "helicarm/pipeline/result.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 
 #include "helicarm/fiducials/status_words.h"
 #include "helicarm/pipeline/advice.h"
@@ -99,6 +101,37 @@ void add_guess(Json& json, const ViewResult& view) {
         {{"label", guess.label}, {"uv_raw", vector(guess.uv_raw)}, {"residual_px", guess.residual_px}});
 }
 
+constexpr std::array parameter_names{"fx_px",
+                                     "fy_px",
+                                     "u0",
+                                     "v0",
+                                     "rotation_x_rad",
+                                     "rotation_y_rad",
+                                     "rotation_z_rad",
+                                     "translation_x_mm",
+                                     "translation_y_mm",
+                                     "translation_z_mm",
+                                     "skew_px"};
+static_assert(parameter_names.size() == calibration::view_parameters);
+
+Json parameters_of(const calibration::CalibratedView& view) {
+  if (view.covariance.isZero(0)) return nullptr;
+  const auto sigmas = [](const auto& covariance) {
+    return vector(covariance.diagonal().cwiseMax(0).cwiseSqrt().eval());
+  };
+  const Json all = sigmas(view.covariance);
+  const Eigen::Matrix3d turn = view.covariance.block<3, 3>(4, 4) * std::pow(180 / std::numbers::pi, 2);
+  return {{"order", parameter_names},
+          {"covariance", matrix(view.covariance)},
+          {"sigma",
+           {{"fx_px", all[0]},
+            {"fy_px", all[1]},
+            {"u0", all[2]},
+            {"v0", all[3]},
+            {"source_mm", sigmas(calibration::source_covariance(view))},
+            {"rotation_deg", sigmas(turn)}}}};
+}
+
 Json json_of(const ViewResult& view) {
   Json json = {{"name", view.name}};
   json["image_size"] = view.xray_image
@@ -117,7 +150,7 @@ Json json_of(const ViewResult& view) {
                                         {"runner_up_rms_px", view.found->runner_up_rms_px}}
                                  : Json(nullptr);
   for (const char* key : {"projection", "dlt", "intrinsics", "camera_from_calibrator", "reprojection_rms_px",
-                          "chi2", "dof", "condition", "method"})
+                          "chi2", "dof", "condition", "method", "parameters"})
     json[key] = nullptr;
   if (const auto& calibrated = view.calibrated) {
     json["projection"] = matrix(calibrated->view.projection());
@@ -129,6 +162,7 @@ Json json_of(const ViewResult& view) {
     json["dof"] = calibrated->dof;
     json["condition"] = number(calibrated->condition);
     json["method"] = calibrated->by_paper ? "paper" : "best";
+    json["parameters"] = parameters_of(*calibrated);
   }
   return json;
 }
