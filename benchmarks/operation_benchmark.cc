@@ -46,8 +46,8 @@ void message_to_lines_in_xrays(benchmark::State& state) {
     guidance::Poses now;
     now.tracker_from_tool = board.latest("tool", begin + time_s).value().tracker_from_tool;
     now.tracker_from_bone["femur"] = board.latest("femur", begin + time_s).value().tracker_from_tool;
-    const verification::ToolLine line = operation::tool_line("femur", "femur", xray_image, now, {}).value();
-    for (const geometry::View& view : views) benchmark::DoNotOptimize(verification::line_in_xray(view, line));
+    const guidance::ToolLine line = operation::tool_line("femur", "femur", xray_image, now, {}).value();
+    for (const geometry::View& view : views) benchmark::DoNotOptimize(guidance::line_in_xray(view, line));
   }
 }
 BENCHMARK(message_to_lines_in_xrays)->Unit(benchmark::kMicrosecond);

@@ -35,7 +35,7 @@ void run(std::string_view bytes) {
   check_pose(read->poses_now.tracker_from_tool);
   for (const pipeline::Pick& pick : read->picks)
     check(pick.uv_raw.allFinite() && names.contains(pick.view), "picks are positions in views");
-  for (const verification::ToolLine& line : read->tool_lines)
+  for (const guidance::ToolLine& line : read->tool_lines)
     check((line.p2_in_calibrator - line.p1_in_calibrator).norm() >= 1, "lines have a direction");
   check(std::isfinite(read->tracker.sigma_mm), "the tracker's noise is finite");
 }

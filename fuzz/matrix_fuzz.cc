@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/geometry/import_matrix.h"
-#include "helicarm/geometry/itk_transform.h"
+#include "helicarm/exchange/import_matrix.h"
+#include "helicarm/exchange/itk_transform.h"
 #include "target.h"
 
 namespace helicarm::fuzz {
 
 void run(std::string_view bytes) {
   const auto file = put_file("input.txt", bytes);
-  if (const auto transform = geometry::read_itk_transform(file); transform && *transform)
+  if (const auto transform = exchange::read_itk_transform(file); transform && *transform)
     check((*transform)->matrix().allFinite(), "the transform is finite");
-  geometry::ImportOptions options{.mm_per_unit = 10, .column = 1, .image_size = Eigen::Vector2i(1024, 768)};
+  exchange::ImportOptions options{.mm_per_unit = 10, .column = 1, .image_size = Eigen::Vector2i(1024, 768)};
   options.pixel_mm = {0.4, 0.4};
-  const auto matrix = geometry::import_matrix(file, options);
+  const auto matrix = exchange::import_matrix(file, options);
   if (!matrix) return;
   check(matrix->view.camera_from_world.matrix().allFinite(), "the camera's position is finite");
   check(std::isfinite(matrix->view.intrinsics.fx) && std::isfinite(matrix->view.intrinsics.fy),

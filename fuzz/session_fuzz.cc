@@ -3,7 +3,7 @@
 #include <openssl/evp.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/session/session_log.h"
+#include "helicarm/operation/session_log.h"
 #include "target.h"
 
 namespace helicarm::fuzz {
@@ -30,15 +30,15 @@ std::string with_chain(std::string_view texts) {
 void run(std::string_view bytes) {
   const bool as_it_is = Choices(bytes).byte() % 8 == 7;
   const auto path = put_file("session.log", as_it_is ? std::string(bytes) : with_chain(bytes));
-  const auto history = session::read_session(path);
-  auto session = session::SessionLog::open(path);
+  const auto history = operation::read_session(path);
+  auto session = operation::SessionLog::open(path);
   check(history.has_value() == session.has_value(), "a readable log can be continued");
   if (!history) return;
   for (std::size_t i = 0; i < history->records.size(); ++i)
     check(history->records[i].number == i && std::isfinite(history->records[i].time_s),
           "records are in order");
   check((*session)->append("more", {{"x_mm", 1}}).has_value(), "a record can be added");
-  const auto again = session::read_session(path);
+  const auto again = operation::read_session(path);
   check(again.has_value() && !again->torn, "the log is complete again");
   check(again->records.size() == std::max<std::size_t>(history->records.size(), 1) + 1, "no record is lost");
 }
@@ -46,7 +46,7 @@ void run(std::string_view bytes) {
 std::vector<std::string> seeds() {
   const auto path = folder() / "seed.log";
   {
-    const auto session = session::SessionLog::open(path).value();
+    const auto session = operation::SessionLog::open(path).value();
     for (int i = 0; i < 3; ++i)
       check(session->append("pose", {{"of", "femur"}, {"x_mm", 1.25 * i}}).has_value(), "a seed is written");
   }

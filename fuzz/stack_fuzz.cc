@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <tiffio.h>
 
-#include "helicarm/case_registration/tiff_stack.h"
 #include "helicarm/core/files.h"
+#include "helicarm/volume/tiff_stack.h"
 #include "target.h"
 #include "volume_target.h"
 

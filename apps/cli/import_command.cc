@@ -4,16 +4,16 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/json.h"
-#include "helicarm/geometry/import_matrix.h"
-#include "helicarm/geometry/itk_transform.h"
-#include "helicarm/geometry/matrix_transform.h"
+#include "helicarm/exchange/import_matrix.h"
+#include "helicarm/exchange/itk_transform.h"
+#include "helicarm/exchange/matrix_transform.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/pipeline/result.h"
 
 namespace helicarm::cli {
 namespace {
 
-Json json_of(const geometry::ImportedMatrix& imported) {
+Json json_of(const exchange::ImportedMatrix& imported) {
   const geometry::View& view = imported.view;
   Json json;
   json["K"] = geometry::json_rows(view.intrinsics.matrix());
@@ -26,7 +26,7 @@ Json json_of(const geometry::ImportedMatrix& imported) {
   return json;
 }
 
-void print_table(const geometry::ImportedMatrix& imported, std::ostream& out) {
+void print_table(const exchange::ImportedMatrix& imported, std::ostream& out) {
   const Eigen::IOFormat rows(8, 0, "  ", "\n", "  ");
   const geometry::View& view = imported.view;
   out << "K (px)\n"
@@ -79,13 +79,13 @@ Expected<std::optional<double>> mm_per_unit(const std::optional<std::string>& un
 CommandResult import_command(const ImportArguments& arguments, Console& console) {
   const auto mm = mm_per_unit(arguments.unit);
   if (!mm) return tl::unexpected<Failure>(mm.error());
-  geometry::ImportOptions options{
+  exchange::ImportOptions options{
       .mm_per_unit = *mm, .column = arguments.column, .undistorted = arguments.undistorted};
   if (!arguments.image_size.empty()) options.image_size = {arguments.image_size[0], arguments.image_size[1]};
   if (!arguments.pixel_mm.empty()) options.pixel_mm = {arguments.pixel_mm[0], arguments.pixel_mm[1]};
   if (!arguments.origin_mm.empty()) options.origin_mm = {arguments.origin_mm[0], arguments.origin_mm[1]};
-  for (const auto& [read, print] : {std::pair{&geometry::read_itk_transform, &print_transform},
-                                    {&geometry::read_matrix_transform, &print_matrix}}) {
+  for (const auto& [read, print] : {std::pair{&exchange::read_itk_transform, &print_transform},
+                                    {&exchange::read_matrix_transform, &print_matrix}}) {
     auto transform = read(arguments.file);
     if (!transform) return tl::unexpected<Failure>(transform.error());
     if (!*transform) continue;
@@ -93,7 +93,7 @@ CommandResult import_command(const ImportArguments& arguments, Console& console)
     print(**transform, console);
     return {};
   }
-  const auto imported = geometry::import_matrix(arguments.file, options);
+  const auto imported = exchange::import_matrix(arguments.file, options);
   if (!imported) return tl::unexpected<Failure>(imported.error());
   for (const Warning& warning : imported->warnings)
     console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);

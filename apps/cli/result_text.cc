@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/pipeline/advice.h"
+#include "helicarm/pipeline/diagnosis/advice.h"
 #include "helicarm/report/tables.h"
 
 namespace helicarm::cli {

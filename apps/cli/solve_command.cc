@@ -12,7 +12,7 @@
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/json.h"
-#include "helicarm/geometry/import_matrix.h"
+#include "helicarm/exchange/import_matrix.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/pipeline/result.h"
@@ -123,7 +123,7 @@ std::vector<Warning> warnings_of(const Solution& solution, double rms_px,
                      rms_px, limit, farthest(solution, points)),
          {},
          {{"rms_px", rms_px}, {"limit", limit}}});
-  if (const auto flipped = geometry::mirrored_or_upwards(solution.view.intrinsics))
+  if (const auto flipped = exchange::mirrored_or_upwards(solution.view.intrinsics))
     warnings.push_back(*flipped);
   return warnings;
 }

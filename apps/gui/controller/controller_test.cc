@@ -140,7 +140,7 @@ TEST(Steps, VerifyShowsTheImagesFiguresWithoutARobot) {
   state.source = Source::files;
   EXPECT_EQ(card_of(steps_of(state), Phase::navigate).why, "images from files: no robot");
   auto result = std::make_shared<pipeline::Result>(*state.result);
-  verification::LineError near, far;
+  guidance::LineError near, far;
   near.distance_mm = 0.4;
   far.distance_mm = 0.9;
   result->verifications = {{"femur", near, far}};

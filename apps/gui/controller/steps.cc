@@ -148,7 +148,7 @@ void navigate(StepCard& card, const ApplicationState& state) {
 void verify_images(StepCard& card, const pipeline::Result& result) {
   double worst = 0;
   int ends = 0;
-  for (const verification::Verification& line : result.verifications)
+  for (const guidance::Verification& line : result.verifications)
     for (const auto& end : {line.start, line.end})
       if (end) {
         worst = std::max(worst, end->distance_mm);

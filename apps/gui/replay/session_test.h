@@ -8,7 +8,7 @@
 
 #include "helicarm/operation/plan.h"
 #include "helicarm/operation/seen_poses.h"
-#include "helicarm/session/session_log.h"
+#include "helicarm/operation/session_log.h"
 
 /// A short operation's record for tests, with one record of each kind.
 namespace helicarm::gui {
@@ -26,7 +26,7 @@ inline Json window_with(double femur_x) {
 }
 
 inline void write_session(const std::filesystem::path& folder) {
-  const auto session = session::SessionLog::open(folder / "session.log").value();
+  const auto session = operation::SessionLog::open(folder / "session.log").value();
   const auto add = [&](const char* kind, Json content) {
     ASSERT_TRUE(session->append(kind, std::move(content)));
   };

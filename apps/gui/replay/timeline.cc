@@ -10,7 +10,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/operation/seen_poses.h"
-#include "helicarm/session/session_log.h"
+#include "helicarm/operation/session_log.h"
 
 namespace helicarm::gui {
 namespace {
@@ -166,13 +166,13 @@ std::size_t Timeline::at(double seconds) const {
 
 Expected<Timeline> read_timeline(const std::filesystem::path& session) {
   return guarded([&] {
-    session::SessionHistory history = value_or_throw(session::read_session(session / "session.log"));
+    operation::SessionHistory history = value_or_throw(operation::read_session(session / "session.log"));
     if (history.records.empty())
       throw BadInput(Reason::bad_value, fmt::format("{}: the record is empty", session.string()));
     Timeline timeline{session, {}, history.torn};
     double seconds = 0;
     const double begin = history.records.front().time_s;
-    for (session::SessionRecord& record : history.records) {
+    for (operation::SessionRecord& record : history.records) {
       seconds = std::max(seconds, record.time_s - begin);  // the clock may be set back
       QString summary = of_record(record.number, [&] { return summary_of(record.kind, record.content); });
       timeline.finished = timeline.finished || record.kind == "end";

@@ -87,7 +87,7 @@ TEST_F(TimelineTest, DamageIsReportedWithItsReason) {
 }
 
 TEST_F(TimelineTest, RecordWithoutContentIsNamedInTheMessage) {
-  const auto session = session::SessionLog::open(folder_ / "session.log").value();
+  const auto session = operation::SessionLog::open(folder_ / "session.log").value();
   ASSERT_TRUE(session->append("exposure", {{"view", 7}}));
   const auto timeline = read_timeline(folder_);
   ASSERT_FALSE(timeline);
@@ -95,7 +95,7 @@ TEST_F(TimelineTest, RecordWithoutContentIsNamedInTheMessage) {
 }
 
 TEST_F(TimelineTest, CaseOutsideTheSessionIsRefused) {
-  const auto session = session::SessionLog::open(folder_ / "session.log").value();
+  const auto session = operation::SessionLog::open(folder_ / "session.log").value();
   ASSERT_TRUE(session->append("case", {{"folder", "../elsewhere"}}));
   EXPECT_EQ(state_at(read(), session_kinds.size()).error().reason, Reason::path_outside);
 }

@@ -356,7 +356,7 @@ void MainWindow::show_live() {
   const operation::ToolOverlay* tool = recorded_ ? &*recorded_ : nullptr;
   if (live_.tool) tool = *live_.tool ? &**live_.tool : nullptr;
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    std::optional<verification::ImageLine> line;
+    std::optional<guidance::ImageLine> line;
     const auto view = panels_->view_in(i);
     if (tool && shown_ && view && *view < shown_->views.size() && panels_->panel(i).shows_own_frame())
       if (const auto seen = tool->by_view.find(shown_->views[*view].name); seen != tool->by_view.end())

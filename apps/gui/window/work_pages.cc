@@ -119,8 +119,8 @@ void VerifyPage::show_state(const ApplicationState& state) {
   std::vector<report::ToolAtEnd> tools;
   for (const auto& [name, outcome] : state.outcomes)
     for (const auto& [end, miss, in_images] :
-         {std::tuple("start", &outcome.start, &verification::Verification::start),
-          std::tuple("end", &outcome.end, &verification::Verification::end)})
+         {std::tuple("start", &outcome.start, &guidance::Verification::start),
+          std::tuple("end", &outcome.end, &guidance::Verification::end)})
       tools.push_back({name, end, miss->distance_mm(), miss->predicted_mm(),
                        outcome.verification ? (*outcome.verification).*in_images : std::nullopt});
   if (tools.empty() && state.result) tools = report::tools_at_ends(state.result->verifications);

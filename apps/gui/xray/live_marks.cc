@@ -27,7 +27,7 @@ void LiveMarks::set_epipolar(std::vector<rectification::PixelPath> rectified) {
   for (rectification::PixelPath& line : rectified) epipolar_.push_back({std::move(line)});
 }
 
-void LiveMarks::set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note) {
+void LiveMarks::set_tool(const std::optional<guidance::ImageLine>& rectified, const QString& note) {
   tool_ = {rectified ? rectification::PixelPath{rectified->back, rectified->tip}
                      : rectification::PixelPath{}};
   note_ = note;

@@ -6,7 +6,7 @@
 
 #include "gui/xray/image_frame.h"
 #include "gui/xray/marks.h"
-#include "helicarm/verification/image_line.h"
+#include "helicarm/guidance/image_line.h"
 
 namespace helicarm::gui {
 
@@ -29,7 +29,7 @@ class LiveMarks {
   void set_epipolar(std::vector<rectification::PixelPath> rectified);
   void set_path(rectification::PixelPath rectified) { path_ = {std::move(rectified)}; }
   bool has_tool() const { return !tool_.given.empty(); }
-  void set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note);
+  void set_tool(const std::optional<guidance::ImageLine>& rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
   void set_outlines(std::vector<ModelOutline> rectified);
   /// The pick that is being dragged, in place of the one of its name.

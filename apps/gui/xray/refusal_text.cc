@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "gui/xray/text.h"
-#include "helicarm/pipeline/advice.h"
+#include "helicarm/pipeline/diagnosis/advice.h"
 
 namespace helicarm::gui {
 namespace {

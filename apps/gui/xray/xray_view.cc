@@ -165,7 +165,7 @@ void XrayView::set_outlines(std::vector<ModelOutline> rectified) {
   carry_live();
 }
 
-void XrayView::set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note) {
+void XrayView::set_tool(const std::optional<guidance::ImageLine>& rectified, const QString& note) {
   if (!rectified && !live_.has_tool()) return;
   live_.set_tool(rectified, note);
   carry_live();

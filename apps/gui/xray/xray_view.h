@@ -56,7 +56,7 @@ class XrayView : public QWidget {
   /// Marks over the view: rectified pixels, except picks.
   void set_epipolar(std::vector<rectification::PixelPath> rectified);
   void set_path(std::vector<Eigen::Vector2d> rectified);
-  void set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note);
+  void set_tool(const std::optional<guidance::ImageLine>& rectified, const QString& note);
   void set_outlines(std::vector<ModelOutline> rectified);
   void set_picks(std::vector<FreshPick> raw);
   /// Drawn over everything; removed as the picks are.

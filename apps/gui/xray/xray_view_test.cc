@@ -345,7 +345,7 @@ TEST_F(XrayViewTest, ClearRemovesEverything) {
   QSignalSpy spy(&view, &XrayView::picked);
   QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
   for (int which : {Qt::Key_H, Qt::Key_L, Qt::Key_0, Qt::Key_W, Qt::Key_Plus, Qt::Key_Return}) key(which);
-  view.set_tool(verification::ImageLine{{1, 2}, {3, 4}}, "note");
+  view.set_tool(guidance::ImageLine{{1, 2}, {3, 4}}, "note");
   view.grab();
   EXPECT_EQ(spy.count(), 0);
 }
@@ -411,7 +411,7 @@ TEST_F(XrayViewTest, RandomInputDoesNotCrash) {
         view.set_picking(below(2));
         break;
       case 6:
-        view.set_tool(verification::ImageLine{{double(at.x()), 9}, {double(to.x()), 1e5}}, "tip");
+        view.set_tool(guidance::ImageLine{{double(at.x()), 9}, {double(to.x()), 1e5}}, "tip");
         break;
       default:
         key(keys[below(int(std::size(keys)))], with[below(3)]);

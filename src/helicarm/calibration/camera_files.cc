@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/exchange/import_matrix.h"
 #include "helicarm/geometry/decomposition.h"
-#include "helicarm/geometry/import_matrix.h"
 #include "helicarm/geometry/view_json.h"
 
 namespace helicarm::calibration {
@@ -58,7 +58,7 @@ SavedCalibration from_file(const std::filesystem::path& path) {
     return value_or_throw(saved_calibration_from_json(*json, origin));
   if (json && json->is_object() && json->contains("camera_from_world")) return from_solve(*json, origin);
   CalibratedView view;
-  view.view = value_or_throw(geometry::import_matrix(path)).view;
+  view.view = value_or_throw(exchange::import_matrix(path)).view;
   view.dlt = geometry::factors_from_projection(view.view.projection());
   return one_view(std::move(view));
 }

@@ -20,7 +20,7 @@ Expected<CameraFile> camera_file_from(const std::string& word);
 
 /// Views from several files with one world frame, which the files cannot confirm: a helicarm-result/1 or a
 /// helicarm-calibration/1 (its view of that name, or its only one), the output of `solve`, or what
-/// `geometry::import_matrix` reads. The covariance of views from one file is joint, of others independent,
+/// `exchange::import_matrix` reads. The covariance of views from one file is joint, of others independent,
 /// and zero where a file has none.
 Expected<SavedCalibration> calibration_of_cameras(std::span<const CameraFile> files);
 

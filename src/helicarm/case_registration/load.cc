@@ -7,12 +7,12 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/centred_view.h"
-#include "helicarm/case_registration/tiff_stack.h"
+#include "helicarm/exchange/import_matrix.h"
 #include "helicarm/geometry/dense_matrix.h"
-#include "helicarm/geometry/import_matrix.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/volume/read_volume.h"
+#include "helicarm/volume/tiff_stack.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -77,7 +77,7 @@ volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& given,
   if (!given.voxel_mm)
     throw BadInput(Reason::bad_value,
                    fmt::format("models: \"{}\": \"voxel_mm\" is missing: a TIFF stack needs it", given.name));
-  return value_or_throw(tiff_stack(path, *given.voxel_mm, offset_hu));
+  return value_or_throw(volume::tiff_stack(path, *given.voxel_mm, offset_hu));
 }
 
 bool has_voxels_of(const volume::Volume& volume, const Eigen::Vector3d& voxel_mm) {
@@ -108,7 +108,7 @@ LoadedViews views_of_cameras(const pipeline::RegistrationCase& given) {
     const pipeline::CaseView& view = given.base.views[i];
     const xray::XrayImage image = value_or_throw(pipeline::image_of(view));
     take_patient(loaded.patient_key, image);
-    const geometry::ImportedMatrix camera = value_or_throw(geometry::import_matrix(given.cameras[i]));
+    const exchange::ImportedMatrix camera = value_or_throw(exchange::import_matrix(given.cameras[i]));
     if (camera.image_size) check_size(view.name, "the camera is for", *camera.image_size, image.pixels);
     loaded.views.push_back(view_of(image, view.name, camera.view));
     loaded.views.back().grey = std::move(image.pixels);

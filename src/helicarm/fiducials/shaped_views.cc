@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prints simulated views of flat, symmetric and helical phantoms, the truth and the labels found, one JSON
-// object per line, for tools/falsify_views.py. Usage: shaped_views SEED FIRST END
+// object per line, for tools/drills/falsify_views.py. Usage: shaped_views SEED FIRST END
 #include <cstdio>
 #include <cstdlib>
 

@@ -99,7 +99,7 @@ Expected<PlanFiles> files_of_case(const OperationPlan& plan, const fs::path& fol
 Expected<pipeline::Case> operation_case(const fs::path& folder, const OperationPlan& plan,
                                         const PlanFiles& files, const std::vector<CaseImage>& images,
                                         const guidance::Poses& now,
-                                        const std::vector<verification::ToolLine>& tool_lines) {
+                                        const std::vector<guidance::ToolLine>& tool_lines) {
   pipeline::Case made;
   made.folder = folder;
   made.calibrator_name = files.calibrator_name;

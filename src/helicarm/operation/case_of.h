@@ -39,7 +39,7 @@ Expected<PlanFiles> files_of_case(const OperationPlan& plan, const std::filesyst
 Expected<pipeline::Case> operation_case(const std::filesystem::path& folder, const OperationPlan& plan,
                                         const PlanFiles& files, const std::vector<CaseImage>& images,
                                         const guidance::Poses& now,
-                                        const std::vector<verification::ToolLine>& tool_lines);
+                                        const std::vector<guidance::ToolLine>& tool_lines);
 
 /// The bytes of a received image. Refuses as `read_file`, and (image_changed) a file that is no longer the
 /// one that was received.

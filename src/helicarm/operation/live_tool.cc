@@ -82,7 +82,7 @@ Expected<ToolOverlay> LiveTool::overlay(const guidance::Poses& now, const guidan
   for (const Shown& shown : views_) {
     const auto line = tool_line("", bone, shown.poses, now, tool_.marker_from_tip);
     if (!line || !shown.view) continue;
-    if (const auto seen = verification::line_in_xray(*shown.view, *line)) overlay.by_view[shown.name] = *seen;
+    if (const auto seen = guidance::line_in_xray(*shown.view, *line)) overlay.by_view[shown.name] = *seen;
   }
   return overlay;
 }

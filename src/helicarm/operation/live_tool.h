@@ -28,8 +28,8 @@ struct TunnelAim {
 
 /// The tool at the newest poses.
 struct ToolOverlay {
-  std::map<std::string, verification::ImageLine> by_view;  ///< rectified px (Eq. 6)
-  double age_s = 0;                                        ///< of the older of the tool's and the bone's pose
+  std::map<std::string, guidance::ImageLine> by_view;  ///< rectified px (Eq. 6)
+  double age_s = 0;                                    ///< of the older of the tool's and the bone's pose
   /// At the first view's acquisition, as if the tool had moved with the bone; empty if the bone was not
   /// visible.
   std::optional<geometry::RigidTransform> calibrator_from_tip = {};

@@ -71,7 +71,7 @@ Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const 
     std::unique_ptr<Operation> operation(
         new Operation(std::move(plan), folder, board, robot, std::move(notify)));
     value_or_throw(make_private_folder(folder));
-    operation->log_ = value_or_throw(session::SessionLog::open(folder / "session.log"));
+    operation->log_ = value_or_throw(SessionLog::open(folder / "session.log"));
     if (operation->log_->history().records.size() > 1)
       throw BadInput(Reason::cannot_write,
                      fmt::format("{}: already holds the record of another operation; choose an empty folder",
@@ -129,7 +129,7 @@ Expected<void> Operation::finish(const std::optional<Failure>& why) {
 }
 
 pipeline::Result Operation::run(const guidance::Poses& now,
-                                const std::vector<verification::ToolLine>& tool_lines) {
+                                const std::vector<guidance::ToolLine>& tool_lines) {
   newest_.reset();
   const std::string name = fmt::format("case-{}", ++measurements_);
   std::vector<CaseImage> images;
@@ -323,7 +323,7 @@ Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std:
 TunnelOutcome Operation::check(const PlannedTunnel& tunnel) {
   const guidance::Poses now = value_or_throw(poses_now(look("verify"), plan_.tracker));
   const TrackedTool tracked = tool();
-  const verification::ToolLine line =
+  const guidance::ToolLine line =
       value_or_throw(tool_line(tunnel.name, tunnel.bone, views_.front().poses, now, tracked.marker_from_tip));
   const pipeline::Result checked = run(now, {line});
   TunnelOutcome outcome = value_or_throw(outcome_of(tunnel, checked, tracked));

@@ -18,7 +18,7 @@
 #include "helicarm/operation/live_tool.h"
 #include "helicarm/operation/orders.h"
 #include "helicarm/operation/plan_watch.h"
-#include "helicarm/session/session_log.h"
+#include "helicarm/operation/session_log.h"
 #include "helicarm/xray/xray_image.h"
 
 namespace helicarm::operation {
@@ -189,7 +189,7 @@ class Operation {
                      const robot::RobotState& present) const;
   const Planned& planned(const robot::RobotOrder& order) const;
   void record_halt(const robot::RobotOrder& order, const Failure& why);
-  pipeline::Result run(const guidance::Poses& now, const std::vector<verification::ToolLine>& tool_lines);
+  pipeline::Result run(const guidance::Poses& now, const std::vector<guidance::ToolLine>& tool_lines);
   std::vector<robot::Miss> carry_out(const robot::RobotOrder& order, const std::string& token,
                                      const robot::Measure& measure, const robot::Watch& watch);
   TunnelOutcome check(const PlannedTunnel& tunnel);
@@ -202,7 +202,7 @@ class Operation {
   robot::RobotLink* robot_;  ///< null for a hand-held drill
   Notify notify_;
   std::stop_source end_;
-  std::unique_ptr<session::SessionLog> log_;
+  std::unique_ptr<SessionLog> log_;
   bool finished_ = false;
   std::string who_ = "unknown";
   std::vector<View> views_;

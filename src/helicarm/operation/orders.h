@@ -12,7 +12,7 @@ struct TunnelOutcome {
   std::vector<robot::Miss> loop;  ///< measurements of the closed loop; the last one is within the tolerance
   EndMiss start;                  ///< across the tool's axis, from tracker and X-ray images
   EndMiss end;
-  std::optional<verification::Verification> verification;  ///< Eq. 17 in the X-ray images
+  std::optional<guidance::Verification> verification;  ///< Eq. 17 in the X-ray images
 };
 
 /// The order to a tunnel from these joints. Fails as `tunnel_in_bone` and `plan_approach`.

@@ -13,8 +13,8 @@
 #include "helicarm/operation/freehand.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/operation/replay_orders.h"
+#include "helicarm/operation/session_log.h"
 #include "helicarm/pipeline/poses_json.h"
-#include "helicarm/session/session_log.h"
 #include "helicarm/xray/digest.h"
 
 namespace helicarm::operation {
@@ -50,7 +50,7 @@ class Replay {
       : session_(std::move(session)),
         orders_([this](const std::string& origin, const std::string& how) { differ(origin, how); }) {}
 
-  void take(const session::SessionRecord& record) {
+  void take(const SessionRecord& record) {
     const std::string origin = fmt::format("record {}", record.number);
     if (report.finished) differ(origin, "a record after the end of the operation");
     if (record.kind == "plan") plan_ = value_or_throw(plan_from(record.content, origin));
@@ -71,7 +71,7 @@ class Replay {
   }
 
   /// A record that cannot be read differs from those that an operation writes.
-  void take_whole(const session::SessionRecord& record) {
+  void take_whole(const SessionRecord& record) {
     const std::string origin = fmt::format("record {}", record.number);
     try {
       take(record);
@@ -112,7 +112,7 @@ class Replay {
                                  differing_fields(then, now)));
   }
 
-  void exposure(const session::SessionRecord& record, const std::string& origin) {
+  void exposure(const SessionRecord& record, const std::string& origin) {
     ++report.exposures;
     const std::string view = record.content.at("view").get<std::string>();
     const std::string digest = record.content.at("picture").get<std::string>();
@@ -133,7 +133,7 @@ class Replay {
   }
 
   /// An earlier image that turned out to be delayed has no digest.
-  void refused(const session::SessionRecord& record) {
+  void refused(const SessionRecord& record) {
     if (record.content.contains("picture")) return;
     views_.erase(record.content.at("view").get<std::string>());
     measurement_.reset();
@@ -151,20 +151,19 @@ class Replay {
     return entry->second;
   }
 
-  void end(const session::SessionRecord& record) {
+  void end(const SessionRecord& record) {
     report.finished = true;
     report.ended_by = record.content.value("why", "");
   }
 
   /// The files that a record lists, in this folder of the session; a later preview replaces an earlier one's.
-  void list_files(const session::SessionRecord& record, const std::string& folder,
-                  const std::string& origin) {
+  void list_files(const SessionRecord& record, const std::string& folder, const std::string& origin) {
     if (!record.content.contains("files")) return differ(origin, "the digests of its files are missing");
     for (const auto& [name, digest] : record.content.at("files").items())
       files_.insert_or_assign(folder.empty() ? name : folder + "/" + name, ListedFile{digest, origin});
   }
 
-  void touched(const session::SessionRecord& record, const std::string& origin) {
+  void touched(const SessionRecord& record, const std::string& origin) {
     const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
     const auto check = std::ranges::find(
         plan_.check_points, record.content.at("check_point").get<std::string>(), &PlannedCheck::name);
@@ -174,7 +173,7 @@ class Replay {
   }
 
   /// The case must equal the recorded one, which holds the accepted images with their poses.
-  void images(const session::SessionRecord& record, const std::string& origin) {
+  void images(const SessionRecord& record, const std::string& origin) {
     const std::string folder = record.content.at("folder").get<std::string>();
     list_files(record, folder, origin);
     const Json& recorded = record.content.at("case");
@@ -205,7 +204,7 @@ class Replay {
     for (const std::string& view : plan_.views)
       if (const auto taken = views_.find(view); taken != views_.end()) images.push_back(taken->second);
     guidance::Poses now;
-    std::vector<verification::ToolLine> lines;
+    std::vector<guidance::ToolLine> lines;
     const auto look = orders_.take_verify_look();
     verifies_ = !recorded.at("tool_lines").empty();
     if (verifies_) {
@@ -222,7 +221,7 @@ class Replay {
     return value_or_throw(operation_case(folder, plan, files, images, now, lines));
   }
 
-  void result(const session::SessionRecord& record, const std::string& origin) {
+  void result(const SessionRecord& record, const std::string& origin) {
     ++report.results;
     const std::string folder = record.content.at("folder").get<std::string>();
     list_files(record, folder, origin);
@@ -243,7 +242,7 @@ class Replay {
                                  differing_fields(written, now)));
   }
 
-  void guide(const session::SessionRecord& record, const std::string& origin) {
+  void guide(const SessionRecord& record, const std::string& origin) {
     guide_.reset();
     const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
     if (!plan_.drill || !result_) return differ(origin, "guidance without a drill or a measurement");
@@ -256,7 +255,7 @@ class Replay {
     if (begun) guide_ = *begun;  // the operation refused it as well and recorded no decision
   }
 
-  void guided(const session::SessionRecord& record, const std::string& origin) {
+  void guided(const SessionRecord& record, const std::string& origin) {
     ++report.decisions;
     if (!guide_) return differ(origin, "a decision before guidance began");
     const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
@@ -281,13 +280,13 @@ class Replay {
 
 Expected<ReplayReport> replay(const std::filesystem::path& session, const GoOn& go_on) {
   return guarded([&] {
-    const session::SessionHistory history = value_or_throw(session::read_session(session / "session.log"));
+    const SessionHistory history = value_or_throw(read_session(session / "session.log"));
     if (history.records.empty())
       throw BadInput(Reason::bad_value, fmt::format("{}: the record is empty", session.string()));
     Replay replay(session);
     replay.report.records = history.records.size();
     replay.report.torn = history.torn;
-    for (const session::SessionRecord& record : history.records) {
+    for (const SessionRecord& record : history.records) {
       if (!go_on(record.number, history.records.size()))
         throw BadInput(Reason::interrupted,
                        fmt::format("{}: stopped at record {}", session.string(), record.number));

@@ -24,7 +24,7 @@ const PlannedTunnel& tunnel_of(const OperationPlan& plan, const std::string& nam
   return *tunnel;
 }
 
-std::string text_at(const session::SessionRecord& record, const char* key) {
+std::string text_at(const SessionRecord& record, const char* key) {
   return record.content.at(key).get<std::string>();
 }
 

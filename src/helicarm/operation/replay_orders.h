@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "helicarm/operation/orders.h"
-#include "helicarm/session/session_log.h"
+#include "helicarm/operation/session_log.h"
 
 namespace helicarm::operation {
 
@@ -23,7 +23,7 @@ class OrderReplay {
 
   /// The records that concern orders; `newest` is `measured`, or the verification after it. Throws BadInput
   /// for a malformed record.
-  void take(const session::SessionRecord& record, const OperationPlan& plan,
+  void take(const SessionRecord& record, const OperationPlan& plan,
             const std::optional<pipeline::Result>& measured, const std::optional<pipeline::Result>& newest);
 
   /// The tracker's samples for the verification that the next case holds, once.
@@ -43,7 +43,7 @@ class OrderReplay {
     std::string digest;  ///< of the order to the tunnel that is left
     Withdrawal from;
   };
-  using Record = session::SessionRecord;
+  using Record = SessionRecord;
 
   void poses(const Record& record, const std::string& origin);
   void tour(const Record& record, const std::string& origin);

@@ -104,17 +104,17 @@ Expected<robot::ToolMeasurement> measure_tool(const PoseWindow& window, const Op
   });
 }
 
-Expected<verification::ToolLine> tool_line(const std::string& tunnel, const guidance::Bone& bone,
-                                           const guidance::Poses& exposure, const guidance::Poses& now,
-                                           const geometry::RigidTransform& marker_from_tip) {
+Expected<guidance::ToolLine> tool_line(const std::string& tunnel, const guidance::Bone& bone,
+                                       const guidance::Poses& exposure, const guidance::Poses& now,
+                                       const geometry::RigidTransform& marker_from_tip) {
   return guarded([&] {
     if (!exposure.tracker_from_calibrator || !now.tracker_from_tool)
       throw BadInput(Reason::no_pose, "calibrator or tool: its marker is not visible");
     const geometry::RigidTransform calibrator_from_tip =
         exposure.tracker_from_calibrator->inverse() * pose_of(exposure, bone) * pose_of(now, bone).inverse() *
         *now.tracker_from_tool * marker_from_tip;
-    return verification::ToolLine{tunnel, tunnel, calibrator_from_tip * Vector3d(0, 0, -line_mm),
-                                  calibrator_from_tip.translation};
+    return guidance::ToolLine{tunnel, tunnel, calibrator_from_tip * Vector3d(0, 0, -line_mm),
+                              calibrator_from_tip.translation};
   });
 }
 

@@ -4,9 +4,9 @@
 #include "helicarm/devices/robot/follow_target.h"
 #include "helicarm/devices/robot/plan_approach.h"
 #include "helicarm/devices/tracker/hand_eye.h"
+#include "helicarm/guidance/image_line.h"
 #include "helicarm/operation/seen_poses.h"
 #include "helicarm/pipeline/result.h"
-#include "helicarm/verification/image_line.h"
 
 namespace helicarm::operation {
 
@@ -51,9 +51,9 @@ Expected<robot::ToolMeasurement> measure_tool(const PoseWindow& window, const Op
 
 /// The tool's line at each view's acquisition, as if the tool had moved with the bone: two points in the
 /// calibrator frame (3.3). Refuses no_pose if the bone was not visible then or is not now.
-Expected<verification::ToolLine> tool_line(const std::string& tunnel, const guidance::Bone& bone,
-                                           const guidance::Poses& exposure, const guidance::Poses& now,
-                                           const geometry::RigidTransform& marker_from_tcp);
+Expected<guidance::ToolLine> tool_line(const std::string& tunnel, const guidance::Bone& bone,
+                                       const guidance::Poses& exposure, const guidance::Poses& now,
+                                       const geometry::RigidTransform& marker_from_tcp);
 
 /// Distance of a tunnel's end from the tool's axis, perpendicular to it.
 struct EndMiss {

@@ -89,7 +89,7 @@ TEST(ToolLine, LineAtTheAcquisitionFollowsTheBone) {
   now.tracker_from_bone["femur"] = femur_now;
   geometry::RigidTransform tip{geometry::rotation_from_euler(0.5, 0.5, 0.5), femur_now * on_bone};
   now.tracker_from_tool = tip * marker_from_tip.inverse();
-  const verification::ToolLine line = tool_line("femur", "femur", exposure, now, marker_from_tip).value();
+  const guidance::ToolLine line = tool_line("femur", "femur", exposure, now, marker_from_tip).value();
   EXPECT_LT((line.p2_in_calibrator - tracker_from_calibrator.inverse() * (femur_then * on_bone)).norm(),
             1e-9);
   EXPECT_NEAR((line.p2_in_calibrator - line.p1_in_calibrator).norm(), 100, 1e-9);

@@ -11,7 +11,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/phantom_calibration/correspondence.h"
 #include "helicarm/phantom_calibration/from_scratch.h"
-#include "helicarm/pipeline/calibrator_checks.h"
+#include "helicarm/pipeline/diagnosis/calibrator_checks.h"
 #include "helicarm/pipeline/prior.h"
 
 namespace helicarm::phantom_calibration {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "helicarm/pipeline/calibrator_checks.h"
+#include "helicarm/pipeline/diagnosis/calibrator_checks.h"
 
 namespace helicarm::phantom_calibration {
 namespace {

@@ -8,7 +8,7 @@
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/label_fiducials.h"
-#include "helicarm/pipeline/calibrator_checks.h"
+#include "helicarm/pipeline/diagnosis/calibrator_checks.h"
 #include "helicarm/rectification/intrinsics_prior.h"
 
 namespace helicarm::phantom_calibration {

@@ -9,8 +9,8 @@
 
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
-#include "helicarm/pipeline/calibrator_checks.h"
 #include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/diagnosis/calibrator_checks.h"
 
 namespace helicarm::phantom_calibration {
 

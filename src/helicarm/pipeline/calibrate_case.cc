@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <iterator>
 
-#include "helicarm/pipeline/calibrator_checks.h"
-#include "helicarm/pipeline/causes.h"
+#include "helicarm/pipeline/diagnosis/calibrator_checks.h"
+#include "helicarm/pipeline/diagnosis/causes.h"
+#include "helicarm/pipeline/diagnosis/residuals.h"
 #include "helicarm/pipeline/prior.h"
-#include "helicarm/pipeline/residuals.h"
 #include "helicarm/pipeline/stopwatch.h"
 
 namespace helicarm::pipeline {

@@ -194,13 +194,12 @@ std::vector<TunnelPlan> tunnels_from(JsonReader& reader, const std::vector<Pick>
   return tunnels;
 }
 
-std::vector<verification::ToolLine> tool_lines_from(JsonReader& reader,
-                                                    const std::vector<TunnelPlan>& tunnels) {
-  std::vector<verification::ToolLine> lines;
+std::vector<guidance::ToolLine> tool_lines_from(JsonReader& reader, const std::vector<TunnelPlan>& tunnels) {
+  std::vector<guidance::ToolLine> lines;
   std::set<std::string> names;
   for (JsonReader& entry : reader.objects("tool_lines", false, most_picks)) {
-    verification::ToolLine line{name_from(entry, "name"), name_from(entry, "tunnel"),
-                                place_from(entry, "p1_in_calibrator"), place_from(entry, "p2_in_calibrator")};
+    guidance::ToolLine line{name_from(entry, "name"), name_from(entry, "tunnel"),
+                            place_from(entry, "p1_in_calibrator"), place_from(entry, "p2_in_calibrator")};
     take_name(entry, names, line.name);
     if (!find_named(tunnels, line.tunnel, &TunnelPlan::name))
       entry.refuse(Reason::bad_value, "tunnel",
@@ -332,7 +331,7 @@ Json json_of(const guidance::TrackerNoise& noise) {
           {"samples", noise.samples == guidance::Samples::shared ? "shared" : "independent"}};
 }
 
-Json json_of(const verification::ToolLine& line) {
+Json json_of(const guidance::ToolLine& line) {
   return {{"name", line.name},
           {"tunnel", line.tunnel},
           {"p1_in_calibrator", geometry::json_list(line.p1_in_calibrator)},
@@ -356,7 +355,7 @@ Json to_json(const Case& written) {
   for (const Pick& pick : written.picks) json["picks"].push_back(to_json(pick));
   for (const TunnelPlan& tunnel : written.tunnels)
     json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
-  for (const verification::ToolLine& line : written.tool_lines) json["tool_lines"].push_back(json_of(line));
+  for (const guidance::ToolLine& line : written.tool_lines) json["tool_lines"].push_back(json_of(line));
   if (!written.diameters_mm.empty()) json["diameters_mm"] = written.diameters_mm;
   if (!written.notes.empty()) json["notes"] = written.notes;
   return json;

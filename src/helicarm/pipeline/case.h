@@ -11,9 +11,9 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
 #include "helicarm/guidance/poses.h"
+#include "helicarm/guidance/verify.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/plate.h"
-#include "helicarm/verification/verify.h"
 
 namespace helicarm::pipeline {
 
@@ -81,7 +81,7 @@ struct Case {
   guidance::TrackerNoise tracker;
   std::vector<Pick> picks;
   std::vector<TunnelPlan> tunnels;
-  std::vector<verification::ToolLine> tool_lines;
+  std::vector<guidance::ToolLine> tool_lines;
   std::vector<double> diameters_mm;  ///< of the fiducials of a phantom without a file
   std::string notes;
   std::vector<Warning> warnings;

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/pipeline/calibrator_checks.h"
+#include "helicarm/pipeline/diagnosis/calibrator_checks.h"
 #include "helicarm/pipeline/outcome.h"
 #include "helicarm/pipeline/points.h"
 #include "helicarm/pipeline/stopwatch.h"
@@ -118,7 +118,7 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
             result.tunnels = std::move(tunnels);
             return verify_tool_lines(given, calibration.views, result);  // Eq. 17
           })
-          .and_then([&](std::vector<verification::Verification> verifications) {
+          .and_then([&](std::vector<guidance::Verification> verifications) {
             result.verifications = std::move(verifications);
             return check_certain(result.points, options.max_error_mm, given.calibrator);
           })

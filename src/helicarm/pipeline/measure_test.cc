@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "helicarm/pipeline/causes.h"
+#include "helicarm/pipeline/diagnosis/causes.h"
 #include "helicarm/pipeline/locate_case.h"
 #include "helicarm/pipeline/outcome.h"
 #include "helicarm/pipeline/stages.h"

@@ -14,14 +14,14 @@ std::size_t index_of(const std::vector<PointResult>& points, const std::string& 
   return static_cast<std::size_t>(std::ranges::find(points, name, &PointResult::name) - points.begin());
 }
 
-std::optional<verification::LineError> error_at(const PointResult& point,
-                                                const std::vector<geometry::View>& views,
-                                                const verification::ToolLine& line) {
+std::optional<guidance::LineError> error_at(const PointResult& point,
+                                            const std::vector<geometry::View>& views,
+                                            const guidance::ToolLine& line) {
   if (!point.place) return std::nullopt;
-  verification::PlannedPoint planned{point.place->in_calibrator, {}};
+  guidance::PlannedPoint planned{point.place->in_calibrator, {}};
   for (const auto& seen : point.seen)
     planned.uv.push_back(seen ? std::optional<Eigen::Vector2d>(seen->uv) : std::nullopt);
-  return value_or_throw(verification::distance_to_line(views, planned, line));
+  return value_or_throw(guidance::distance_to_line(views, planned, line));
 }
 
 /// 95 % error of a point by that of the calibrator's scale, along the line from its middle.
@@ -78,13 +78,13 @@ Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& given, const Re
   });
 }
 
-Expected<std::vector<verification::Verification>> verify_tool_lines(
+Expected<std::vector<guidance::Verification>> verify_tool_lines(
     const Case& given, const std::vector<calibration::CalibratedView>& calibrated, const Result& result) {
   std::vector<geometry::View> views;
   for (const calibration::CalibratedView& view : calibrated) views.push_back(view.view);
   return guarded([&] {
-    std::vector<verification::Verification> verifications;
-    for (const verification::ToolLine& line : given.tool_lines) {
+    std::vector<guidance::Verification> verifications;
+    for (const guidance::ToolLine& line : given.tool_lines) {
       const auto plan =
           std::ranges::find(given.tunnels, line.tunnel, &TunnelPlan::name) - given.tunnels.begin();
       const TunnelEnds& ends = result.tunnel_ends[static_cast<std::size_t>(plan)];

@@ -23,7 +23,7 @@ std::vector<TunnelEnds> tunnel_ends(const std::vector<TunnelPlan>& plans,
 Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& given, const Result& result);
 
 /// Eq. 17; unlocated ends are omitted. Refuses as `distance_to_line`.
-Expected<std::vector<verification::Verification>> verify_tool_lines(
+Expected<std::vector<guidance::Verification>> verify_tool_lines(
     const Case& given, const std::vector<calibration::CalibratedView>& views, const Result& result);
 
 /// 95 % error (mm) of a tunnel's start or end in the tool's frame; nothing if it is not known there.

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "helicarm/fiducials/status_words.h"
-#include "helicarm/pipeline/advice.h"
+#include "helicarm/pipeline/diagnosis/advice.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -215,27 +215,27 @@ Json json_of(const localization::Accuracy& accuracy) {
   return json;
 }
 
-Json json_of(const verification::Verification& verification, const std::vector<ViewResult>& views) {
-  const auto per_view = [&](const std::optional<verification::LineError>& error) {
+Json json_of(const guidance::Verification& verification, const std::vector<ViewResult>& views) {
+  const auto per_view = [&](const std::optional<guidance::LineError>& error) {
     Json json = Json::object();
     for (std::size_t i = 0; i < views.size(); ++i)
       json[views[i].name] = error ? optional_number(error->per_view_px[i]) : Json(nullptr);
     return json;
   };
   const auto& [name, start, end] = verification;
-  const auto figure = [](const std::optional<verification::LineError>& error,
-                         double verification::LineError::*which) {
+  const auto figure = [](const std::optional<guidance::LineError>& error,
+                         double guidance::LineError::*which) {
     return error ? number((*error).*which) : Json(nullptr);
   };
   return {{"name", name},
           {"start_px", per_view(start)},
           {"end_px", per_view(end)},
-          {"err_start_px", figure(start, &verification::LineError::combined_px)},
-          {"err_end_px", figure(end, &verification::LineError::combined_px)},
-          {"err_start_mm", figure(start, &verification::LineError::combined_mm)},
-          {"err_end_mm", figure(end, &verification::LineError::combined_mm)},
-          {"distance_start_mm", figure(start, &verification::LineError::distance_mm)},
-          {"distance_end_mm", figure(end, &verification::LineError::distance_mm)}};
+          {"err_start_px", figure(start, &guidance::LineError::combined_px)},
+          {"err_end_px", figure(end, &guidance::LineError::combined_px)},
+          {"err_start_mm", figure(start, &guidance::LineError::combined_mm)},
+          {"err_end_mm", figure(end, &guidance::LineError::combined_mm)},
+          {"distance_start_mm", figure(start, &guidance::LineError::distance_mm)},
+          {"distance_end_mm", figure(end, &guidance::LineError::distance_mm)}};
 }
 
 Json json_of(const Timing& timing) {

@@ -17,10 +17,10 @@
 #include "helicarm/fiducials/label_fiducials.h"
 #include "helicarm/guidance/guide.h"
 #include "helicarm/guidance/tunnel.h"
+#include "helicarm/guidance/verify.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/rectification/rectify.h"
-#include "helicarm/verification/verify.h"
 #include "helicarm/xray/xray_image.h"
 
 namespace helicarm::pipeline {
@@ -114,8 +114,8 @@ struct Result {
   std::vector<guidance::Tunnel> tunnels;
   std::vector<ModelPoint> model_points;  ///< of the models that were registered and not refused
   std::vector<ModelTunnel> model_tunnels;
-  std::vector<verification::ToolLine> tool_lines;
-  std::vector<verification::Verification> verifications;
+  std::vector<guidance::ToolLine> tool_lines;
+  std::vector<guidance::Verification> verifications;
   Timing timing_ms;
 };
 

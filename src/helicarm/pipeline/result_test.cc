@@ -38,7 +38,7 @@ TEST(ResultJson, HasEveryKeyOfTheContract) {
   result.bones = guidance::knee_bones();
   result.tunnels.push_back({"femur", {}, {}, {}, 30});
   result.verifications.push_back(
-      {"drill", verification::LineError{{1.0, {}}, 1, 2, 3}, verification::LineError{{1.0, {}}, 1, 2, 3}});
+      {"drill", guidance::LineError{{1.0, {}}, 1, 2, 3}, guidance::LineError{{1.0, {}}, 1, 2, 3}});
   const Json json = to_json(result);
 
   expect_keys(json, {"format", "status", "failure", "warnings", "views", "points", "accuracy", "tunnels",

@@ -9,8 +9,8 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/operation/replay.h"
+#include "helicarm/operation/session_log.h"
 #include "helicarm/rehearsal/rehearse.h"
-#include "helicarm/session/session_log.h"
 
 namespace helicarm::rehearsal {
 namespace {
@@ -44,14 +44,14 @@ class AttackedRecord : public testing::Test {
   void SetUp() override {
     session_ = folder_->path() / testing::UnitTest::GetInstance()->current_test_info()->name();
     fs::copy(whole_, session_, fs::copy_options::recursive);
-    records_ = session::read_session(session_ / "session.log")->records;
+    records_ = operation::read_session(session_ / "session.log")->records;
   }
 
   /// Writes the records with a valid chain and consecutive numbers.
   void write() const {
     std::string chain, log;
     std::uint64_t number = 0;
-    for (const session::SessionRecord& record : records_) {
+    for (const operation::SessionRecord& record : records_) {
       const std::string text =
           Json{{"n", number++}, {"time_s", record.time_s}, {"kind", record.kind}, {"content", record.content}}
               .dump();
@@ -61,7 +61,7 @@ class AttackedRecord : public testing::Test {
     std::ofstream(session_ / "session.log", std::ios::binary) << log;
   }
   Json& content(const std::string& kind, std::size_t which = 0) {
-    for (session::SessionRecord& record : records_)
+    for (operation::SessionRecord& record : records_)
       if (record.kind == kind && which-- == 0) return record.content;
     throw std::out_of_range(kind);
   }
@@ -77,13 +77,13 @@ class AttackedRecord : public testing::Test {
     EXPECT_THAT(report.differences, testing::Contains(HasSubstr(part)));
   }
   void remove_records(const std::string& kind) {
-    std::erase_if(records_, [&](const session::SessionRecord& record) { return record.kind == kind; });
+    std::erase_if(records_, [&](const operation::SessionRecord& record) { return record.kind == kind; });
   }
 
   static std::unique_ptr<TemporaryFolder> folder_;
   static fs::path whole_;
   fs::path session_;
-  std::vector<session::SessionRecord> records_;
+  std::vector<operation::SessionRecord> records_;
 };
 std::unique_ptr<TemporaryFolder> AttackedRecord::folder_;
 fs::path AttackedRecord::whole_;

@@ -59,7 +59,7 @@ void stir(virtual_devices::SimulatedScene& simulated_scene) {
 }
 
 EndError end_error(const std::string& name, const operation::EndMiss& miss,
-                   const std::optional<verification::LineError>& in_xrays, VirtualDevices& virtual_or) {
+                   const std::optional<guidance::LineError>& in_xrays, VirtualDevices& virtual_or) {
   const Eigen::Vector2d across =
       (virtual_or.tracker_from_tip().inverse() * virtual_or.simulated_scene().point_in_tracker(name))
           .head<2>();
@@ -115,7 +115,7 @@ operation::HandDrill calibrated_drill(const virtual_devices::HeldDrill& drill) {
 
 void add_ends(Rehearsal& done, const operation::PlannedTunnel& tunnel,
               const operation::TunnelOutcome& outcome, VirtualDevices& virtual_or) {
-  using verification::Verification, verification::LineError;
+  using guidance::Verification, guidance::LineError;
   const auto in_xrays = [&](const std::optional<LineError> Verification::*end) {
     return outcome.verification ? (*outcome.verification).*end : std::nullopt;
   };

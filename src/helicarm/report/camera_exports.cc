@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/geometry/import_matrix.h"
-#include "helicarm/geometry/itk_transform.h"
+#include "helicarm/exchange/import_matrix.h"
+#include "helicarm/exchange/itk_transform.h"
+#include "helicarm/exchange/rtk_projection.h"
 #include "helicarm/geometry/rotation.h"
-#include "helicarm/geometry/rtk_projection.h"
 
 namespace helicarm::report {
 namespace {
@@ -68,9 +68,9 @@ std::string opencv_yaml(const pipeline::ViewResult& view) {
 }
 
 std::string rtk_geometry(const pipeline::ViewResult& view) {
-  const geometry::RtkView rtk =
-      value_or_throw(geometry::rtk_view(view.calibrated->view, image_size(view), detector_pixel_mm(view)));
-  const geometry::RtkProjection& p = rtk.projection;
+  const exchange::RtkView rtk =
+      value_or_throw(exchange::rtk_view(view.calibrated->view, image_size(view), detector_pixel_mm(view)));
+  const exchange::RtkProjection& p = rtk.projection;
   std::string text = fmt::format(
       "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<!-- Projection image: spacing {} {} mm, origin {} "
       "{} mm; "
@@ -93,7 +93,7 @@ std::string rtk_geometry(const pipeline::ViewResult& view) {
 }
 
 std::string itk_pose(const pipeline::ViewResult& view) {
-  return geometry::itk_transform_text(view.calibrated->view.camera_from_world);
+  return exchange::itk_transform_text(view.calibrated->view.camera_from_world);
 }
 
 std::string dlt_csv(std::span<const pipeline::ViewResult* const> views) {
@@ -101,7 +101,7 @@ std::string dlt_csv(std::span<const pipeline::ViewResult* const> views) {
   for (Eigen::Index i = 0; i < columns.cols(); ++i) {
     const pipeline::ViewResult& view = *views[std::size_t(i)];
     const geometry::Projection p =
-        geometry::xmalab_from_pixels(view.xray_image->pixels.height()) * view.calibrated->view.projection();
+        exchange::xmalab_from_pixels(view.xray_image->pixels.height()) * view.calibrated->view.projection();
     if (!geometry::factors_from_projection(p))
       throw BadInput(
           {Reason::point_at_infinity,

@@ -19,7 +19,7 @@ std::string matrix_text(const pipeline::ViewResult& view);
 std::string opencv_yaml(const pipeline::ViewResult& view);
 
 /// RTK's ThreeDCircularProjectionGeometry of one projection, the calibrator's frame as the fixed one; a
-/// comment states the spacing and origin of the projection image. Throws BadInput as `geometry::rtk_view`.
+/// comment states the spacing and origin of the projection image. Throws BadInput as `exchange::rtk_view`.
 std::string rtk_geometry(const pipeline::ViewResult& view);
 
 /// ITK transform whose moving space is the camera and whose fixed one is the calibrator.

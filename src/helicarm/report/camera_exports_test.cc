@@ -7,8 +7,8 @@
 #include <unistd.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/geometry/import_matrix.h"
-#include "helicarm/geometry/itk_transform.h"
+#include "helicarm/exchange/import_matrix.h"
+#include "helicarm/exchange/itk_transform.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::report {
@@ -63,7 +63,7 @@ TEST_P(CameraExports, OpenCvReadsItsOwnFormat) {
 }
 
 TEST_P(CameraExports, OpenCvFileIsImported) {
-  const auto back = geometry::import_matrix(written(opencv_yaml(view_)));
+  const auto back = exchange::import_matrix(written(opencv_yaml(view_)));
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(back->view.projection(), view_.calibrated->view.projection());
   EXPECT_EQ(back->image_size, Eigen::Vector2i(64, 48));
@@ -75,15 +75,15 @@ TEST_P(CameraExports, RtkGeometryShowsPointsAtTheirPixels) {
   EXPECT_THAT(text,
               testing::HasSubstr(fmt::format("spacing {} 0.25 mm", 4000.25 * 0.25 / std::abs(GetParam()))));
   EXPECT_EQ(text.find("rows run upwards") == text.npos, mirrored);
-  geometry::ImportOptions options{.image_size = Eigen::Vector2i(64, 48)};
+  exchange::ImportOptions options{.image_size = Eigen::Vector2i(64, 48)};
   options.pixel_mm = {4000.25 * 0.25 / std::abs(GetParam()), 0.25};
-  const auto back = geometry::import_matrix(written(text), options);
+  const auto back = exchange::import_matrix(written(text), options);
   ASSERT_TRUE(back) << back.error().message;
   expect_pixels(back->view, !mirrored);
 }
 
 TEST_P(CameraExports, PoseIsAnItkTransform) {
-  const auto back = geometry::read_itk_transform(written(itk_pose(view_)));
+  const auto back = exchange::read_itk_transform(written(itk_pose(view_)));
   ASSERT_TRUE(back) << back.error().message;
   ASSERT_TRUE(*back);
   const geometry::RigidTransform& pose = view_.calibrated->view.camera_from_world;

@@ -10,7 +10,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
-#include "helicarm/geometry/import_matrix.h"
+#include "helicarm/exchange/import_matrix.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/xray/read_xray_image.h"
 
@@ -96,7 +96,7 @@ TEST_F(Exports, RectifiedImagesAreOfTheViews) {
 TEST_F(Exports, MayaCamReadsBackToTheLastBit) {
   ASSERT_TRUE(write_exports(result_, folder_));
   for (const pipeline::ViewResult& view : result_.views) {
-    const auto back = geometry::import_matrix(folder_ / (view.name + "_mayacam.txt"));
+    const auto back = exchange::import_matrix(folder_ / (view.name + "_mayacam.txt"));
     ASSERT_TRUE(back) << back.error().message;
     EXPECT_EQ(back->view.projection(), view.calibrated->view.projection());
     EXPECT_EQ(back->image_size, Eigen::Vector2i(64, 48));
@@ -106,7 +106,7 @@ TEST_F(Exports, MayaCamReadsBackToTheLastBit) {
 TEST_F(Exports, MatrixReadsBack) {
   ASSERT_TRUE(write_exports(result_, folder_));
   for (const pipeline::ViewResult& view : result_.views) {
-    const auto back = geometry::import_matrix(folder_ / (view.name + "_matrix.txt"));
+    const auto back = exchange::import_matrix(folder_ / (view.name + "_matrix.txt"));
     ASSERT_TRUE(back) << back.error().message;
     const geometry::Projection expected = view.calibrated->view.projection();
     EXPECT_LT((back->view.projection() - expected).norm(), 1e-9 * expected.norm()) << view.name;

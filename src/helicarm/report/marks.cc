@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/verification/image_line.h"
+#include "helicarm/guidance/image_line.h"
 
 namespace helicarm::report {
 namespace {
@@ -53,8 +53,8 @@ void add_lines(ViewMarks& marks, const pipeline::Result& result, std::size_t vie
     const auto &from = result.points[start].seen[view], &to = result.points[end].seen[view];
     if (from && to) marks.tunnels.push_back({from->uv, to->uv});
   }
-  for (const verification::ToolLine& tool : result.tool_lines)
-    if (const auto line = verification::line_in_xray(result.views[view].calibrated->view, tool)) {
+  for (const guidance::ToolLine& tool : result.tool_lines)
+    if (const auto line = guidance::line_in_xray(result.views[view].calibrated->view, tool)) {
       const Vector2d beyond = 3 * (line->tip - line->back);
       marks.tool_lines.push_back({line->back - beyond, line->tip + beyond});
     }

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/pipeline/advice.h"
+#include "helicarm/pipeline/diagnosis/advice.h"
 #include "helicarm/report/figures.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/tables.h"

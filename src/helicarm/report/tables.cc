@@ -148,9 +148,9 @@ Table positions_table(const std::vector<pipeline::PointResult>& points) {
       points);
 }
 
-std::vector<ToolAtEnd> tools_at_ends(const std::vector<verification::Verification>& lines) {
+std::vector<ToolAtEnd> tools_at_ends(const std::vector<guidance::Verification>& lines) {
   std::vector<ToolAtEnd> tools;
-  for (const verification::Verification& line : lines)
+  for (const guidance::Verification& line : lines)
     for (const auto& [end, error] : {std::pair{"start", &line.start}, {"end", &line.end}})
       if (*error) tools.push_back({line.name, end, {}, {}, *error});
   return tools;
@@ -254,12 +254,12 @@ Table tunnels_table(const pipeline::Result& result) {
 }
 
 Table verification_table(const std::vector<ToolAtEnd>& tools) {
-  const auto in_images = [](double verification::LineError::*member) {
+  const auto in_images = [](double guidance::LineError::*member) {
     return [member](const ToolAtEnd& t) {
       return t.in_images ? Cell{fixed((*t.in_images).*member, 2)} : Cell{};
     };
   };
-  using verification::LineError;
+  using guidance::LineError;
   return table_of<ToolAtEnd>(
       "Verification",
       {{words("Tunnel", "Name of the tunnel"), [](const ToolAtEnd& t) { return Cell{t.tunnel}; }},

@@ -29,10 +29,10 @@ Table positions_table(const std::vector<pipeline::PointResult>& points);
 struct ToolAtEnd {
   std::string tunnel, end;
   std::optional<double> distance_mm, predicted_mm;  ///< with the tracker
-  std::optional<verification::LineError> in_images;
+  std::optional<guidance::LineError> in_images;
 };
 /// "start" and "end" of each tool line, where located.
-std::vector<ToolAtEnd> tools_at_ends(const std::vector<verification::Verification>& lines);
+std::vector<ToolAtEnd> tools_at_ends(const std::vector<guidance::Verification>& lines);
 
 Table statistics_table(const localization::Accuracy& accuracy);
 Table targets_table(const localization::Accuracy& accuracy);

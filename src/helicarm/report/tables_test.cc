@@ -60,7 +60,7 @@ TEST(PointsTable, MissingRaysAreMarked) {
 
 TEST(VerificationTable, TrackerAndImagesMayEachBeMissing) {
   ToolAtEnd by_tracker{"femur", "start", 0.5, 0.25, {}};
-  ToolAtEnd by_images{"femur", "end", {}, {}, verification::LineError{{}, 1, 2, 3}};
+  ToolAtEnd by_images{"femur", "end", {}, {}, guidance::LineError{{}, 1, 2, 3}};
   const Table table = verification_table({by_tracker, by_images});
   EXPECT_EQ(cell(table, 0, "Error, mm"), "0.50");
   EXPECT_EQ(cell(table, 0, "In space, mm"), "–");

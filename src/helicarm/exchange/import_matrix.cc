@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/exchange/import_matrix.h"
+
+#include <algorithm>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+#include "helicarm/core/text.h"
+#include "helicarm/exchange/import_formats.h"
+
+namespace helicarm::exchange {
+namespace {
+
+constexpr std::uintmax_t max_bytes = 256u << 20;  // an NRRD file includes its pixels
+constexpr double largest_number = 1e12;
+
+ImportedMatrix parse_nrrd(const std::string& text, const std::string& origin, const ImportOptions& options) {
+  std::istringstream lines(text);
+  std::optional<ImportedMatrix> result;
+  std::optional<Eigen::Vector2i> size;
+  constexpr std::string_view matrix_key = "Projection Matrix:=", size_key = "sizes:";
+  for (std::string line; std::getline(lines, line) && !trimmed(line).empty();) {
+    const std::string_view view = line;
+    const std::string name = line.substr(0, line.find(':'));
+    if (key_word(name).find("distortion") != std::string::npos &&
+        view.substr(name.size()).starts_with(":=")) {
+      const std::string where = fmt::format("{}: {}", origin, name);
+      refuse_lens_distortion(numbers_in(view.substr(name.size() + 2), where), where, options);
+    }
+    if (view.starts_with(matrix_key))
+      result = imported(numbers_in(view.substr(matrix_key.size()), origin + ": Projection Matrix"), origin);
+    if (view.starts_with(size_key)) {
+      auto sizes = numbers_in(view.substr(size_key.size()), origin + ": sizes");
+      sizes.resize(std::min<std::size_t>(sizes.size(), 2));
+      size = image_size_from(sizes, origin + ": sizes");
+    }
+  }
+  if (!result)
+    throw BadInput(Reason::unsupported, fmt::format("{}: the header has no \"Projection Matrix\"", origin));
+  result->image_size = size;
+  return *result;
+}
+
+/// What `helicarm import --json` prints.
+ImportedMatrix camera_from(JsonReader& reader, const std::string& origin) {
+  const auto k = reader.matrix("K", 3, 3, {-largest_number, largest_number});
+  const auto r = reader.matrix("R", 3, 3, {-largest_number, largest_number});
+  const auto t = reader.numbers("t", 3, {-largest_number, largest_number});
+  reader.raw("warnings");
+  const ImportedMatrix camera{camera_of(k, r, t, origin), std::nullopt, {}, true};
+  const geometry::View given =
+      imported(reader.matrix("projection", 3, 4, {-largest_number, largest_number}), origin).view;
+  const geometry::Projection own = camera.view.projection(), stated = given.projection();
+  constexpr double rounding = 1e-4;
+  if (std::min((own - stated).norm(), (own + stated).norm()) > rounding * own.norm())
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: \"projection\" is not that of \"K\", \"R\" and \"t\"", origin));
+  return camera;
+}
+
+/// The first three rows; a rigid 4x4 matrix is no camera.
+ImportedMatrix from_4x4(std::vector<double> numbers, const std::string& origin) {
+  if (numbers[12] != 0 || numbers[13] != 0 || numbers[14] != 0 || numbers[15] != 1)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: the last row of a 4x4 matrix must be 0 0 0 1", origin));
+  numbers.resize(12);
+  ImportedMatrix camera = imported(numbers, origin);
+  constexpr double least_focal_px = 20;
+  const double focal = std::min(std::abs(camera.view.intrinsics.fx), std::abs(camera.view.intrinsics.fy));
+  if (focal < least_focal_px)
+    throw BadInput(
+        Reason::unsupported,
+        fmt::format("{}: a 4x4 matrix that is no projection (focal length {:.3g} px, at least {:g}): it "
+                    "has no camera; of a pose, give K, R and t",
+                    origin, focal, least_focal_px));
+  return camera;
+}
+
+ImportedMatrix parse_json_matrix(const std::string& text, const std::string& origin,
+                                 const ImportOptions& options) {
+  Json json = value_or_throw(parse_json(text, origin));
+  if (json.is_array()) json = Json{{"projection", std::move(json)}};
+  if (!json.contains("projection") && holds_camera(json)) return camera_of_keys(json, origin, options);
+  if (!json.contains("projection") && json.size() == 1 && json.front().is_array() && json.front().size() == 4)
+    json = Json{{"projection", Json(json.front())}};
+  JsonReader reader(json, origin);
+  const bool has_4_rows = json["projection"].is_array() && json["projection"].size() == 4;
+  const auto projection = [&] {
+    return reader.matrix("projection", has_4_rows ? 4 : 3, 4, {-largest_number, largest_number});
+  };
+  ImportedMatrix result = reader.has("K") ? camera_from(reader, origin)
+                          : has_4_rows    ? from_4x4(projection(), origin)
+                                          : imported(projection(), origin);
+  if (reader.has("image_size"))
+    result.image_size = image_size_from(reader.numbers("image_size", 2, {1, largest_side_px}), origin);
+  reader.raw("image_size");
+  reader.finish();
+  return result;
+}
+
+/// L1 to L11 of one camera (XMALab's MergedDlts).
+ImportedMatrix from_dlt(const std::vector<std::vector<double>>& rows, const std::string& origin,
+                        const ImportOptions& options) {
+  const std::size_t cameras = rows.front().size();
+  for (const auto& row : rows)
+    if (row.size() != cameras)
+      throw BadInput(Reason::bad_size,
+                     fmt::format("{}: the rows of DLT coefficients differ in length", origin));
+  if (!options.image_size || (cameras > 1 && !options.column))
+    throw BadInput(
+        Reason::usage,
+        fmt::format("{}: DLT coefficients of {} camera(s): give the image's size, whose rows they count "
+                    "upwards from 1{}",
+                    origin, cameras, cameras > 1 ? ", and the column" : ""));
+  const int column = options.column.value_or(1);
+  if (column < 1 || std::size_t(column) > cameras)
+    throw BadInput(Reason::bad_value, fmt::format("{}: column {}, must be 1 to {}", origin, column, cameras));
+  Eigen::Matrix<double, 12, 1> l;
+  for (std::size_t i = 0; i < rows.size(); ++i) l[Eigen::Index(i)] = rows[i][std::size_t(column) - 1];
+  l[11] = 1;
+  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> projection =
+      xmalab_from_pixels(options.image_size->y()).inverse() *
+      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(l.data());
+  ImportedMatrix result = imported({projection.data(), projection.data() + projection.size()}, origin);
+  result.image_size = options.image_size;
+  return result;
+}
+
+/// "3532,97 0;" separates by blanks or semicolons and writes the decimal point as a comma.
+bool has_decimal_commas(std::string_view text) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  const bool other_separators = text.find_first_of("; \t") != text.npos;
+  for (std::size_t at = text.find(','); at != text.npos; at = text.find(',', at + 1))
+    if (at == 0 || at + 1 == text.size() || !is_digit(text[at - 1]) || !is_digit(text[at + 1])) return false;
+  return other_separators && text.find(',') != text.npos;
+}
+
+ImportedMatrix parse_text_matrix(const std::string& text, const std::string& origin,
+                                 const ImportOptions& options) {
+  constexpr std::size_t dlt_rows = 11, most_rows = 12;
+  std::istringstream lines(text);
+  std::vector<std::vector<double>> rows;
+  for (std::string line; rows.size() <= most_rows && std::getline(lines, line);) {
+    if (line.starts_with('#')) continue;
+    if (has_decimal_commas(trimmed(line)))
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{}: \"{}\": numbers with a decimal comma: write them with a point", origin,
+                                 without_control_characters(trimmed(line).substr(0, 40))));
+    if (auto row = numbers_in(line, origin); !row.empty()) rows.push_back(std::move(row));
+  }
+  const auto all_have = [&](std::size_t count) {
+    return std::ranges::all_of(rows, [&](const auto& row) { return row.size() == count; });
+  };
+  if (rows.size() == dlt_rows) return from_dlt(rows, origin, options);
+  if (rows.size() == 5 && all_have(3)) return from_maya_cam_1(rows, origin, options);
+  std::vector<double> numbers;
+  for (const auto& row : rows) {
+    if (row.size() != 4 && row.size() != 12)
+      throw BadInput(Reason::bad_size,
+                     fmt::format("{}: a row of {} numbers, a 3x4 matrix has rows of 4", origin, row.size()));
+    numbers.insert(numbers.end(), row.begin(), row.end());
+  }
+  return rows.size() == 4 && all_have(4) ? from_4x4(std::move(numbers), origin) : imported(numbers, origin);
+}
+
+ImportedMatrix parse(const std::string& text, const std::string& origin, const ImportOptions& options) {
+  const auto first = text.find_first_not_of(" \t\r\n");
+  if (first == std::string::npos) throw BadInput(Reason::truncated, fmt::format("{}: is empty", origin));
+  if (text.starts_with("NRRD")) return parse_nrrd(text, origin, options);
+  refuse_other_formats(text, origin);
+  const std::string_view content = std::string_view(text).substr(first);
+  const auto second = content.find_first_not_of(" \t\r\n", 1);
+  if (content[0] == '{' || (content[0] == '[' && second != content.npos && content[second] == '['))
+    return parse_json_matrix(text, origin, options);
+  if (is_rtk_geometry(text)) return parse_rtk_geometry(text, origin, options);
+  if (is_opencv_file(text)) return parse_opencv_camera(text, origin, options);
+  if (text.find("camera matrix") != std::string::npos) return parse_maya_cam(text, origin, options);
+  return parse_text_matrix(text, origin, options);
+}
+
+/// The translation in mm. A file without a unit is in mm, unless the source would lie too near.
+void to_mm(ImportedMatrix& camera, std::optional<double> mm_per_unit, const std::string& origin) {
+  camera.view.camera_from_world.translation *= mm_per_unit.value_or(1);
+  if (!camera.view.camera_from_world.translation.allFinite())
+    throw BadInput(Reason::not_finite, fmt::format("{}: the translation is not finite in mm", origin));
+  // C-arms' sources are farther from what they show; in cm or m they seem to be nearer.
+  constexpr double least_mm = 200;
+  const double distance = camera.view.source_in_world().norm();
+  if (mm_per_unit || camera.in_mm || distance >= least_mm) return;
+  throw BadInput(
+      {Reason::usage,
+       fmt::format(
+           "{}: states no unit of length, and in mm the source lies {:.3g} mm from the world's origin "
+           "(at least {:g} mm are taken for granted): state the unit, helicarm import --unit cm ({:.4g} "
+           "mm), m or mm, and use its output",
+           origin, distance, least_mm, 10 * distance),
+       {},
+       {{"distance_mm", distance}, {"limit", least_mm}}});
+}
+
+/// What is unusual in a camera that can be right.
+void add_warnings(ImportedMatrix& camera, const std::string& origin) {
+  const geometry::Intrinsics& k = camera.view.intrinsics;
+  if (const auto flipped = mirrored_or_upwards(k)) {
+    camera.warnings.push_back(*flipped);
+    camera.warnings.back().message.insert(0, origin + ": ");
+  }
+  const auto& size = camera.image_size;
+  if (size && !(k.u0 > 0 && k.v0 > 0 && k.u0 < size->x() && k.v0 < size->y()))
+    camera.warnings.push_back(
+        {Reason::intrinsics_inconsistent,
+         fmt::format(
+             "{}: the central ray ({:.0f}, {:.0f}) lies outside the image of {} x {}: check the image size",
+             origin, k.u0, k.v0, size->x(), size->y()),
+         {},
+         {{"u0_px", k.u0}, {"v0_px", k.v0}}});
+}
+
+}  // namespace
+
+Eigen::Matrix3d xmalab_from_pixels(int image_height) {
+  Eigen::Matrix3d pixels;
+  pixels << 1, 0, 1, 0, -1, image_height, 0, 0, 1;
+  return pixels;
+}
+
+std::optional<Warning> mirrored_or_upwards(const geometry::Intrinsics& k) {
+  if (k.fx * k.fy >= 0) return std::nullopt;
+  return Warning{
+      Reason::ambiguous_handedness,
+      fmt::format("fx {:.4g} and fy {:.4g} px have different signs: the image is mirrored, or its v "
+                  "points upwards; v points downwards here (height - 1 - v)",
+                  k.fx, k.fy),
+      {},
+      {{"fx_px", k.fx}, {"fy_px", k.fy}}};
+}
+
+Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, const ImportOptions& options) {
+  const auto text = read_file(path, max_bytes);
+  if (!text) return tl::unexpected<Failure>(text.error());
+  return guarded([&] {
+    const std::string origin = path.filename().string();
+    ImportedMatrix result = parse(without_byte_order_mark(*text), origin, options);
+    const auto &given = options.image_size, &stated = result.image_size;
+    if (given && stated && *given != *stated)
+      throw BadInput(Reason::bad_size,
+                     fmt::format("{}: is for images of {} x {}, --image-size states {} x {}", origin,
+                                 stated->x(), stated->y(), given->x(), given->y()));
+    to_mm(result, options.mm_per_unit, origin);
+    add_warnings(result, origin);
+    return result;
+  });
+}
+
+}  // namespace helicarm::exchange

@@ -1,0 +1,429 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Registers a modelled knee's femur, or a patient's head, in simulated images from perturbed starts and with wrong input.
+
+  tools/evaluation/registration_protocol.py --starts 200 --jobs 4 --doc docs/registration.md
+  tools/evaluation/registration_protocol.py --head --starts 200 --jobs 4 --doc docs/registration.md
+  tools/evaluation/registration_protocol.py --kinds mirrored,tibia --cases 10 --keep folder
+
+Knees and their CTs are those of tools/evaluation/bone_ct.py. The head is the CT of Debian's package invesalius-examples (apt-get install
+invesalius-examples), registered by a bone window without mask. The registered volume is blurred, has noise, and the head's also has
+another grid and the CT's headrest, which is not rendered. Images and calibration come from the program (`simulate`, whose rays,
+attenuation, blur and scatter are not the registration's). The head is larger than the field and surrounds the calibrator.
+
+Right cases: a start whose mean displacement of the targets is 0 to 20 mm, every 20 cases in each bin of 1 mm once (van de Kraats
+2005). mTRE: mean over 14 targets, for the knee the corners and face centres of a box of 40 mm about the femur's end, for the head
+points of the skull within 60 mm of the CT's centre, as far from each other as possible. Success: not refused, and mTRE below 1 or
+2 mm. False accept: not refused, and mTRE above 2 mm. False refusal: refused, and mTRE below 1 mm. Capture range: end of the last
+1 mm bin up to which every bin has 95 % successes at 2 mm. Seconds: of the registration, without calibration.
+Wrong cases, from a start within 5 mm of the best guess:
+  patient    another knee's CT          mirrored   the CT exchanged left for right     tibia   tibia for femur
+  moved      3 mm between the images, across both central rays    hidden  3 mm within their plane
+  scaled     voxels 3 % larger          camera     one view's calibration off by 2 mm along the leg
+`patient` and `tibia` are kinds of the knee alone.
+One view (`one_view`, right input): error and predicted sigma along the view's central ray, and both views' sigma there.
+A wrong case that is accepted is a false accept; `hidden` cannot be seen, its error is compared with the covariance.
+
+Long runs: --jobs registers several cases at once, each by a process with one thread; poses do not depend on it, seconds do. --rows
+keeps what is done; the same command goes on after an interruption. Needs NumPy. Exit code 1 if a visible wrong case is accepted."""
+import argparse
+import concurrent.futures
+import json
+import math
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+
+import numpy as np
+
+import bone_ct
+import head_ct
+
+KINDS = ("right", "patient", "mirrored", "tibia", "moved", "hidden", "scaled", "camera", "one_view")
+VISIBLE = ("patient", "mirrored", "tibia", "moved", "scaled", "camera")
+TARGETS = np.array([[x, y, z] for x in (-20, 0, 20) for y in (-20, 0, 20) for z in (-20, 0, 20)
+                    if abs(x) + abs(y) + abs(z) in (20, 60)], float)
+CHI2_95 = 7.815
+BINS = 20  # of 1 mm
+
+
+def rotation(vector):
+    angle = np.linalg.norm(vector)
+    if angle < 1e-12:
+        return np.eye(3)
+    x, y, z = vector / angle
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + math.sin(angle) * k + (1 - math.cos(angle)) * k @ k
+
+
+def moved(pose, centre, shift, vector):
+    """The pose turned about `centre` (world) and shifted."""
+    result = pose.copy()
+    result[:3, :3] = rotation(vector) @ pose[:3, :3]
+    result[:3, 3] = rotation(vector) @ (pose[:3, 3] - centre) + centre + shift
+    return result
+
+
+def placed(pose, points):
+    return points @ pose[:3, :3].T + pose[:3, 3]
+
+
+def start_at(pose, targets, distance, rng, arm_mm=30):
+    """A start whose mean displacement of the targets is `distance`, shift and rotation in random proportion. `arm_mm`: the
+    targets' distance from their centre."""
+    centre = placed(pose, targets).mean(axis=0)
+    shift, vector = rng.standard_normal(3), rng.standard_normal(3)
+    shift *= rng.uniform(0.2, 1) / np.linalg.norm(shift)
+    vector *= rng.uniform(0.2, 1) / np.linalg.norm(vector) / arm_mm
+    low, high = 0.0, 100.0
+    for _ in range(60):
+        factor = (low + high) / 2
+        start = moved(pose, centre, factor * shift, factor * vector)
+        error = np.linalg.norm(placed(start, targets) - placed(pose, targets), axis=1).mean()
+        low, high = (factor, high) if error < distance else (low, factor)
+    return moved(pose, centre, low * shift, low * vector)
+
+
+def made(folder, make):
+    """`folder`, filled by `make` unless it exists; an interrupted run leaves no half of it."""
+    if not folder.exists():
+        part = folder.with_name(f"{folder.name}.part")
+        shutil.rmtree(part, ignore_errors=True)
+        make(part)
+        part.rename(folder)
+    return folder
+
+
+class Knees:
+    name, model, kinds = "knee", "femur", KINDS
+    arm_mm = 30
+    targets = np.array([0, 5, 20.0]) + TARGETS
+
+    def subject(self, number, other=False):
+        return number % 4 + (4 if other else 0)
+
+    def write(self, folder, subject):
+        folder.mkdir()
+        knee = bone_ct.Knee(subject)
+        scan = bone_ct.rounded(knee.scanned())
+        bone_ct.write_nrrd(folder / "true.nrrd", bone_ct.rounded(knee.hu))
+        bone_ct.write_nrrd(folder / "scan.nrrd", scan)
+        bone_ct.write_nrrd(folder / "mirrored.nrrd", scan[:, :, ::-1])
+        bone_ct.write_nrrd(folder / "scaled.nrrd", scan, 1.03 * bone_ct.VOXEL_MM)
+        for name, mask in (("femur", knee.femur), ("tibia", knee.tibia)):
+            bone_ct.write_nrrd(folder / f"{name}.nrrd", mask.astype(np.uint8))
+            bone_ct.write_nrrd(folder / f"mirrored_{name}.nrrd", mask[:, :, ::-1].astype(np.uint8))
+            bone_ct.write_nrrd(folder / f"scaled_{name}.nrrd", mask.astype(np.uint8), 1.03 * bone_ct.VOXEL_MM)
+
+    def files(self, folder, kind):
+        """The model's keys of case.json, with the files' places."""
+        if kind in ("mirrored", "scaled"):
+            return {"volume": folder / f"{kind}.nrrd", "mask": folder / f"{kind}_femur.nrrd"}
+        return {"volume": folder / "scan.nrrd", "mask": folder / ("tibia.nrrd" if kind == "tibia" else "femur.nrrd")}
+
+
+class Heads:
+    name, model, kinds = "head", "head", tuple(kind for kind in KINDS if kind not in ("patient", "tibia"))
+
+    def __init__(self, path):
+        self.head = head_ct.Head(path)
+        self.targets = self.head.targets()
+        self.arm_mm = np.linalg.norm(self.targets - self.targets.mean(axis=0), axis=1).mean()
+
+    def subject(self, number, other=False):
+        return 0
+
+    def write(self, folder, subject):
+        folder.mkdir()
+        scan, voxel_mm, centre = bone_ct.rounded(self.head.scanned()), self.head.voxel_mm, head_ct.GRID_SHIFT_MM
+        bone_ct.write_nrrd(folder / "true.nrrd", self.head.hu, voxel_mm)
+        bone_ct.write_nrrd(folder / "scan.nrrd", scan, voxel_mm, centre)
+        bone_ct.write_nrrd(folder / "mirrored.nrrd", scan[:, :, ::-1], voxel_mm, centre * [-1, 1, 1])
+        bone_ct.write_nrrd(folder / "scaled.nrrd", scan, 1.03 * voxel_mm, 1.03 * centre)
+
+    def files(self, folder, kind):
+        return {"volume": folder / f"{kind if kind in ('mirrored', 'scaled') else 'scan'}.nrrd", "window_hu": head_ct.WINDOW_HU}
+
+
+class Protocol:
+    def __init__(self, body, arguments, folder):
+        self.body, self.program, self.threads, self.folder = body, arguments.program, arguments.threads, folder
+        self.keep = arguments.keep is not None
+        self.lock, self.locks = threading.Lock(), {}
+
+    def run(self, *words):
+        done = subprocess.run([self.program, *map(str, words), "--quiet", "--threads", str(self.threads)], capture_output=True,
+                              text=True, check=False)
+        if done.returncode not in (0, 3):
+            sys.exit(f"{' '.join(map(str, words))}\n{done.stderr}")
+
+    def volumes(self, subject):
+        """Folder of a subject's volumes."""
+        with self.lock:
+            return made(self.folder / f"{self.body.name}{subject}", lambda folder: self.body.write(folder, subject))
+
+    def simulated(self, number, shift=(0, 0, 0)):
+        """Case folder, the same for every kind. `shift`: of the body along L, P, S."""
+        centre = ",".join(f"{-s:g}" for s in shift)
+        volume = self.volumes(self.body.subject(number)) / "true.nrrd"
+        folder = self.folder / f"{self.body.name}-case-{number}{''.join(f'_{s:g}' for s in shift)}"
+        with self.lock:
+            own = self.locks.setdefault(folder, threading.Lock())
+        with own:
+            return made(folder, lambda case: self.run("simulate", case, "--kind", "flat", "--seed", 100 + number, "--ct", volume,
+                                                      f"--ct-centre={centre}"))
+
+    def cameras(self, case, out):
+        """Views' cameras as calibrated, with the image of each; and the failure if there are none."""
+        self.run("run", case, "--out", out)
+        result = json.loads((out / "result.json").read_text())
+        given = json.loads((case / "case.json").read_text())["views"]
+        cameras = []
+        for view, image in zip(result["views"], given):
+            if not (view.get("camera_from_calibrator") and view.get("intrinsics")):
+                return [], result["failure"]
+            pose, k = np.array(view["camera_from_calibrator"]), view["intrinsics"]
+            cameras.append(({"K": [[k["fx_px"], 0, k["u0"]], [0, k["fy_px"], k["v0"]], [0, 0, 1]]}, pose, image))
+        return cameras, result["failure"]
+
+    def register(self, case, model, out, views):
+        work = out.with_name("work")
+        shutil.rmtree(work, ignore_errors=True)
+        shutil.copytree(case, work)
+        case_json = json.loads((case / "case.json").read_text())
+        model = dict(model)
+        for name in ("volume", "mask"):
+            if name in model:
+                os.link(model[name], work / f"{name}.nrrd")
+                model[name] = f"{name}.nrrd"
+        (work / "case.json").write_text(json.dumps({**case_json, "views": views, "models": [model]}))
+        self.run("register", work, "--out", out)
+        result = json.loads((out / "registration.json").read_text())
+        return result["models"][0] if result["models"] else {"decision": "refuse", "failure": result["failure"]}
+
+    def case(self, kind, number):
+        """The row of one case, in a folder of its own."""
+        folder = self.folder / f"{self.body.name}-{kind}-{number}"
+        folder.mkdir(exist_ok=True)
+        row = self.row_of(folder, kind, number)
+        if not self.keep:
+            shutil.rmtree(folder, ignore_errors=True)
+        return row
+
+    def row_of(self, folder, kind, number):
+        rng = np.random.default_rng([number, KINDS.index(kind)])
+        targets = self.body.targets
+        case = self.simulated(number)
+        pose = np.array(json.loads((case / "truth.json").read_text())["ct"]["calibrator_from_patient"])
+        # The models' sizes are exact, but where a kind is about them.
+        model = {"name": self.body.model, "scale_sigma": 0,
+                 **self.body.files(self.volumes(self.body.subject(number, other=kind == "patient")), kind)}
+        guess = pose.copy()
+        if kind == "tibia":
+            guess[:3, 3] += pose[:3, :3] @ [0, 0, 55.0]
+        if kind in ("moved", "hidden"):
+            other = self.simulated(number, {"moved": (0, 0, 3), "hidden": (3, 0, 0)}[kind])
+            mixed = folder / "mixed"
+            shutil.rmtree(mixed, ignore_errors=True)
+            shutil.copytree(case, mixed)
+            shutil.copy(other / "LAT.dcm", mixed / "LAT.dcm")
+            case = mixed
+        # Every 20 starts have each bin once; further ones meet the next subject in each bin.
+        distance = (number + number // BINS) % BINS + rng.uniform() if kind == "right" else rng.uniform(0, 5)
+        start = start_at(guess, targets, distance, rng, self.body.arm_mm)
+        model["start"] = {"world_from_model": start.tolist()}
+        cameras, failure = self.cameras(case, folder / "calibrated") if kind in ("camera", "one_view") else ([], None)
+        if kind == "camera" and cameras:
+            case = self.shifted_camera(case, cameras, folder / "camera")
+        views = json.loads((case / "case.json").read_text())["views"]
+        if kind == "camera" and not cameras:
+            result = {"decision": "refuse", "failure": failure}
+        else:
+            result = self.register(case, model, folder / "out", views[:1] if kind == "one_view" else views)
+        row = self.row(kind, number, distance, pose, targets, result)
+        if kind == "one_view" and cameras:
+            ray = cameras[0][1][2, :3]
+            row |= self.along(ray, pose, targets, result)
+            both = self.along(ray, pose, targets, self.register(case, model, folder / "both", views))
+            row["both_sigma_mm"] = both.get("sigma_mm")
+        return row
+
+    def along(self, ray, pose, targets, result):
+        """Along a direction of the world: error of the targets' centre, and its sigma."""
+        if not result.get("covariance"):
+            return {}
+        found, centre = np.array(result["world_from_model"]), np.array(result["centre_mm"])
+        at = placed(found, targets).mean(axis=0)
+        covariance = self.of_point(np.array(result["covariance"]), at - centre)
+        return {"error_mm": float(ray @ (at - placed(pose, targets).mean(axis=0))), "sigma_mm": math.sqrt(ray @ covariance @ ray)}
+
+    @staticmethod
+    def shifted_camera(case, cameras, changed):
+        shutil.rmtree(changed, ignore_errors=True)
+        changed.mkdir()
+        views = []
+        for i, (camera, pose, image) in enumerate(cameras):
+            pose = pose.copy()
+            if i == 1:
+                pose[:3, 3] += pose[:3, :3] @ [2.0, 0, 0]  # along the leg
+            name = f"camera{i}.json"
+            (changed / name).write_text(json.dumps({**camera, "R": pose[:3, :3].tolist(), "t": pose[:3, 3].tolist()}))
+            shutil.copy(case / image["image"], changed / image["image"])
+            views.append({**image, "camera": name})
+        (changed / "case.json").write_text(json.dumps({"format": "helicarm-case/1", "views": views}))
+        return changed
+
+    def row(self, kind, number, distance, pose, targets, result):
+        row = {"body": self.body.name, "kind": kind, "number": number, "start_mm": distance, "decision": result["decision"] or "refuse",
+               "code": (result.get("failure") or {}).get("code"), "seconds": result.get("seconds"),
+               "warnings": [w["code"] for w in result.get("warnings", [])]}
+        if result.get("world_from_model"):
+            found = np.array(result["world_from_model"])
+            errors = placed(found, targets) - placed(pose, targets)
+            row["mtre_mm"] = float(np.linalg.norm(errors, axis=1).mean())
+            if result.get("covariance"):
+                covariance, centre = np.array(result["covariance"]), np.array(result["centre_mm"])
+                row["inside"] = float(np.mean([e @ np.linalg.solve(self.of_point(covariance, p - centre), e) < CHI2_95
+                                               for e, p in zip(errors, placed(found, targets))]))
+        return row
+
+    @staticmethod
+    def of_point(covariance, arm):
+        x, y, z = arm
+        jacobian = np.hstack([[[0, z, -y], [-z, 0, x], [y, -x, 0]], np.eye(3)])
+        return jacobian @ covariance @ jacobian.T
+
+
+def figures(values, percentiles=(50, 95, 100), digits=2):
+    return [f"{np.percentile(values, q):.{digits}f}" for q in percentiles] if values else ["-"] * len(percentiles)
+
+
+def is_within(row, limit, refused_too=False):
+    return (refused_too or row["decision"] != "refuse") and row.get("mtre_mm", math.inf) < limit
+
+
+def capture_range_mm(rows, refused_too=False):
+    for low in range(BINS):
+        own = [is_within(row, 2, refused_too) for row in rows if low <= row["start_mm"] < low + 1]
+        if not own or np.mean(own) < 0.95:
+            return low
+    return BINS
+
+
+def right_table(right):
+    lines = ["| start | cases | mTRE median | 95 % | max | success 1 mm | 2 mm | refused | false accepts | false refusals | "
+             "in the 95 % region | seconds median | 95 % |", "| --- |" + " --- |" * 12]
+    for low, high in ((0, 5), (5, 10), (10, 15), (15, 20), (0, 20)):
+        own = [row for row in right if low <= row["start_mm"] < high]
+        kept = [row for row in own if row["decision"] != "refuse"]
+        inside = [row["inside"] for row in kept if "inside" in row]
+        share = lambda limit: f"{sum(is_within(row, limit) for row in own)} of {len(own)}"  # noqa: E731
+        false_refusals = sum(row["decision"] == "refuse" and is_within(row, 1, True) for row in own)
+        cells = [f"{low} to {high} mm", len(own), *figures([row["mtre_mm"] for row in kept]), share(1), share(2),
+                 len(own) - len(kept), sum(row["mtre_mm"] > 2 for row in kept), false_refusals,
+                 f"{100 * np.mean(inside):.0f} %" if inside else "-",
+                 *figures([row["seconds"] for row in own if row["seconds"] is not None], (50, 95), 1)]
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    refused = sorted(row["code"] for row in right if row["decision"] == "refuse")
+    counts = ", ".join(f"{code} {refused.count(code)}" for code in dict.fromkeys(refused))
+    warned = sum(row["decision"] == "warn" for row in right)
+    return lines + ["", f"Capture range: {capture_range_mm(right)} mm; of the poses found, refused or not: "
+                        f"{capture_range_mm(right, True)} mm. Warned: {warned}. Refused: {counts or 'none'}.", ""]
+
+
+def tables(rows):
+    rows = sorted(rows, key=lambda row: (KINDS.index(row["kind"]), row["number"]))
+    right = [row for row in rows if row["kind"] == "right"]
+    lines = right_table(right) if right else []
+    wrong = [kind for kind in KINDS[1:-1] if any(row["kind"] == kind for row in rows)]
+    if wrong:
+        lines += ["| wrong | cases | refused | warned | accepted | codes |", "| --- | --- | --- | --- | --- | --- |"]
+    for kind in wrong:
+        own = [row for row in rows if row["kind"] == kind]
+        count = lambda decision: sum(row["decision"] == decision for row in own)  # noqa: E731
+        codes = sorted({row["code"] or ",".join(row["warnings"]) or "-" for row in own})
+        lines.append(f"| {kind} | {len(own)} | {count('refuse')} | {count('warn')} | {count('accept')} | {', '.join(codes)} |")
+    single = [row for row in rows if row["kind"] == "one_view" and "sigma_mm" in row and row.get("both_sigma_mm")]
+    kept = [row for row in single if row["decision"] != "refuse"]
+    if kept:
+        count = lambda decision: sum(row["decision"] == decision for row in single)  # noqa: E731
+        errors, sigmas, both = (np.array([row[name] for row in kept]) for name in ("error_mm", "sigma_mm", "both_sigma_mm"))
+        lines += ["", "| one view | refused | warned | accepted | not refused: error along its ray, rms | mean | predicted sigma, median | "
+                  "both views' sigma, median | within 1.96 sigma |", "| --- |" + " --- |" * 8,
+                  f"| {len(single)} cases | {count('refuse')} | {count('warn')} | {count('accept')} | {np.sqrt(np.mean(errors**2)):.2f} mm | "
+                  f"{np.mean(errors):+.2f} mm | {np.median(sigmas):.2f} mm | {np.median(both):.3f} mm | "
+                  f"{np.sum(abs(errors) < 1.96 * sigmas)} of {len(kept)} |"]
+    return "\n".join(lines)
+
+
+MARKS = {"knee": ("<!-- registration protocol -->", "<!-- end of the registration protocol -->"),
+         "head": ("<!-- registration protocol, head -->", "<!-- end of the registration protocol, head -->")}
+
+
+def renew(document, table, begin, end):
+    text = document.read_text()
+    if begin not in text or end not in text:
+        sys.exit(f"{document}: the marks {begin} and {end} are missing")
+    document.write_text(f"{text[:text.index(begin)]}{begin}\n{table.strip()}\n{text[text.index(end):]}")
+
+
+def rows_in(path):
+    return [json.loads(line) for line in path.read_text().splitlines()] if path and path.exists() else []
+
+
+def parallel(work, jobs, count):
+    """Results of `work(*job)` as they come."""
+    pool = concurrent.futures.ThreadPoolExecutor(count)
+    try:
+        for done in concurrent.futures.as_completed([pool.submit(work, *job) for job in jobs]):
+            yield done.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--program", default="build/bin/helicarm")
+    parser.add_argument("--head", nargs="?", const="", metavar="PATH",
+                        help="the head instead of the knees; PATH of Cranium.inv3, default: where its package installs it")
+    parser.add_argument("--starts", type=int, default=20, help="right cases (default: 20)")
+    parser.add_argument("--cases", type=int, default=10, help="of each wrong kind (default: 10)")
+    parser.add_argument("--kinds", help=f"some of {','.join(KINDS)}; default: all that the body has")
+    parser.add_argument("--jobs", type=int, default=1, help="cases at once (default: 1)")
+    parser.add_argument("--threads", type=int, help="of each case; 0: all cores (default: 0 for one job, 1 for several)")
+    parser.add_argument("--rows", type=pathlib.Path, help="JSON lines of all cases; those it holds are not run again")
+    parser.add_argument("--keep", type=pathlib.Path, help="folder for cases and results (default: a temporary one)")
+    parser.add_argument("--doc", type=pathlib.Path, help="renews the tables between the body's marks of that document")
+    arguments = parser.parse_args()
+    if arguments.threads is None:
+        arguments.threads = 0 if arguments.jobs == 1 else 1
+    body = Knees() if arguments.head is None else Heads(arguments.head or None)
+    kinds = arguments.kinds.split(",") if arguments.kinds else body.kinds
+    if unknown := [kind for kind in kinds if kind not in body.kinds]:
+        parser.error(f"--kinds: {', '.join(unknown)}: the {body.name} has {', '.join(body.kinds)}")
+    rows = [row for row in rows_in(arguments.rows) if row.get("body", "knee") == body.name]
+    done = {(row["kind"], row["number"]) for row in rows}
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = arguments.keep or pathlib.Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        jobs = [(kind, number) for kind in kinds for number in range(arguments.starts if kind == "right" else arguments.cases)
+                if (kind, number) not in done]
+        for row in parallel(Protocol(body, arguments, folder).case, jobs, arguments.jobs):
+            rows.append(row)
+            print(json.dumps(row), flush=True)
+            if arguments.rows:
+                with arguments.rows.open("a") as out:
+                    out.write(json.dumps(row) + "\n")
+    table = tables(rows)
+    print(table)
+    if arguments.doc:
+        renew(arguments.doc, table, *MARKS[body.name])
+    return any(row["kind"] in VISIBLE and row["decision"] == "accept" for row in rows)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
