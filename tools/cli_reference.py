@@ -26,6 +26,9 @@ def parsed(text):
         if line in HEADINGS:
             heading = line[:-1]
             page[heading] = []
+        elif re.fullmatch(r"[A-Z][a-z ]+:", line) and heading not in ("Example", "Begin with"):  # a group of commands
+            heading = "Subcommands"
+            page.setdefault(heading, [])
         elif line.startswith("Usage: "):
             page["usage"] = line[len("Usage: "):]
         elif heading is None and line.strip():

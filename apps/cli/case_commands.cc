@@ -11,7 +11,8 @@ namespace {
 
 void add_new(CLI::App& app, Action& action) {
   auto* command = add_command(
-      app, "new", "Make a case of image files: what they show decides the views and the plate",
+      app, group::measure, "new",
+      "Make a case of image files: what they show decides the views and the plate",
       "helicarm new IM0001 IM0002 --calibrator my-phantom/calibrator.json --out my-case\n"
       "  helicarm new AP=front.png LAT=side.png --calibrator udcsc --plate none --out my-case\n"
       "  helicarm new AP=run.dcm:12 LAT=run.dcm:40 --calibrator c.json --plate plate.json --out my-case");
@@ -44,7 +45,8 @@ void add_new(CLI::App& app, Action& action) {
 }
 
 void add_pick(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "pick", "Pick points in a case: in the desktop application, or by a table",
+  auto* command = add_command(app, group::measure, "pick",
+                              "Pick points in a case: in the desktop application, or by a table",
                               "helicarm pick my-case\n"
                               "  helicarm pick my-case --csv picks.csv");
   auto& a = arguments_of(command, action, pick_command);
@@ -56,9 +58,10 @@ void add_pick(CLI::App& app, Action& action) {
 }
 
 void add_bundle(CLI::App& app, Action& action) {
-  auto* command = add_command(
-      app, "bundle", "Pack a de-identified case with its result and a log into one file for a bug report",
-      "helicarm bundle my-case --result my-result --out report.tar.gz");
+  auto* command =
+      add_command(app, group::measure, "bundle",
+                  "Pack a de-identified case with its result and a log into one file for a bug report",
+                  "helicarm bundle my-case --result my-result --out report.tar.gz");
   auto& a = arguments_of(command, action, bundle_command);
   command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
   command->add_option("--result", a.result,

@@ -149,6 +149,15 @@ class CommandLine(SimulatedCase):
         done = run("phantom", "export", "--svg", drawing, "--json")
         self.assertEqual(json.loads(done.stdout), {"written": [str(drawing)]})
 
+    def test_help_lists_the_commands_by_subject(self):
+        text = run("--help").stdout
+        headings = [line[:-1] for line in text.splitlines() if line.endswith(":") and not line.startswith(" ")]
+        for one, next_one in (("Measure", "Images and cameras"), ("Phantom", "Operation"), ("Operation", "Simulation and studies")):
+            self.assertIn(one, headings)
+            self.assertIn(next_one, headings)
+        self.assertNotIn("Subcommands", headings)
+        self.assertLess(text.index("Registration and motion:"), text.index("  register "))
+
     def test_help_has_an_example(self):
         for command in ("demo", "run", "export", "solve", "locate", "rectify", "detect", "import", "simulate", "phantom"):
             done = run(command, "--help")

@@ -19,8 +19,20 @@ namespace helicarm::cli {
 /// The selected command with its arguments; set while the command line is parsed.
 using Action = std::function<CommandResult(Console&)>;
 
-inline CLI::App* add_command(CLI::App& app, const char* name, const char* what, const char* example) {
+/// Headings of `helicarm --help`, in the order of their first commands.
+namespace group {
+inline constexpr const char* measure = "Measure";
+inline constexpr const char* images = "Images and cameras";
+inline constexpr const char* phantom = "Phantom";
+inline constexpr const char* motion = "Registration and motion";
+inline constexpr const char* operation = "Operation";
+inline constexpr const char* studies = "Simulation and studies";
+}  // namespace group
+
+inline CLI::App* add_command(CLI::App& app, const char* in_group, const char* name, const char* what,
+                             const char* example) {
   CLI::App* command = app.add_subcommand(name, what);
+  command->group(in_group);
   command->footer(std::string("Example:\n  ") + example);
   return command;
 }

@@ -20,11 +20,11 @@ CLI::Option* add_port(CLI::App* command, const char* name, std::uint16_t& port, 
 }
 
 void add_receive(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, "receive", "Receive X-ray images from a C-arm by DICOM (C-STORE) or from a folder",
-                  "helicarm receive --out inbox\n"
-                  "  helicarm receive --out inbox --address 192.168.7.2 --peer C_ARM\n"
-                  "  helicarm receive --out inbox --watch /mnt/c-arm");
+  auto* command = add_command(app, group::operation, "receive",
+                              "Receive X-ray images from a C-arm by DICOM (C-STORE) or from a folder",
+                              "helicarm receive --out inbox\n"
+                              "  helicarm receive --out inbox --address 192.168.7.2 --peer C_ARM\n"
+                              "  helicarm receive --out inbox --watch /mnt/c-arm");
   auto& a = arguments_of(command, action, receive_command);
   command->add_option("--out", a.out, "Folder for the images; one program at a time")->capture_default_str();
   auto* address = command
@@ -118,7 +118,8 @@ void add_calibrate_mount(CLI::App* tracker, Action& action) {
 
 void add_tracker(CLI::App& app, Action& action) {
   auto* tracker = add_command(
-      app, "tracker", "Watch, record or play a tracker (OpenIGTLink); calibrate pointer and mount",
+      app, group::operation, "tracker",
+      "Watch, record or play a tracker (OpenIGTLink); calibrate pointer and mount",
       "helicarm tracker watch 127.0.0.1:18944\n"
       "  helicarm tracker record 127.0.0.1:18944 poses.mha --seconds 20\n"
       "  helicarm tracker replay poses.mha --port 18944\n"
@@ -155,9 +156,10 @@ void add_tracker(CLI::App& app, Action& action) {
 }
 
 void add_robot(CLI::App& app, Action& action) {
-  auto* robot = add_command(app, "robot", "Watch a robot's state (RTDE); nothing is written to it",
-                            "helicarm robot watch 192.168.7.5\n"
-                            "  helicarm robot watch --seconds 2 --json");
+  auto* robot =
+      add_command(app, group::operation, "robot", "Watch a robot's state (RTDE); nothing is written to it",
+                  "helicarm robot watch 192.168.7.5\n"
+                  "  helicarm robot watch --seconds 2 --json");
   robot->require_subcommand(1);
   auto* watch = robot->add_subcommand("watch", "Print the robot's modes, pose and whether it may move");
   auto& a = arguments_of(watch, action, robot_watch_command);
@@ -172,7 +174,8 @@ void add_robot(CLI::App& app, Action& action) {
 
 void add_virtual_or(CLI::App& app, Action& action) {
   auto* command =
-      add_command(app, "virtual-or", "Virtual C-arm, tracker and robot on the protocols of the real ones",
+      add_command(app, group::operation, "virtual-or",
+                  "Virtual C-arm, tracker and robot on the protocols of the real ones",
                   "helicarm virtual-or --plan plan.json\n"
                   "  (then type: shoot AP, shoot LAT, fault hide:femur on, fault cut_cable on, where, quit)");
   auto& a = arguments_of(command, action, virtual_or_command);
@@ -197,7 +200,7 @@ void add_virtual_or(CLI::App& app, Action& action) {
 
 void add_navigate(CLI::App& app, Action& action) {
   auto* command = add_command(
-      app, "navigate",
+      app, group::operation, "navigate",
       "Carry out an operation by a plan: X-ray images, measurement, robot or drill held by hand, "
       "verification",
       "helicarm virtual-or --plan plan.json        (in one terminal; --freehand: without a robot)\n"
@@ -224,8 +227,9 @@ void add_navigate(CLI::App& app, Action& action) {
 }
 
 void add_operate(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "operate", "Table 2's experiment with virtual devices, end to end",
-                              "helicarm operate --cases 4 --out operate");
+  auto* command =
+      add_command(app, group::operation, "operate", "Table 2's experiment with virtual devices, end to end",
+                  "helicarm operate --cases 4 --out operate");
   auto& a = arguments_of(command, action, operate_command);
   command->add_option("--cases", a.cases, "Number of simulated pairs of bones, with four points each")
       ->check(within(1, 1000))
@@ -239,7 +243,8 @@ void add_operate(CLI::App& app, Action& action) {
 }
 
 void add_replay(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "replay", "Recompute an operation from its record and compare bit for bit",
+  auto* command = add_command(app, group::operation, "replay",
+                              "Recompute an operation from its record and compare bit for bit",
                               "helicarm replay operate/case-1");
   auto& a = arguments_of(command, action, replay_command);
   command->add_option("SESSION", a.session, "Folder that holds session.log")->required();

@@ -33,7 +33,7 @@ int run(int argc, char** argv) {
   Console console{std::cout, std::cerr};
   Action action;
   CLI::App app(
-      "helicarm: 3-D points with confidence regions from X-ray images of a knee with a calibrator.\n"
+      "helicarm: 3-D points with confidence regions from X-ray images with a calibrator.\n"
       "Research instrument, not a medical device.",
       "helicarm");
   app.footer("Begin with:\n  helicarm demo\nHelp for a command: helicarm COMMAND --help");

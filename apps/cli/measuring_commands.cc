@@ -28,7 +28,7 @@ void add_motion(CLI::App* command, double& motion_sigma_mm) {
 
 void add_run(CLI::App& app, Action& action) {
   auto* command = add_command(
-      app, "run",
+      app, group::measure, "run",
       "Measure a case: cameras with covariances from X-ray images, and from two or more points and tunnels",
       "helicarm run my-case --out my-result\n"
       "  helicarm run study/* --out results    each case in results/NAME, all in results/summary.csv");
@@ -48,7 +48,7 @@ void add_run(CLI::App& app, Action& action) {
 }
 
 void add_register(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "register",
+  auto* command = add_command(app, group::motion, "register",
                               "Register CT volumes and surfaces of bones or implants to the views of a case",
                               "helicarm register my-case --out my-registration\n\n"
                               "case.json holds \"models\": a CT (\"volume\", with \"mask\" or \"window_hu\") "
@@ -73,9 +73,10 @@ void add_register(CLI::App& app, Action& action) {
 }
 
 void add_export(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "export", "Measure a case and write the result for other programs",
-                              "helicarm export my-case --out exported\n"
-                              "  helicarm export my-case --out exported --as csv,slicer");
+  auto* command =
+      add_command(app, group::images, "export", "Measure a case and write the result for other programs",
+                  "helicarm export my-case --out exported\n"
+                  "  helicarm export my-case --out exported --as csv,slicer");
   auto& a = arguments_of(command, action, export_command);
   command->add_option("CASE", a.run.folder, "Folder that holds case.json")->required();
   command->add_option("--out", a.run.out, "Folder for the files")->capture_default_str();
@@ -91,8 +92,9 @@ void add_export(CLI::App& app, Action& action) {
 }
 
 void add_predict(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "predict", "Predict the error of a point before it is picked",
-                              "helicarm predict my-case --at 0,0,40 --at 60,0,40 --map tre");
+  auto* command =
+      add_command(app, group::measure, "predict", "Predict the error of a point before it is picked",
+                  "helicarm predict my-case --at 0,0,40 --at 60,0,40 --map tre");
   auto& a = arguments_of(command, action, predict_command);
   command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
   command->add_option("--at", a.at,
@@ -116,9 +118,9 @@ void add_predict(CLI::App& app, Action& action) {
 }
 
 void add_solve(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, "solve", "Calibrate one view from known 3-D points and their pixels (Eq. 4-7)",
-                  "helicarm solve --points points.csv --method ml --json");
+  auto* command = add_command(app, group::images, "solve",
+                              "Calibrate one view from known 3-D points and their pixels (Eq. 4-7)",
+                              "helicarm solve --points points.csv --method ml --json");
   auto& a = arguments_of(command, action, solve_command);
   command->add_option("--points", a.points, "CSV: label,x_mm,y_mm,z_mm,u_px,v_px[,sigma_px]")->required();
   command->add_option("--method", a.method, "dlt, homogeneous or ml")
@@ -128,7 +130,7 @@ void add_solve(CLI::App& app, Action& action) {
 
 void add_locate(CLI::App& app, Action& action) {
   auto* command = add_command(
-      app, "locate", "Triangulate picked pixels in calibrated views (Eq. 8)",
+      app, group::images, "locate", "Triangulate picked pixels in calibrated views (Eq. 8)",
       "helicarm locate --calibration my-result/result.json --picks picks.csv --json\n"
       "  helicarm locate --calibration AP=cam1.json --calibration LAT=cam2.json --picks picks.csv");
   auto& a = arguments_of(command, action, locate_command);
@@ -146,7 +148,8 @@ void add_locate(CLI::App& app, Action& action) {
 
 void add_measure(CLI::App& app, Action& action) {
   auto* command = add_command(
-      app, "measure", "Measure in single images: distance, angle, circle, positions in femur and tibia",
+      app, group::measure, "measure",
+      "Measure in single images: distance, angle, circle, positions in femur and tibia",
       "helicarm measure --clicks clicks.csv --calibration my-result/result.json\n"
       "  helicarm measure --clicks clicks.csv      without a calibration: lengths in pixels\n\n"
       "kind and the names of its clicks:\n"
@@ -180,7 +183,7 @@ void add_measure(CLI::App& app, Action& action) {
 }
 
 void add_rectify(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "rectify",
+  auto* command = add_command(app, group::images, "rectify",
                               "Correct an intensifier's distortion by its plate, or apply a known map (2.1)",
                               "helicarm rectify AP.dcm --plate plate48 --out rectified\n"
                               "  helicarm rectify series/ --map rectified/map.json --out straight\n"
@@ -220,7 +223,8 @@ void add_rectify(CLI::App& app, Action& action) {
 }
 
 void add_detect(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "detect", "Detect balls, holes or wire crossings with sub-pixel precision",
+  auto* command = add_command(app, group::images, "detect",
+                              "Detect balls, holes or wire crossings with sub-pixel precision",
                               "helicarm detect AP.dcm --kind balls --json\n"
                               "  helicarm detect series/ --out dots.csv");
   auto& a = arguments_of(command, action, detect_command);
@@ -234,7 +238,7 @@ void add_detect(CLI::App& app, Action& action) {
 
 void add_import(CLI::App& app, Action& action) {
   auto* command = add_command(
-      app, "import",
+      app, group::images, "import",
       "Read a projection or transform of another program: MayaCam, DLT, NRRD, OpenCV, RTK, ITK",
       "helicarm import camera.txt --unit cm --json\n"
       "  helicarm import MergedDlts.csv --column 2 --image-size 1760,1700 --json\n"

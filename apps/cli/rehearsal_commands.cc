@@ -11,18 +11,19 @@ namespace helicarm::cli {
 namespace {
 
 void add_demo(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, "demo", "Simulate two X-ray images, measure them and compare with the ground truth",
-                  "helicarm demo --out helicarm-demo");
+  auto* command = add_command(app, group::measure, "demo",
+                              "Simulate two X-ray images, measure them and compare with the ground truth",
+                              "helicarm demo --out helicarm-demo");
   auto& a = arguments_of(command, action, demo_command);
   command->add_option("--out", a.out, "Folder for the case and its result")->capture_default_str();
 }
 
 void add_simulate(CLI::App& app, Action& action) {
-  auto* command = add_command(
-      app, "simulate", "Simulate a case with known ground truth: X-ray images of a knee with the calibrator",
-      "helicarm simulate my-case --kind tunnels --seed 7\n"
-      "  helicarm simulate my-case --calibrator my-phantom.json --plate my-plate.json");
+  auto* command =
+      add_command(app, group::studies, "simulate",
+                  "Simulate a case with known ground truth: X-ray images of a knee with the calibrator",
+                  "helicarm simulate my-case --kind tunnels --seed 7\n"
+                  "  helicarm simulate my-case --calibrator my-phantom.json --plate my-plate.json");
   auto& a = arguments_of(command, action, simulate_command);
   command->add_option("DIR", a.folder, "Folder for the case and truth.json")->required();
   command
@@ -92,8 +93,9 @@ void add_simulate(CLI::App& app, Action& action) {
 }
 
 void add_drr(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "drr", "Project a CT volume: its line integrals on a flat detector",
-                              "helicarm drr knee.nii.gz --angle 90 --out lateral.png --raw lateral.f32");
+  auto* command =
+      add_command(app, group::studies, "drr", "Project a CT volume: its line integrals on a flat detector",
+                  "helicarm drr knee.nii.gz --angle 90 --out lateral.png --raw lateral.f32");
   auto& a = arguments_of(command, action, drr_command);
   command->add_option("VOLUME", a.volume, "MetaImage, NRRD, NIfTI-1, or a folder of DICOM CT slices")
       ->required();
@@ -130,11 +132,11 @@ void add_drr(CLI::App& app, Action& action) {
 }
 
 void add_study(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, "study", "The paper's simulations, and the estimators against the Cramer-Rao bound",
-                  "helicarm study number --out number\n"
-                  "  helicarm study location --calibrator udcsc --out location\n"
-                  "  helicarm study limit --groups 10000 --seed 1 --out limit");
+  auto* command = add_command(app, group::studies, "study",
+                              "The paper's simulations, and the estimators against the Cramer-Rao bound",
+                              "helicarm study number --out number\n"
+                              "  helicarm study location --calibrator udcsc --out location\n"
+                              "  helicarm study limit --groups 10000 --seed 1 --out limit");
   auto& a = arguments_of(command, action, study_command);
   command
       ->add_option("NAME", a.name,
@@ -190,7 +192,7 @@ void add_study(CLI::App& app, Action& action) {
 
 void add_phantom(CLI::App& app, Action& action) {
   auto* command = add_command(
-      app, "phantom", "Show, check, design, export, measure or verify the calibrator",
+      app, group::phantom, "phantom", "Show, check, design, export, measure or verify the calibrator",
       "helicarm phantom show\n  helicarm phantom check calibrator.json\n"
       "  helicarm phantom design --knee 66.7,57.2 --file knee.json\n"
       "  helicarm phantom export --stl calibrator.stl --svg calibrator.svg\n"
