@@ -7,23 +7,25 @@ namespace helicarm::guidance {
 namespace {
 
 /// Views along +z from 800 mm: 5 px are 1 mm at the origin.
-geometry::View frontal() { return {{4000, 4000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}}; }
+geometry::View front_view() {
+  return {{4000, 4000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}};
+}
 
 /// Views along +x.
-geometry::View lateral() {
+geometry::View side_view() {
   Eigen::Matrix3d camera_from_world;
   camera_from_world << 0, 1, 0, 0, 0, 1, 1, 0, 0;
   return {{-4000, 4000, 512, 512, 0}, {camera_from_world, {0, 0, 800}}};
 }
 
 PlannedPoint seen_in_both(const Eigen::Vector3d& point) {
-  return {point, {frontal().project(point), lateral().project(point)}};
+  return {point, {front_view().project(point), side_view().project(point)}};
 }
 
 const ToolLine along_y{"femur", "femur", {0, -20, 0}, {0, 30, 0}};
 
 TEST(DistanceToLine, OffsetAppearsInTheViewThatObservesItsAxis) {
-  const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({0, 5, 2}), along_y);
+  const auto error = distance_to_line({front_view(), side_view()}, seen_in_both({0, 5, 2}), along_y);
   ASSERT_TRUE(error.has_value());
   EXPECT_NEAR(*error->per_view_px[0], 0, 1e-9);
   EXPECT_NEAR(*error->per_view_px[1], 10, 1e-9);
@@ -33,7 +35,7 @@ TEST(DistanceToLine, OffsetAppearsInTheViewThatObservesItsAxis) {
 }
 
 TEST(DistanceToLine, TwoViewsCombineAsRootSumOfSquares) {
-  const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({3, 0, 4}), along_y);
+  const auto error = distance_to_line({front_view(), side_view()}, seen_in_both({3, 0, 4}), along_y);
   ASSERT_TRUE(error.has_value());
   EXPECT_NEAR(error->distance_mm, 5, 1e-12);
   EXPECT_NEAR(*error->per_view_px[0], 3 * 4000 / 804.0, 1e-9);
@@ -42,7 +44,7 @@ TEST(DistanceToLine, TwoViewsCombineAsRootSumOfSquares) {
 }
 
 TEST(DistanceToLine, PointOnTheLineBeyondItsEndsHasNoError) {
-  const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({0, 90, 0}), along_y);
+  const auto error = distance_to_line({front_view(), side_view()}, seen_in_both({0, 90, 0}), along_y);
   ASSERT_TRUE(error.has_value());
   EXPECT_NEAR(error->combined_px, 0, 1e-9);
   EXPECT_NEAR(error->distance_mm, 0, 1e-12);
@@ -51,7 +53,7 @@ TEST(DistanceToLine, PointOnTheLineBeyondItsEndsHasNoError) {
 TEST(DistanceToLine, ViewWithoutThePointIsLeftOut) {
   PlannedPoint point = seen_in_both({3, 0, 4});
   point.uv[1].reset();
-  const auto error = distance_to_line({frontal(), lateral()}, point, along_y);
+  const auto error = distance_to_line({front_view(), side_view()}, point, along_y);
   ASSERT_TRUE(error.has_value());
   EXPECT_FALSE(error->per_view_px[1]);
   EXPECT_NEAR(error->combined_mm, 3, 1e-9);
@@ -59,7 +61,7 @@ TEST(DistanceToLine, ViewWithoutThePointIsLeftOut) {
 
 TEST(DistanceToLine, ViewAlongTheLineIsLeftOut) {
   const ToolLine along_z{"femur", "femur", {0, 0, -20}, {0, 0, 30}};
-  const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({3, 4, 0}), along_z);
+  const auto error = distance_to_line({front_view(), side_view()}, seen_in_both({3, 4, 0}), along_z);
   ASSERT_TRUE(error.has_value());
   EXPECT_FALSE(error->per_view_px[0]);
   EXPECT_NEAR(error->combined_mm, 4, 1e-9);
@@ -68,7 +70,7 @@ TEST(DistanceToLine, ViewAlongTheLineIsLeftOut) {
 
 TEST(DistanceToLine, LineBehindTheSourceIsRefused) {
   const ToolLine behind{"femur", "femur", {0, 0, -900}, {0, 30, 0}};
-  const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({3, 0, 4}), behind);
+  const auto error = distance_to_line({front_view(), side_view()}, seen_in_both({3, 0, 4}), behind);
   ASSERT_FALSE(error.has_value());
   EXPECT_EQ(error.error().reason, Reason::behind_source);
 }
