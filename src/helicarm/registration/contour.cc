@@ -65,6 +65,8 @@ bool has_shadow(const std::vector<Vector2d>& pixels, double cell) {
   return ((high - low) / cell + Vector2d::Constant(6)).prod() < most_shadow_cells;
 }
 
+/// Share of the contour that counts at least, so that no pose gains by leaving the image.
+constexpr double least_visible = 0.5;
 constexpr double sample_step = 0.5;  // of the profile, raster pixels
 
 /// Attenuation between pixels; nothing where it is not valid.
@@ -80,15 +82,10 @@ std::optional<double> attenuation_at(const Raster& raster, const Vector2d& at) {
   return (1 - y) * ((1 - x) * value(0, 0) + x * value(1, 0)) + y * ((1 - x) * value(0, 1) + x * value(1, 1));
 }
 
-struct EdgeFound {
-  double offset = 0;  ///< outward, raster pixels
-  double slope = 0;   ///< fall of the attenuation per raster pixel
-};
-
-/// The steepest fall of the attenuation along the normal, near ones preferred; three parallel profiles are
-/// averaged.
-std::optional<EdgeFound> edge_along(const Raster& raster, const Vector2d& at, const Vector2d& normal,
-                                    double reach) {
+/// The attenuation along the normal, samples on either side of the contour's point; three parallel profiles
+/// are averaged. Nothing where a part is hidden or beyond the field.
+std::optional<std::vector<double>> profile_along(const Raster& raster, const Vector2d& at,
+                                                 const Vector2d& normal, double reach) {
   const int half = int(std::ceil(reach / sample_step)) + 3;
   std::vector<double> profile(std::size_t(2 * half + 1), 0);
   const Vector2d tangent(-normal.y(), normal.x());
@@ -98,26 +95,66 @@ std::optional<EdgeFound> edge_along(const Raster& raster, const Vector2d& at, co
       if (!value) return std::nullopt;
       profile[std::size_t(i + half)] += *value / 3;
     }
+  return profile;
+}
+
+/// Where, outwards in raster pixels, the profile falls most steeply within `reach` of `about`; near places
+/// are preferred.
+std::optional<double> steepest_fall(const std::vector<double>& profile, double about, double reach) {
+  const int half = int(profile.size() / 2);
   // Fall over two pixels about each sample, smoothed over three samples.
   const auto fall = [&](int i) {
     const auto p = [&](int k) { return profile[std::size_t(k + half)]; };
     return (p(i - 2) - p(i + 2) + 0.5 * (p(i - 3) - p(i + 1) + p(i - 1) - p(i + 3))) / 4;
   };
-  const int last = half - 3;
-  std::optional<EdgeFound> best;
+  std::optional<double> best;
   double best_rank = 0;
-  for (int i = 1 - last; i < last; ++i) {
+  for (int i = 4 - half; i < half - 3; ++i) {
+    if (std::abs(i - about / sample_step) >= std::ceil(reach / sample_step)) continue;
     const double here = fall(i), before = fall(i - 1), after = fall(i + 1);
     if (!(here > 0 && here >= before && here > after)) continue;
     const double bend = before - 2 * here + after;
     const double offset = sample_step * (i + (bend < 0 ? 0.5 * (before - after) / bend : 0));
-    const double rank = here * std::exp(-0.5 * std::pow(offset / (0.5 * reach), 2));
-    if (rank > best_rank) {
-      best_rank = rank;
-      best = EdgeFound{offset, here};
-    }
+    const double rank = here * std::exp(-0.5 * std::pow((offset - about) / (0.5 * reach), 2));
+    if (rank > best_rank) best_rank = rank, best = offset;
   }
   return best;
+}
+
+/// A point of the contour that the image shows.
+struct VisiblePoint {
+  const ContourPoint* point;
+  std::vector<double> profile;
+  std::optional<double> residual = {};  ///< full-resolution pixels, outward
+};
+
+void find_edges(std::vector<VisiblePoint>& points, double about_px, const Raster& raster, double reach) {
+  for (VisiblePoint& point : points) {
+    const auto edge = steepest_fall(point.profile, about_px / raster.factor, reach);
+    point.residual = edge ? std::optional(raster.factor * *edge) : std::nullopt;
+  }
+}
+
+/// The offset that most residuals have in common: weighted means from their median on.
+double common_offset(const std::vector<VisiblePoint>& points, const ContourOptions& options) {
+  std::vector<double> residuals;
+  for (const VisiblePoint& point : points)
+    if (point.residual) residuals.push_back(*point.residual);
+  if (residuals.empty()) return 0;
+  const auto middle = residuals.begin() + std::ptrdiff_t(residuals.size() / 2);
+  std::ranges::nth_element(residuals, middle);
+  double offset = *middle;
+  constexpr int means = 10;
+  for (int i = 0; i < means; ++i) {
+    double sum = 0, weights = 0;
+    for (const double residual : residuals) {
+      const double weight = std::pow(1 + std::pow((residual - offset) / (2 * options.sigma_px), 2), -2);
+      sum += weight * residual;
+      weights += weight;
+    }
+    offset = sum / weights;
+  }
+  return std::clamp(offset, -options.inward_px, 0.0);
 }
 
 }  // namespace
@@ -172,20 +209,33 @@ ViewObservation compare_contour(const Raster& raster, const geometry::View& view
                                 const ContourOptions& options) {
   ViewObservation observation;
   const auto contour = apparent_contour(surface, view, world_from_model, contour_spacing * raster.factor);
+  std::vector<VisiblePoint> points;
+  for (const ContourPoint& point : contour)
+    if (auto profile = profile_along(raster, raster.raster_at(point.pixel), point.normal,
+                                     options.reach + options.inward_px / raster.factor))
+      points.push_back({&point, std::move(*profile)});
+  double offset = 0;
+  find_edges(points, offset, raster, options.reach);
+  if (options.inward_px > 0) {
+    find_edges(points, common_offset(points, options), raster, options.reach);
+    offset = common_offset(points, options);
+  }
+  const double counted = std::max(double(points.size()), least_visible * double(contour.size()));
   double sum2 = 0, weights = 0;
-  for (const ContourPoint& point : contour) {
+  for (const VisiblePoint& visible : points) {
+    const ContourPoint& point = *visible.point;
     Comparison comparison;
     comparison.pixel = point.pixel;
-    comparison.weight = 1 / double(contour.size());
-    if (const auto edge = edge_along(raster, raster.raster_at(point.pixel), point.normal, options.reach)) {
-      const double residual = raster.factor * edge->offset;
+    comparison.weight = 1 / counted;
+    if (visible.residual) {
+      const double residual = *visible.residual - offset;
       comparison.agreement = 1 / (1 + std::pow(residual / (2 * options.sigma_px), 2));
       const Vector3d by_point =
           geometry::projection_jacobian(view, point.in_world).transpose() * point.normal;
       const Vector3d arm = point.in_world - centre;
       Gradient jacobian;
       jacobian.head<3>() = by_point;
-      for (int i = 0; i < 3; ++i) jacobian.segment<3>(3 + 3 * i) = by_point[i] * arm;
+      for (int k = 0; k < 3; ++k) jacobian.segment<3>(3 + 3 * k) = by_point[k] * arm;
       jacobian[edge_offset] = 1;
       const double weight = std::pow(comparison.agreement, 2) / (options.sigma_px * options.sigma_px);
       comparison.information = weight * jacobian * jacobian.transpose();

@@ -25,12 +25,13 @@ std::vector<ContourPoint> apparent_contour(const Surface& surface, const geometr
 inline constexpr double contour_spacing = 2;  ///< of the points that are compared, pixels of the raster
 
 struct ContourOptions {
-  double reach = 6;     ///< pixels of the raster, on either side, where an edge is looked for
-  double sigma_px = 1;  ///< full-resolution pixels; scale of the robust weight and of the information
+  double reach = 6;      ///< pixels of the raster, on either side, where an edge is looked for
+  double sigma_px = 1;   ///< full-resolution pixels; scale of the robust weight and of the information
+  double inward_px = 0;  ///< full-resolution pixels; most by which all edges may lie inside the contour
 };
 
-/// Compares the contour with the image's edges along its normals. Agreement: the robust weight of an edge,
-/// 0 without one.
+/// Compares the contour with the image's edges along its normals, after the offset that they have in common.
+/// Agreement: the robust weight of an edge, 0 without one.
 ViewObservation compare_contour(const Raster& raster, const geometry::View& view, const Surface& surface,
                                 const geometry::RigidTransform& world_from_model,
                                 const Eigen::Vector3d& centre, const ContourOptions& options);

@@ -19,6 +19,10 @@ double pixel_mm_of(const geometry::View& view, const Vector3d& at) {
   return std::max(1.0, view.depth(at)) / std::abs(view.intrinsics.fy);
 }
 
+/// The steepest fall of attenuation lies inside the edge of a round, blurred bone: 0.4 mm in simulated images
+/// with a raster of 0.5 mm.
+double inward_px(const Model& model, const Raster& raster) { return model.voxel_mm > 0 ? raster.factor : 0; }
+
 /// Score over the views that take part.
 double score_of(const Observation& observation, const std::vector<bool>& views) {
   if (views.empty()) return observation.score();
@@ -88,11 +92,11 @@ Observation Scene::observe(const Level& level, const geometry::RigidTransform& p
       continue;
     }
     const geometry::View& view = (*views_)[i].view;
-    observation.views.push_back(level.contour
-                                    ? compare_contour(made.rasters[i], view, *model_->surface, pose, centre,
-                                                      {level.reach, level.sigma_px})
-                                    : compare_patches(made.rasters[i], view, made.density, model_->cuts, pose,
-                                                      centre, derivatives, threads));
+    observation.views.push_back(
+        level.contour ? compare_contour(made.rasters[i], view, *model_->surface, pose, centre,
+                                        {level.reach, level.sigma_px, inward_px(*model_, made.rasters[i])})
+                      : compare_patches(made.rasters[i], view, made.density, model_->cuts, pose, centre,
+                                        derivatives, threads));
   }
   return observation;
 }

@@ -24,6 +24,7 @@ struct Model {
   std::vector<Eigen::Vector3d> samples;  ///< points spread over the body
   double radius_mm = 0;                  ///< rms distance of the samples from the centre
   double resolution_mm = 0;              ///< of the density's voxels
+  double voxel_mm = 0;                   ///< about, of a surface made from a mask; 0: another body
   std::vector<Warning> warnings = {};    ///< of its files
 };
 
@@ -39,7 +40,7 @@ struct HuWindow {
 Expected<Model> model_from(const std::string& name, const volume::Volume& volume,
                            const std::optional<volume::Volume>& mask, const std::optional<HuWindow>& window);
 
-/// A body from a closed surface. Fails as `prepare_surface`.
+/// A body from a closed surface; steps of one made from a mask are smoothed. Fails as `prepare_surface`.
 Expected<Model> model_from(const std::string& name, phantom::TriangleMesh mesh);
 
 /// Root mean square distance (mm) between the samples at two poses.

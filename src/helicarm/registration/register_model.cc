@@ -26,7 +26,10 @@ constexpr double correlation_mm = 12;  // of residuals along a bone's edge
 constexpr double edge_shift_sigma = 0.1;
 constexpr double edge_growth_sigma = 0.05;
 constexpr double lone_growth_sigma = 0.1;  // a single view of a body that a threshold delimits
-constexpr double alone_prior_mm = 10;      // keeps a single view from running along its rays
+// Of a surface from a mask, of its voxels: the mask's boundary, and edges in the image that thick and thin
+// cortex shift unlike.
+constexpr double voxel_edge_sigma = 0.2;
+constexpr double alone_prior_mm = 10;  // keeps a single view from running along its rays
 
 /// Levels from coarse to fine for this model and these views.
 std::vector<SearchStage> stages_for(const Scene& scene, const Vector3d& at) {
@@ -67,6 +70,13 @@ std::vector<double> correlations_px(const std::vector<RegistrationView>& views, 
     lengths.push_back(std::min(correlation_mm, model.radius_mm / 2) * std::abs(view.view.intrinsics.fy) /
                       view.view.depth(centre));
   return lengths;
+}
+
+EdgeSigma edge_sigma_of(const Model& model, double spacing_mm, std::size_t views) {
+  const double finest_mm = std::max(spacing_mm, model.resolution_mm);
+  const double growth = model.outlined || views > 1 ? edge_growth_sigma : lone_growth_sigma;
+  const double of_voxels = voxel_edge_sigma * model.voxel_mm;
+  return {std::max(edge_shift_sigma * finest_mm, of_voxels), std::max(growth * finest_mm, of_voxels)};
 }
 
 /// Information, in the units of the comparisons' weights, of a prior with this sigma (rms over the model).
@@ -194,14 +204,12 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
                         (1 - found.runner_up->score) / (1 - found.runner_up_best)};
   describe(scene, stages.back().level, best, result);
   step("errors");
-  const double finest_mm = std::max(result.spacing_mm, model.resolution_mm);
-  const double growth = model.outlined || views.size() > 1 ? edge_growth_sigma : lone_growth_sigma;
   const MatrixXd cameras = camera_covariance_of(views, options);
   const ErrorModel errors{views,
                           model.radius_mm,
                           cameras_with_motion(cameras, options.motion_sigma_mm),
                           correlations_px(views, model, result.centre),
-                          {edge_shift_sigma * finest_mm, growth * finest_mm},
+                          edge_sigma_of(model, result.spacing_mm, views.size()),
                           options.scale_sigma};
   result.covariance = errors.covariance(best.observation, result.centre);
   result.deformation = deformation_of(best.observation, errors, result.centre);

@@ -244,5 +244,16 @@ TEST(RegisterModel, FindsASurfaceByItsContour) {
   EXPECT_LT(separation(model, result.world_from_model, pose), 0.4);
 }
 
+TEST(RegisterModel, FindsTheSurfaceOfAGrownMask) {
+  const Model body = *model_from("body", lopsided_surface());
+  const Model model = *model_from("bone", stepped_surface());
+  RigidTransform pose;
+  pose.rotation = geometry::rotation_from_vector({0.3, 0.5, -0.2});
+  const auto result =
+      register_model(model, two_views(filled_volume(body), pose), {start_near(model, pose)}, quick());
+  EXPECT_FALSE(result.failure) << result.failure->message;
+  EXPECT_LT(separation(model, result.world_from_model, pose), worst_error_mm(model, result));
+}
+
 }  // namespace
 }  // namespace helicarm::registration
