@@ -20,7 +20,7 @@ Wrong cases, from a start within 5 mm of the best guess:
   patient    another knee's CT          mirrored   the CT exchanged left for right     tibia   tibia for femur
   moved      3 mm between the images, across both central rays    hidden  3 mm within their plane
   scaled     voxels 3 % larger          camera     one view's calibration off by 2 mm along the leg
-`patient` and `tibia` are kinds of the knee alone.
+`patient` and `tibia` are kinds of the knee alone. With --surface the models are surfaces of the bones' masks (tools/bone_surface.py).
 One view (`one_view`, right input): error and predicted sigma along the view's central ray, and both views' sigma there.
 A wrong case that is accepted is a false accept; `hidden` cannot be seen, its error is compared with the covariance.
 
@@ -41,6 +41,7 @@ import threading
 import numpy as np
 
 import bone_ct
+import bone_surface
 import head_ct
 
 KINDS = ("right", "patient", "mirrored", "tibia", "moved", "hidden", "scaled", "camera", "one_view")
@@ -101,6 +102,7 @@ def made(folder, make):
 class Knees:
     name, model, kinds = "knee", "femur", KINDS
     arm_mm = 30
+    scale_sigma = 0  # the volumes' sizes are exact, but where a kind is about them
     targets = np.array([0, 5, 20.0]) + TARGETS
 
     def subject(self, number, other=False):
@@ -126,8 +128,27 @@ class Knees:
         return {"volume": folder / "scan.nrrd", "mask": folder / ("tibia.nrrd" if kind == "tibia" else "femur.nrrd")}
 
 
+class Surfaces(Knees):
+    """The knees' bones as surfaces of their masks. In the images the femur goes on beyond the surface's end."""
+    name, kinds = "surface", ("right", "patient", "mirrored", "tibia", "scaled")
+    scale_sigma = 0.005  # a mask's size is not exact
+    end_mm = 80  # of the surface along the shaft
+
+    def write(self, folder, subject):
+        super().write(folder, subject)
+        knee = bone_ct.Knee(subject)
+        femur, tibia = (mask & (np.abs(knee.s) < self.end_mm) for mask in (knee.femur_itself, knee.tibia_itself))
+        for name, mask, scale in (("femur", femur, 1), ("tibia", tibia, 1), ("mirrored", femur[:, :, ::-1], 1), ("scaled", femur, 1.03)):
+            triangles = bone_surface.triangles_of(mask, 0.5, scale * bone_ct.VOXEL_MM, scale * bone_ct.LOW)
+            bone_surface.write_stl(folder / f"{name}.stl", triangles)
+
+    def files(self, folder, kind):
+        return {"surface": folder / f"{kind if kind in ('tibia', 'mirrored', 'scaled') else 'femur'}.stl"}
+
+
 class Heads:
     name, model, kinds = "head", "head", tuple(kind for kind in KINDS if kind not in ("patient", "tibia"))
+    scale_sigma = 0
 
     def __init__(self, path):
         self.head = head_ct.Head(path)
@@ -196,10 +217,11 @@ class Protocol:
         shutil.copytree(case, work)
         case_json = json.loads((case / "case.json").read_text())
         model = dict(model)
-        for name in ("volume", "mask"):
+        for name in ("volume", "mask", "surface"):
             if name in model:
-                os.link(model[name], work / f"{name}.nrrd")
-                model[name] = f"{name}.nrrd"
+                file = f"{name}{model[name].suffix}"
+                os.link(model[name], work / file)
+                model[name] = file
         (work / "case.json").write_text(json.dumps({**case_json, "views": views, "models": [model]}))
         self.run("register", work, "--out", out)
         result = json.loads((out / "registration.json").read_text())
@@ -219,8 +241,7 @@ class Protocol:
         targets = self.body.targets
         case = self.simulated(number)
         pose = np.array(json.loads((case / "truth.json").read_text())["ct"]["calibrator_from_patient"])
-        # The models' sizes are exact, but where a kind is about them.
-        model = {"name": self.body.model, "scale_sigma": 0,
+        model = {"name": self.body.model, "scale_sigma": self.body.scale_sigma,
                  **self.body.files(self.volumes(self.body.subject(number, other=kind == "patient")), kind)}
         guess = pose.copy()
         if kind == "tibia":
@@ -360,7 +381,8 @@ def tables(rows):
     return "\n".join(lines)
 
 
-MARKS = {"knee": ("<!-- registration protocol -->", "<!-- end of the registration protocol -->"),
+MARKS = {"surface": ("<!-- registration protocol, surface -->", "<!-- end of the registration protocol, surface -->"),
+         "knee": ("<!-- registration protocol -->", "<!-- end of the registration protocol -->"),
          "head": ("<!-- registration protocol, head -->", "<!-- end of the registration protocol, head -->")}
 
 
@@ -390,6 +412,7 @@ def main():
     parser.add_argument("--program", default="build/bin/helicarm")
     parser.add_argument("--head", nargs="?", const="", metavar="PATH",
                         help="the head instead of the knees; PATH of Cranium.inv3, default: where its package installs it")
+    parser.add_argument("--surface", action="store_true", help="surfaces of the knees' masks instead of their volumes")
     parser.add_argument("--starts", type=int, default=20, help="right cases (default: 20)")
     parser.add_argument("--cases", type=int, default=10, help="of each wrong kind (default: 10)")
     parser.add_argument("--kinds", help=f"some of {','.join(KINDS)}; default: all that the body has")
@@ -401,7 +424,7 @@ def main():
     arguments = parser.parse_args()
     if arguments.threads is None:
         arguments.threads = 0 if arguments.jobs == 1 else 1
-    body = Knees() if arguments.head is None else Heads(arguments.head or None)
+    body = Heads(arguments.head or None) if arguments.head is not None else Surfaces() if arguments.surface else Knees()
     kinds = arguments.kinds.split(",") if arguments.kinds else body.kinds
     if unknown := [kind for kind in kinds if kind not in body.kinds]:
         parser.error(f"--kinds: {', '.join(unknown)}: the {body.name} has {', '.join(body.kinds)}")
