@@ -20,7 +20,7 @@ Wrong cases, from a start within 5 mm of the best guess:
   patient    another knee's CT          mirrored   the CT exchanged left for right     tibia   tibia for femur
   moved      3 mm between the images, across both central rays    hidden  3 mm within their plane
   scaled     voxels 3 % larger          camera     one view's calibration off by 2 mm along the leg
-`patient` and `tibia` are kinds of the knee alone. With --surface the models are surfaces of the bones' masks (tools/bone_surface.py).
+`patient` and `tibia` are kinds of the knee alone. With --surface the models are surfaces of the bones' masks (tools/evaluation/bone_surface.py).
 One view (`one_view`, right input): error and predicted sigma along the view's central ray, and both views' sigma there.
 A wrong case that is accepted is a false accept; `hidden` cannot be seen, its error is compared with the covariance.
 
