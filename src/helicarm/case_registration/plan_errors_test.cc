@@ -13,7 +13,8 @@ RegisteredPoint point_with(const char* name, double sigma_mm, std::optional<doub
   RegisteredPoint point{name, {}};
   point.place.covariance_in_calibrator = sigma_mm * sigma_mm * Matrix3d::Identity();
   if (sigma_in_tool_mm)
-    point.place.in_tool = {{Vector3d::Zero(), Matrix3d::Zero(), {}, {}}, *sigma_in_tool_mm * *sigma_in_tool_mm * Matrix3d::Identity()};
+    point.place.in_tool = {{Vector3d::Zero(), Matrix3d::Zero(), {}, {}},
+                           *sigma_in_tool_mm * *sigma_in_tool_mm * Matrix3d::Identity()};
   return point;
 }
 
