@@ -71,7 +71,10 @@ Heartbeat LinkStateMachine::heard(const RobotState& state, Time now) {
   } else if (state_) {
     const double passed_s = state.time_s - state_->time_s;
     if (passed_s < 0 || passed_s > clock_leap_s)
-      stop({Reason::stale_state, fmt::format("the robot's clock jumped by {:.3f} s", passed_s)});
+      stop({Reason::stale_state,
+            fmt::format("the robot's clock jumped by {:.3f} s", passed_s),
+            {},
+            {{clock_jump_figure, passed_s}}});
   }
   if (const auto why = why_stopped(state)) {
     // A lasting stop counts once; otherwise a protective stop could not be unlocked.
@@ -180,7 +183,7 @@ Expected<bool> LinkStateMachine::judge(Time now) const {
     return tl::unexpected<Failure>(robot_stopped("the robot runs another order's program"));
   if (script.stage == ScriptStage::done && !plays) return true;
   if (script.stage == ScriptStage::stopped)
-    return tl::unexpected<Failure>(robot_stopped("the robot received no heartbeat and stopped"));
+    return fail(Reason::stale_state, "the robot received no heartbeat in time and stopped");
   if (!plays) return tl::unexpected<Failure>(robot_stopped("the robot's program ended early"));
   if (state_->time_s - begun_s_ > foreseen_s_)
     return fail(Reason::off_target, "the robot did not reach its target in time",

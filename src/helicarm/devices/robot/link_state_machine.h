@@ -48,6 +48,9 @@ struct LinkRule {
 using LinkTable = std::array<std::array<LinkRule, 7>, 6>;
 extern const LinkTable link_table;
 
+/// Figure of a stale_state that is no delay: by how much the robot's clock jumped, s.
+inline constexpr const char* clock_jump_figure = "jumped_s";
+
 /// Seconds.
 struct LinkTimes {
   double stale_s = 0.1;            ///< a state older than this is not used

@@ -222,10 +222,20 @@ TEST(RobotDrill, InterruptedStreamsStopTheRobotAndEndTheConnection) {
   }
 }
 
+TEST(RobotDrill, HeartbeatsThatAreLateStopTheRobotOnItsConnection) {
+  Drill drill;
+  const Failure failure = drill.fault_on_the_way([&] { drill.robot->advance(0.5); });
+  EXPECT_EQ(failure.reason, Reason::stale_state) << failure.message;
+  EXPECT_FALSE(failure.figures.contains(clock_jump_figure));
+  EXPECT_EQ(drill.link.status().phase, LinkPhase::stopped);
+  drill.expect_locked();
+}
+
 TEST(RobotDrill, ClockJumpIsAnotherController) {
   Drill drill;
-  EXPECT_EQ(drill.fault_on_the_way([&] { drill.robot->set(RobotFault::clock_jump); }).reason,
-            Reason::stale_state);
+  const Failure failure = drill.fault_on_the_way([&] { drill.robot->set(RobotFault::clock_jump); });
+  EXPECT_EQ(failure.reason, Reason::stale_state);
+  EXPECT_TRUE(failure.figures.contains(clock_jump_figure));
   EXPECT_EQ(drill.link.status().phase, LinkPhase::stopped);
 }
 
