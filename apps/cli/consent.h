@@ -46,10 +46,13 @@ class Consent {
       const robot::RobotOrder& order,
       const std::function<Expected<void>()>& holds = [] { return Expected<void>(); });
 
-  /// Whether to unlock the robot and plan again after this refusal.
-  bool plans_again(const Failure& why);
+  /// Asks whether to unlock the robot and plan again. `yes` does not agree: it was given before the stop.
+  operation::Operation::Again again() {
+    return [this](const Failure& why) { return plans_again(why); };
+  }
 
  private:
+  bool plans_again(const Failure& why);
   bool agreed(const robot::RobotOrder& order, const std::function<Expected<void>()>& holds);
 
   robot::RobotLink& robot_;

@@ -130,9 +130,10 @@ void print_tour(const std::vector<robot::RobotOrder>& orders, Console& console) 
 void print_outcome(const operation::TunnelOutcome& outcome, Console& console) {
   console.out << fmt::format(
       "{}: distance from the tool's axis: start {:.2f} mm (predicted {:.2f}), end {:.2f} mm (predicted "
-      "{:.2f}), after {} corrections\n",
+      "{:.2f}), after {} corrections{}\n",
       outcome.tunnel, outcome.start.distance_mm(), outcome.start.predicted_mm(), outcome.end.distance_mm(),
-      outcome.end.predicted_mm(), outcome.loop.empty() ? 0 : outcome.loop.size() - 1);
+      outcome.end.predicted_mm(), outcome.loop.empty() ? 0 : outcome.loop.size() - 1,
+      outcome.replans == 0 ? "" : fmt::format(", planned again {} times", outcome.replans));
 }
 
 bool is_near(const robot::RobotLink& robot, const robot::RobotState& rest) {
@@ -141,7 +142,7 @@ bool is_near(const robot::RobotLink& robot, const robot::RobotState& rest) {
   return state && (state->base_from_tcp.translation - rest.base_from_tcp.translation).norm() <= near_mm;
 }
 
-/// To a tunnel and back to where the tool was. Once the plan is stale or poses are missing, the person at the
+/// To a tunnel and back to where the tool was. After a stop (`Operation::plan_again`) the person at the
 /// terminal may unlock the robot, bring the tool back and have the tunnel planned again.
 void go_to(const operation::PlannedTunnel& tunnel, operation::Operation& operation, robot::RobotLink& robot,
            const fs::path& out, Consent& consent, LineInput& input, const Ending& ending, Console& console) {
@@ -168,10 +169,7 @@ void go_to(const operation::PlannedTunnel& tunnel, operation::Operation& operati
   while (!reached || begun) {
     const auto done = guarded([&] { begun ? withdraw() : approach(); });
     if (done) continue;
-    const Failure& why = done.error();
-    if ((why.reason != Reason::plan_stale && !is_of_poses(why)) || !consent.plans_again(why))
-      throw BadInput(why);
-    value_or_throw(robot.unlock("the operator at the terminal"));
+    value_or_throw(operation.plan_again(tunnel.name, done.error(), consent.again()));
     if (begun && is_near(robot, rest)) begun.reset();
   }
 }
@@ -218,7 +216,8 @@ void drive_robot(const operation::OperationPlan& plan, const NavigateArguments& 
   value_or_throw(robot.unlock("the operator at the terminal"));
   print_tour(value_or_throw(operation.preview_tour()), console);
   value_or_throw(operation.register_robot(
-      [&](const robot::RobotOrder& order) { return consent(order, [&] { return operation.recorded(); }); }));
+      [&](const robot::RobotOrder& order) { return consent(order, [&] { return operation.recorded(); }); },
+      consent.again()));
   for (const operation::PlannedTunnel& tunnel : plan.tunnels)
     go_to(tunnel, operation, robot, arguments.out, consent, input, ending, console);
 }

@@ -30,6 +30,7 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
                               {"decisions", report.decisions},
                               {"orders", report.orders},
                               {"confirmations", report.confirmations},
+                              {"replans", report.replans},
                               {"outcomes", report.outcomes},
                               {"files", report.files},
                               {"ended_by", report.ended_by.empty() ? Json() : Json(report.ended_by)},
@@ -38,10 +39,11 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
     } else {
       console.out << fmt::format(
           "{} records{}{}: {} acquisitions, {} images of cases, {} results, {} hand-eye calibrations, {} "
-          "orders, {} confirmed, {} outcomes, {} decisions on a hand-held drill, {} files\n",
+          "orders, {} confirmed, {} planned again, {} outcomes, {} decisions on a hand-held drill, {} "
+          "files\n",
           report.records, report.torn ? " and an incomplete one" : "", end_of(report), report.exposures,
           report.images, report.results, report.hand_eyes, report.orders, report.confirmations,
-          report.outcomes, report.decisions, report.files);
+          report.replans, report.outcomes, report.decisions, report.files);
       for (const std::string& difference : report.differences) console.out << "  " << difference << '\n';
     }
     if (!report.differences.empty())

@@ -114,6 +114,14 @@ def drill_motion(program, folder):
             check(f"{fault} while the robot moves: at rest after {stop_s * 1000:.0f} ms", stop_s <= limit_s)
             devices.expect_end(fault, reason)
             devices.expect_replay(fault)
+    for fault, reason in (("cut_cable", "stale_state"), ("protective_stop", "robot_stopped")):
+        with VirtualDevices(program, folder / f"terminal_{fault}", terminal=True) as devices:
+            devices.acquire_both()
+            devices.confirm()
+            devices.wait_moving()
+            devices.command(f"fault {fault} on", f"{fault} on")
+            devices.expect_end(f"{fault} at a terminal", reason)
+            devices.expect_replay(f"{fault} at a terminal")
     with VirtualDevices(program, folder / "bone") as devices:
         devices.acquire_both()
         devices.navigation.wait_for("navigate: femur", 120)
@@ -238,16 +246,19 @@ def drill_record(program, folder):
 
 
 def drill_busy(program, folder, operations=10):
-    """Whole operations beside a busy loop on each core, as a compiler would be: all must come to their end."""
+    """Whole operations beside a busy loop on each core, as a compiler would be: all must come to their end. The person at
+    the terminal is a program that has an order planned again, and confirms it, where a pose, state or heartbeat is late."""
     loops = [subprocess.Popen(["bash", "-c", "while :; do :; done"]) for _ in range(os.cpu_count())]
     ended = []
     try:
         for number in range(operations):
-            with VirtualDevices(program, folder / f"busy{number}") as devices:
+            with VirtualDevices(program, folder / f"busy{number}", terminal=True) as devices:
                 devices.acquire_both()
-                code = devices.navigation.process.wait(600)
-                ended.append("done" if code == 0 else devices.navigation.output().splitlines()[-1])
-                print(f"     operation {number + 1}: {ended[-1]}", flush=True)
+                replans = devices.give_orders()
+                code = devices.navigation.process.poll()
+                ended.append("done" if code == 0 else devices.navigation.output_lines[-1])
+                print(f"     operation {number + 1}: {ended[-1]}, planned again {replans} times", flush=True)
+                devices.expect_replay(f"operation {number + 1}", has_end=code is not None)
     finally:
         for loop in loops:
             loop.kill()

@@ -125,6 +125,20 @@ class VirtualDevices:
         check(f"{name}: {self.navigation.wait_for('femur: distance from', 120)}", True)
         self.navigation.end(signal.SIGKILL)
 
+    def give_orders(self, silence_s=120):
+        """Confirms each order, and has it planned again after a late pose, state or heartbeat; how often it did."""
+        replans = 0
+        while True:
+            try:
+                asked = self.navigation.wait_for("Type \"go\"|press Enter to unlock", silence_s)
+            except TimeoutError:
+                return replans
+            if "press Enter" in asked:
+                if not re.match("stale_(pose|state): ", self.navigation.output_lines[-2]):
+                    return replans
+                replans += 1
+            self.type("\n" if "press Enter" in asked else "go\n")
+
     def __enter__(self):
         return self
 

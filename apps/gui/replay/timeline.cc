@@ -78,6 +78,9 @@ QString summary_of(const std::string& kind, const Json& content) {
   if (kind == "halted")
     return TimelineWords::tr("Order %1 halted: %2")
         .arg(text_of(content, "order"), text_of(content, "message"));
+  if (kind == "replanned")
+    return TimelineWords::tr("Order %1 planned again after %2")
+        .arg(text_of(content, "order"), text_of(content, "why"));
   if (kind == "navigated") return loop_summary(content);
   if (kind == "outcome") return outcome_summary(content);
   if (kind == "end") return TimelineWords::tr("End of the operation");

@@ -41,7 +41,7 @@ std::vector<geometry::RigidTransform> hand_eye_tour(const geometry::RigidTransfo
 robot::RobotOrder tour_order(const RobotPlan& plan, const robot::RobotState& present,
                              const geometry::RigidTransform& base_from_tcp) {
   robot::RobotOrder order;
-  order.name = "hand-eye";
+  order.name = tour_name;
   order.model = plan.model;
   order.tool = plan.tool;
   order.start = present.joints;

@@ -11,6 +11,8 @@ namespace helicarm::operation {
 /// pose, with small shifts of the tip; the last one is the initial pose.
 std::vector<geometry::RigidTransform> hand_eye_tour(const geometry::RigidTransform& base_from_tcp);
 
+/// Name of the orders to these poses.
+inline constexpr const char* tour_name = "hand-eye";
 /// The move to one of these poses.
 robot::RobotOrder tour_order(const RobotPlan& plan, const robot::RobotState& present,
                              const geometry::RigidTransform& base_from_tcp);

@@ -174,26 +174,35 @@ Expected<std::vector<robot::RobotOrder>> Operation::preview_tour() const {
   });
 }
 
-Expected<void> Operation::register_robot(const Confirm& confirm) {
+/// Moves the tool there and looks at it.
+tracker::HandEyePair Operation::pair_at(const geometry::RigidTransform& pose, const Confirm& confirm) {
+  const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
+  const robot::RobotOrder order = tour_order(plan_.robot, present, pose);
+  const PlanWatch age(plan_.limits, plan_.tracker, {.time_s = tracker::monotonic_seconds()});
+  record("robot", joints_json(present.joints));
+  record("order", robot::to_json(order));
+  const std::string token = value_or_throw(confirm(order));
+  value_or_throw(age.young(tracker::monotonic_seconds()));
+  carry_out(order, token, {}, sees_tool());
+  const SeenPose seen = value_or_throw(see_tool(look("hand-eye"), plan_.tracker, plan_.tracker.tool));
+  const robot::RobotState at_rest = value_or_throw(robot().wait_connected(robot_patience));
+  return {at_rest.base_from_tcp * plan_.robot.tool.flange_from_tcp.inverse(), seen.tracker_from_marker};
+}
+
+Expected<void> Operation::register_robot(const Confirm& confirm, const Again& again) {
   return guarded([&] {
     notify_(Step::register_robot, "hand-eye calibration");
     std::vector<tracker::HandEyePair> pairs;
     const robot::RobotState begin = value_or_throw(robot().wait_connected(robot_patience));
     const std::vector<geometry::RigidTransform> tour = hand_eye_tour(begin.base_from_tcp);
     record("tour", {{"base_from_tcp", geometry::json_rows(begin.base_from_tcp.matrix())}});
-    for (const geometry::RigidTransform& pose : tour) {
-      const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
-      const robot::RobotOrder order = tour_order(plan_.robot, present, pose);
-      const PlanWatch age(plan_.limits, plan_.tracker, {.time_s = tracker::monotonic_seconds()});
-      record("robot", joints_json(present.joints));
-      record("order", robot::to_json(order));
-      const std::string token = value_or_throw(confirm(order));
-      value_or_throw(age.young(tracker::monotonic_seconds()));
-      carry_out(order, token, {}, sees_tool());
-      const SeenPose seen = value_or_throw(see_tool(look("hand-eye"), plan_.tracker, plan_.tracker.tool));
-      const robot::RobotState at_rest = value_or_throw(robot().wait_connected(robot_patience));
-      pairs.push_back(
-          {at_rest.base_from_tcp * plan_.robot.tool.flange_from_tcp.inverse(), seen.tracker_from_marker});
+    while (pairs.size() < tour.size()) {
+      const auto pair = guarded([&] { return pair_at(tour[pairs.size()], confirm); });
+      if (!pair) {
+        value_or_throw(plan_again(tour_name, pair.error(), again));
+        continue;
+      }
+      pairs.push_back(*pair);
       notify_(Step::register_robot, fmt::format("pose {} of {}", pairs.size(), tour.size()));
     }
     hand_eye_ = value_or_throw(tracker::calibrate_hand_eye(pairs));
@@ -316,6 +325,7 @@ Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std:
     if (!outcome) static_cast<void>(guarded([&] { record_halt(order, outcome.error()); }));
     value_or_throw(outcome);
     outcome->loop = *loop;
+    outcome->replans = replans_[order.name];
     return *outcome;
   });
 }

@@ -33,6 +33,10 @@ struct PathPreview {
   std::vector<Eigen::Vector3d> in_calibrator;                   ///< at the first view's acquisition, mm
 };
 
+/// Whether poses, robot states or heartbeats came later than their limit: the robot is stopped, and nothing
+/// else is known to be wrong.
+bool is_late(const Failure& why);
+
 /// One operation from the first X-ray image to verification, on connected devices. Each decision is written
 /// to the session log with its inputs before it takes effect; a failed write stops the operation, and so does
 /// the loss of the log (record_lost), also during a motion. Call members from one thread, except `interrupt`.
@@ -99,9 +103,12 @@ class Operation {
   /// The moves that `register_robot` would make from the present pose, in order. Nothing moves.
   Expected<std::vector<robot::RobotOrder>> preview_tour() const;
   /// Moves the tool through small rotations and estimates the transforms between marker, robot and tracker.
-  /// Calls `confirm` for the token of each move.
+  /// Calls `confirm` for the token of each move. A move that is stopped is planned anew as `plan_again`.
   using Confirm = std::function<Expected<std::string>(const robot::RobotOrder&)>;
-  Expected<void> register_robot(const Confirm& confirm);
+  /// Asks whoever gives orders whether to unlock the robot and plan again after this refusal.
+  using Again = std::function<bool(const Failure&)>;
+  Expected<void> register_robot(
+      const Confirm& confirm, const Again& again = [](const Failure&) { return false; });
   const tracker::HandEye& hand_eye() const { return *hand_eye_; }
 
   /// The order that moves the tool to the tunnel, with its preview, also written as preview-TUNNEL-VIEW.png
@@ -124,6 +131,12 @@ class Operation {
   /// images. Refuses as `check_plan`, which also stops the robot during the move, and (uncertain) an end
   /// point whose predicted error exceeds the plan's limit.
   Expected<TunnelOutcome> go(const robot::RobotOrder& order, const std::string& token);
+
+  /// After an order to this tunnel was refused or stopped: asks `again`, records that a new plan follows and
+  /// unlocks the robot. Nothing moves before that plan is made and confirmed as the first one. Refuses with
+  /// `why` itself if that is neither of poses (plan_stale, no_pose, stale_pose, pose_spread) nor late
+  /// (`is_late`) on a link that answers again within 2 s, after `most_replans`, and without consent.
+  Expected<void> plan_again(const std::string& order, const Failure& why, const Again& again);
 
   /// Retreats along the tool's axis to the stand-off distance, then moves to the tool's initial pose
   /// (`rest`). Planned at the present poses, so also after a stop, once a person has unlocked the robot.
@@ -192,6 +205,8 @@ class Operation {
   pipeline::Result run(const guidance::Poses& now, const std::vector<guidance::ToolLine>& tool_lines);
   std::vector<robot::Miss> carry_out(const robot::RobotOrder& order, const std::string& token,
                                      const robot::Measure& measure, const robot::Watch& watch);
+  tracker::HandEyePair pair_at(const geometry::RigidTransform& base_from_tcp, const Confirm& confirm);
+  bool answers_again() const;
   TunnelOutcome check(const PlannedTunnel& tunnel);
   void forget_measurement();
   void draw_preview(const robot::RobotOrder& order);
@@ -217,6 +232,7 @@ class Operation {
   std::optional<pipeline::Result> result_, newest_;
   std::optional<tracker::HandEye> hand_eye_;
   std::map<std::string, Planned> planned_;  ///< by tunnel
+  std::map<std::string, int> replans_;      ///< by order
   std::optional<FreehandGuide> guide_;
   std::optional<Guidance> guided_;  ///< the last recorded decision
 };

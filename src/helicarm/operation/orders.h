@@ -6,6 +6,11 @@
 /// What an operation derives from recorded values, so that `replay` derives the same.
 namespace helicarm::operation {
 
+/// Largest number of plans made again for the registration, and for each tunnel: an operation whose orders
+/// are stopped more often needs another machine or network. Measured on two saturated cores: up to 20 to one
+/// tunnel.
+inline constexpr int most_replans = 50;
+
 /// Position of a tool relative to its tunnel after the robot's approach.
 struct TunnelOutcome {
   std::string tunnel;
@@ -13,6 +18,7 @@ struct TunnelOutcome {
   EndMiss start;                  ///< across the tool's axis, from tracker and X-ray images
   EndMiss end;
   std::optional<guidance::Verification> verification;  ///< Eq. 17 in the X-ray images
+  int replans = 0;                                     ///< plans made again until the tool was there
 };
 
 /// The order to a tunnel from these joints. Fails as `tunnel_in_bone` and `plan_approach`.

@@ -68,6 +68,7 @@ class Replay {
     report.orders = orders_.orders;
     report.confirmations = orders_.confirmations;
     report.outcomes = orders_.outcomes;
+    report.replans = orders_.replans;
   }
 
   /// A record that cannot be read differs from those that an operation writes.

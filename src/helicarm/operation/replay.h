@@ -22,6 +22,7 @@ struct ReplayReport {
   std::size_t decisions = 0;  ///< on a hand-held drill
   std::size_t orders = 0;
   std::size_t confirmations = 0;
+  std::size_t replans = 0;  ///< plans made again after a stop
   std::size_t outcomes = 0;
   std::size_t files = 0;                 ///< compared with their recorded digests
   std::vector<std::string> differences;  ///< what differs from the record, or from what it implies

@@ -62,6 +62,7 @@ void OrderReplay::take(const Record& record, const OperationPlan& plan,
   if (record.kind == "confirmed") confirmed(record, origin);
   if (record.kind == "carried_out") carried_out(record, origin);
   if (record.kind == "halted") halted(record);
+  if (record.kind == "replanned") replanned(record, plan, origin);
   if (record.kind == "navigated") navigated(record, plan, origin);
   if (record.kind == "outcome") outcome(record, plan, newest, origin);
   if (record.kind == "end") end(record, origin);
@@ -90,8 +91,8 @@ void OrderReplay::poses(const Record& record, const std::string& origin) {
 
 void OrderReplay::tour(const Record& record, const std::string& origin) {
   JsonReader reader(record.content, origin);
-  const auto poses = hand_eye_tour(geometry::exact_pose_from(reader, "base_from_tcp", any_place_mm));
-  tour_.assign(poses.begin(), poses.end());
+  whole_tour_ = hand_eye_tour(geometry::exact_pose_from(reader, "base_from_tcp", any_place_mm));
+  tour_.assign(whole_tour_.begin(), whole_tour_.end());
   looks_.clear();
   plan_look_.reset();
   leaving_.reset();
@@ -188,6 +189,23 @@ void OrderReplay::halted(const Record& record) {
   const std::string order = text_at(record, "order");
   if (open_ && open_->at("order") == order) open_.reset();
   if (unverified_ == order) unverified_.clear();
+}
+
+/// A confirmation after it needs a new order. A registration goes on at the first pose at which the tracker
+/// has not seen the tool.
+void OrderReplay::replanned(const Record& record, const OperationPlan& plan, const std::string& origin) {
+  ++replans;
+  const std::string name = text_at(record, "order");
+  if (const int number = ++replans_[name]; record.content.at("number") != number || number > most_replans)
+    differ_(origin, fmt::format("{} was planned again {} times by its records, limit {}", name, number,
+                                most_replans));
+  if (open_) differ_(origin, "planned again before the end of the motion");
+  to_.erase(name);
+  other_.erase(name);
+  if (name != tour_name) return;
+  while (!looks_.empty() && !see_tool(looks_.back(), plan.tracker, plan.tracker.tool)) looks_.pop_back();
+  const std::size_t seen = std::min(looks_.size(), whole_tour_.size());
+  tour_.assign(whole_tour_.begin() + static_cast<std::ptrdiff_t>(seen), whole_tour_.end());
 }
 
 void OrderReplay::navigated(const Record& record, const OperationPlan& plan, const std::string& origin) {

@@ -31,7 +31,7 @@ class OrderReplay {
   /// Of the registered robot, or of the plan's drill.
   std::optional<TrackedTool> tool(const OperationPlan& plan) const;
 
-  std::size_t orders = 0, confirmations = 0, outcomes = 0;
+  std::size_t orders = 0, confirmations = 0, outcomes = 0, replans = 0;
 
  private:
   struct Planned {
@@ -56,6 +56,7 @@ class OrderReplay {
   void confirmed(const Record& record, const std::string& origin);
   void carried_out(const Record& record, const std::string& origin);
   void halted(const Record& record);
+  void replanned(const Record& record, const OperationPlan& plan, const std::string& origin);
   void navigated(const Record& record, const OperationPlan& plan, const std::string& origin);
   void outcome(const Record& record, const OperationPlan& plan, const std::optional<pipeline::Result>& result,
                const std::string& origin);
@@ -64,7 +65,8 @@ class OrderReplay {
 
   Differ differ_;
   std::optional<tracker::HandEye> hand_eye_;
-  std::optional<robot::Joints> joints_;        ///< of the order that follows
+  std::optional<robot::Joints> joints_;  ///< of the order that follows
+  std::vector<geometry::RigidTransform> whole_tour_;
   std::deque<geometry::RigidTransform> tour_;  ///< still to be ordered
   std::vector<PoseWindow> looks_;              ///< at the tool, at each pose of the tour
   std::optional<PoseWindow> plan_look_, verify_look_;
@@ -72,10 +74,11 @@ class OrderReplay {
   std::vector<PoseWindow> corrections_;     ///< since the last confirmation
   std::map<std::string, Planned> planned_;  ///< orders to a tunnel, by digest
   std::map<std::string, std::string> to_,
-      other_;                       ///< by name: digest of the last order to a tunnel, of others
-  std::optional<Json> open_;        ///< a confirmation whose motion has not ended
-  std::optional<Planned> reached_;  ///< by the last order that was carried out
-  std::string unverified_;          ///< tunnel that the tool has reached
+      other_;                           ///< by name: digest of the last order to a tunnel, of others
+  std::map<std::string, int> replans_;  ///< by order
+  std::optional<Json> open_;            ///< a confirmation whose motion has not ended
+  std::optional<Planned> reached_;      ///< by the last order that was carried out
+  std::string unverified_;              ///< tunnel that the tool has reached
 };
 
 /// Names of the first differing fields, for a message.

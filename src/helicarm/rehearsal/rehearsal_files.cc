@@ -54,6 +54,7 @@ Json to_json(std::span<const Rehearsal> rehearsals) {
   for (const Rehearsal& rehearsal : rehearsals)
     cases.push_back({{"seed", rehearsal.seed},
                      {"attempts", rehearsal.attempts},
+                     {"replans", rehearsal.replans},
                      {"corrections", rehearsal.corrections},
                      {"hand_eye_rms_mm", rehearsal.hand_eye_rms_mm}});
   const auto figures = [&](auto values) {
@@ -105,15 +106,17 @@ std::string table_of(std::span<const Rehearsal> rehearsals) {
   row("mean", &operation::ErrorFigures::mean, "        0.81  0.88");
   row("SD", &operation::ErrorFigures::sd, "        0.45  0.55   (published as RMS)");
   row("RMS", &operation::ErrorFigures::rms, "        0.93  1.04   (from its mean and SD)");
-  int attempts = 0;
-  for (const Rehearsal& rehearsal : rehearsals) attempts += rehearsal.attempts;
+  int attempts = 0, replans = 0;
+  for (const Rehearsal& rehearsal : rehearsals) {
+    attempts += rehearsal.attempts;
+    replans += rehearsal.replans;
+  }
   text += fmt::format(
       "  mean of all {:.2f}; RMS {:.2f}, predicted {:.2f}; {} of {} within their 95 % ellipses; {} attempts "
-      "for "
-      "{} operations\n",
+      "for {} operations, {} orders planned again\n",
       operation::figures_of(all).mean, root_mean_square(all),
       root_mean_square(collected(rehearsals, '*', &EndError::predicted_mm)), covered(rehearsals), all.size(),
-      attempts, rehearsals.size());
+      attempts, rehearsals.size(), replans);
   return text;
 }
 

@@ -8,7 +8,7 @@ namespace {
 
 const std::vector<Rehearsal> two_cases{
     {7, {{"FS", 0.3, 0.2, 0.4, true, 0.5}, {"FE", 0.1, 0.2, 0.4, true, std::nullopt}}, 0.1, 2, 1},
-    {8, {{"TS", 0.5, 0.2, 0.4, false, 0.7}, {"TE", 0.2, 0.2, 0.4, true, 0.9}}, 0.1, 3, 2}};
+    {8, {{"TS", 0.5, 0.2, 0.4, false, 0.7}, {"TE", 0.2, 0.2, 0.4, true, 0.9}}, 0.1, 3, 2, 4}};
 
 TEST(RehearsalFiles, Eq17StandsBesideTheTrueDistance) {
   const Json json = to_json(two_cases);
@@ -29,7 +29,9 @@ TEST(RehearsalFiles, WithoutEq17TheTableHasNone) {
 TEST(RehearsalFiles, AttemptsOfEachCaseAreCounted) {
   EXPECT_EQ(to_json(two_cases)["cases"][1]["attempts"], 2);
   EXPECT_NE(to_csv(two_cases).find("8,TE,0.2,0.2,0.4,1,0.9,2\n"), std::string::npos);
-  EXPECT_NE(table_of(two_cases).find("3 attempts for 2 operations"), std::string::npos);
+  EXPECT_EQ(to_json(two_cases)["cases"][1]["replans"], 4);
+  EXPECT_NE(table_of(two_cases).find("3 attempts for 2 operations, 4 orders planned again"),
+            std::string::npos);
 }
 
 }  // namespace

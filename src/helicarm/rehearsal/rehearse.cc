@@ -210,19 +210,33 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
     };
     value_or_throw(robot.wait_connected(patience));
     value_or_throw(robot.unlock("the rehearsal"));
-    value_or_throw(operation.register_robot(nod));
+    Rehearsal done{seed, {}};
+    const auto again = [&](const Failure& why) { return operation::is_late(why) && ++done.replans > 0; };
+    value_or_throw(operation.register_robot(nod, again));
+    done.hand_eye_rms_mm = operation.hand_eye().rms_mm;
     if (options.move_bones) stir(stage.virtual_or->simulated_scene());
     std::this_thread::sleep_for(before_exposure);  // until the gate accepts the bones again
 
-    Rehearsal done{seed, {}, operation.hand_eye().rms_mm};
     for (const operation::PlannedTunnel& tunnel : operation.plan().tunnels) {
       const robot::RobotState rest = value_or_throw(robot.wait_connected(patience));
-      const robot::RobotOrder order = value_or_throw(operation.plan_tunnel(tunnel.name));
-      value_or_throw(value_or_throw(operation.live_tool()).overlay(stage.devices->board(), tunnel.bone));
-      const operation::TunnelOutcome outcome = value_or_throw(operation.go(order, robot.confirm(order)));
-      add_ends(done, tunnel, outcome, *stage.virtual_or);
-      done.corrections += static_cast<int>(outcome.loop.size()) - 1;
-      value_or_throw(operation.withdraw(order, rest, nod));
+      std::optional<robot::RobotOrder> begun;  // the tool is on its way by this order, or there
+      std::optional<operation::TunnelOutcome> outcome;
+      const auto approach = [&] {
+        const robot::RobotOrder order = value_or_throw(operation.plan_tunnel(tunnel.name));
+        value_or_throw(value_or_throw(operation.live_tool()).overlay(stage.devices->board(), tunnel.bone));
+        begun = order;
+        outcome = value_or_throw(operation.go(order, robot.confirm(order)));
+        add_ends(done, tunnel, *outcome, *stage.virtual_or);
+        done.corrections += static_cast<int>(outcome->loop.size()) - 1;
+      };
+      while (!outcome || begun) {
+        const auto moved = guarded([&] {
+          if (!begun) return approach();
+          value_or_throw(operation.withdraw(*begun, rest, nod));
+          begun.reset();
+        });
+        if (!moved) value_or_throw(operation.plan_again(tunnel.name, moved.error(), again));
+      }
     }
     value_or_throw(operation.finish());
     return done;

@@ -35,6 +35,7 @@ struct Rehearsal {
   double hand_eye_rms_mm = 0;
   int corrections = 0;  ///< of the closed loops
   int attempts = 1;     ///< 1 + operations that a busy machine aborted before
+  int replans = 0;      ///< orders planned and confirmed again after a late pose, state or heartbeat
 };
 
 /// The plan for an operation with the virtual devices; the picks lie near the balls, as a surgeon's clicks
