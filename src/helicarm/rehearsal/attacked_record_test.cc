@@ -105,9 +105,9 @@ TEST_F(AttackedRecord, ConfirmationAfterAStopNeedsANewOrder) {
   const auto again = [](const std::string& order, int number) {
     return Json{{"order", order}, {"number", number}, {"why", "stale_state"}, {"by", "tester"}};
   };
-  const auto confirmed = std::ranges::find(records_, "confirmed", &session::SessionRecord::kind);
+  const auto confirmed = std::ranges::find(records_, "confirmed", &operation::SessionRecord::kind);
   ASSERT_NE(confirmed, records_.end());
-  session::SessionRecord replanned = *confirmed;
+  operation::SessionRecord replanned = *confirmed;
   replanned.kind = "replanned";
   replanned.content = again("hand-eye", 1);
   const auto inserted = records_.insert(confirmed, replanned);
