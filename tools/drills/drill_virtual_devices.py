@@ -109,9 +109,7 @@ class VirtualDevices:
         """Both acquisitions, and the robot's registration with each motion confirmed."""
         self.acquire_both()
         self.navigation.wait_for("^ *9: tip", 120)
-        for pose in range(1, 10):
-            self.confirm()
-            self.navigation.wait_for(f"register: pose {pose}")
+        self.give_orders("register: pose 9")
 
     def plan_again(self, name, withdrawn=False):
         """After a refusal at the terminal, which waits for Enter, until the tool is at the femur's tunnel."""
@@ -125,19 +123,22 @@ class VirtualDevices:
         check(f"{name}: {self.navigation.wait_for('femur: distance from', 120)}", True)
         self.navigation.end(signal.SIGKILL)
 
-    def give_orders(self, silence_s=120):
-        """Confirms each order, and has it planned again after a late pose, state or heartbeat; how often it did."""
+    def give_orders(self, until="$^", silence_s=120):
+        """Confirms each order, and has it planned again after a late pose, state or heartbeat, until this line, another
+        failure or the end of the program; how often it was planned again."""
         replans = 0
         while True:
             try:
-                asked = self.navigation.wait_for("Type \"go\"|press Enter to unlock", silence_s)
+                asked = self.navigation.wait_for(f"Type \"go\"|press Enter to unlock|{until}", silence_s)
             except TimeoutError:
                 return replans
-            if "press Enter" in asked:
-                if not re.match("stale_(pose|state): ", self.navigation.output_lines[-2]):
-                    return replans
+            if "press Enter to unlock" in asked and re.match("stale_(pose|state): ", self.navigation.output_lines[-2]):
                 replans += 1
-            self.type("\n" if "press Enter" in asked else "go\n")
+                self.type("\n")
+            elif "Type \"go\"" in asked:
+                self.type("go\n")
+            else:
+                return replans
 
     def __enter__(self):
         return self
@@ -210,7 +211,7 @@ class VirtualDevices:
     def expect_replay(self, name, has_end=True):
         """`has_end`: else the program was killed, or its disk was full; everything up to there is reproduced."""
         replayed = subprocess.run([self.program, "replay", self.session, "--json"], capture_output=True, text=True)
-        answer = json.loads(replayed.stdout)
+        answer, _ = json.JSONDecoder().raw_decode(replayed.stdout)  # a failure follows
         check(f"{name}: the record is {'complete' if has_end else 'without an end'} and reproduced",
               replayed.returncode == (0 if has_end else 3) and answer["finished"] == has_end and not answer["differences"],
               (replayed.stdout + replayed.stderr).strip().splitlines()[-1])

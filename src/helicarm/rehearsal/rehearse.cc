@@ -211,7 +211,9 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
     value_or_throw(robot.wait_connected(patience));
     value_or_throw(robot.unlock("the rehearsal"));
     Rehearsal done{seed, {}};
-    const auto again = [&](const Failure& why) { return operation::is_late(why) && ++done.replans > 0; };
+    const auto again = [&](const Failure& why) {
+      return options.plans_again && operation::is_late(why) && ++done.replans > 0;
+    };
     value_or_throw(operation.register_robot(nod, again));
     done.hand_eye_rms_mm = operation.hand_eye().rms_mm;
     if (options.move_bones) stir(stage.virtual_or->simulated_scene());

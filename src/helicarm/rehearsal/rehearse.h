@@ -15,7 +15,8 @@ namespace helicarm::rehearsal {
 struct RehearsalOptions {
   int image_size = 1024;
   double tracker_rate_hz = 60;
-  bool move_bones = true;  ///< between acquisition and navigation
+  bool move_bones = true;   ///< between acquisition and navigation
+  bool plans_again = true;  ///< after late poses, states or heartbeats; else these end it
   std::function<void(const std::string&)> notify = [](const std::string&) {};
 };
 
