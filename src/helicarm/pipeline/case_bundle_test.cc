@@ -39,7 +39,7 @@ class BundleOfNamedCase : public testing::Test {
     ASSERT_TRUE(write_file(folder_.path() / "case.json", to_text(json)));
   }
 
-  CaseBundle bundle(BundleOptions options = {}) {
+  CaseBundle bundle(const BundleOptions& options = {}) {
     auto made = bundle_case(folder_.path(), options);
     EXPECT_TRUE(made) << made.error().message;
     return made ? *made : CaseBundle{};
@@ -79,7 +79,9 @@ TEST_F(BundleOfNamedCase, HoldsNothingOfItsModels) {
                      {"start", {{"world_from_model", Json::array({1234.5})}}}}};
   json["picks"][0]["bone"] = {{"name", "doe_bone"}, {"side", "left"}};
   ASSERT_TRUE(write_file(folder_.path() / "case.json", to_text(json)));
-  const CaseBundle made = bundle({.result = Json{{"models", {{{"name", "doe_femur"}, {"x", 1}}}}}});
+  BundleOptions with_result;
+  with_result.result = Json{{"models", {{{"name", "doe_femur"}, {"x", 1}}}}};
+  const CaseBundle made = bundle(with_result);
   EXPECT_THAT(made.left_out,
               testing::ElementsAre("model1: models are not packed", "model2: models are not packed"));
   EXPECT_THAT(names(made), testing::Contains("result.json"));
@@ -142,7 +144,10 @@ TEST_F(BundleOfNamedCase, TakesFiguresAndNotTextsFromAGivenResult) {
       {"status", "refused"},
       {"failure", {{"code", "ambiguous_labels"}, {"message", "Jane Doe"}, {"view", "doe_LAT"}}},
       {"doe_AP", 17}};
-  const CaseBundle made = bundle({.measure = false, .result = given});
+  BundleOptions with_result;
+  with_result.measure = false;
+  with_result.result = given;
+  const CaseBundle made = bundle(with_result);
   const auto file = std::ranges::find(made.files, "given_result.json", &ArchivedFile::name);
   ASSERT_NE(file, made.files.end());
   const Json written = *parse_json(file->bytes, "given_result.json");
