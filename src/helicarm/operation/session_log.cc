@@ -35,7 +35,7 @@ std::string link(std::string_view chain, std::string_view text) {
   return fmt::format("{:02x}", fmt::join(hash, ""));
 }
 
-double now_s() {
+double unix_seconds() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
@@ -169,7 +169,7 @@ Expected<void> SessionLog::append(const std::string& kind, Json content) {
   const std::lock_guard lock(mutex_);
   if (auto whole = check_file(); !whole) return whole;
   const std::string text =
-      Json{{"n", next_}, {"time_s", now_s()}, {"kind", kind}, {"content", std::move(content)}}.dump(
+      Json{{"n", next_}, {"time_s", unix_seconds()}, {"kind", kind}, {"content", std::move(content)}}.dump(
           -1, ' ', false, Json::error_handler_t::replace);
   if (auto read_back = parse_json(text, log_.string()); !read_back)
     return tl::unexpected<Failure>(read_back.error());
