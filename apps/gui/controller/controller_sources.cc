@@ -24,7 +24,7 @@ std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given, bo
     const auto bone = pick == given.picks.end() ? std::nullopt : pick->moves_with;
     tunnels.push_back({tunnel.name, bone.value_or(guidance::Bone()), tunnel.start, tunnel.end});
   }
-  if (given.picks.empty() && tunnels.empty() && !has_models)
+  if (given.picks.empty() && tunnels.empty() && !has_models && given.bones == guidance::knee_bones())
     tunnels = {{"femur", "femur", "FS", "FE"}, {"tibia", "tibia", "TS", "TE"}};
   return tunnels;
 }

@@ -225,6 +225,7 @@ Expected<operation::ToolOverlay> overlay_of(const operation::LiveTool& tool, con
       const auto seen = state.tracker_from.find(marker);
       return seen == state.tracker_from.end() ? std::nullopt : std::optional(seen->second);
     };
+    if (plan.tunnels.empty()) throw BadInput(Reason::bad_value, "the plan has no tunnel");
     const auto tunnel = std::ranges::find(plan.tunnels, state.tunnel, &operation::PlannedTunnel::name);
     guidance::Poses now;
     for (const auto& [bone, marker] : plan.tracker.markers)

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/freehand.h"
@@ -27,7 +28,7 @@ Json case_in_present_form(const Json& recorded, const Json& present, const Opera
   if (recorded.value("format", "") != "helicarm-case/1") return recorded;
   Json json = present;
   for (const auto& [key, value] : recorded.items())
-    if (key != "format") json[key] = value;
+    if (key != "format" && (key != "tracker" || present.contains(key))) json[key] = value;
   for (Json& view : json.at("views")) view.at("poses") = pipeline::in_present_form(view.at("poses"));
   json.at("picks") = Json::array();
   for (const pipeline::Pick& pick : value_or_throw(picks_of(plan, recorded.at("picks"), "case.json")))
@@ -37,6 +38,35 @@ Json case_in_present_form(const Json& recorded, const Json& present, const Opera
   else
     json.erase("poses_now");
   return json;
+}
+
+/// Earlier versions made every pose that they read a rotation again, which changes last bits.
+pipeline::Case as_read_earlier(pipeline::Case given) {
+  const auto read = [](auto& pose) {
+    pose = value_or_throw(geometry::rigid_transform_from(pose.matrix(), "pose"));
+  };
+  const auto read_all = [&](guidance::Poses& poses) {
+    if (poses.tracker_from_calibrator) read(*poses.tracker_from_calibrator);
+    for (auto& [bone, pose] : poses.tracker_from_bone) read(pose);
+    if (poses.tracker_from_tool) read(*poses.tracker_from_tool);
+  };
+  for (pipeline::CaseView& view : given.views) read_all(view.poses);
+  read_all(given.poses_now);
+  return given;
+}
+
+/// What an earlier version wrote of a result too: the keys of `then`.
+Json in_keys_of(const Json& then, const Json& now) {
+  if (then.is_object() && now.is_object()) {
+    Json kept = Json::object();
+    for (const auto& [key, value] : then.items())
+      if (const auto found = now.find(key); found != now.end()) kept[key] = in_keys_of(value, *found);
+    return kept;
+  }
+  if (!then.is_array() || !now.is_array() || then.size() != now.size()) return now;
+  Json kept = Json::array();
+  for (std::size_t i = 0; i < then.size(); ++i) kept.push_back(in_keys_of(then[i], now[i]));
+  return kept;
 }
 
 Json without_timing(Json result) {
@@ -191,7 +221,8 @@ class Replay {
     const auto derived =
         guarded([&] { return derived_case(recorded, value_or_throw(path_inside(session_, folder))); });
     if (!derived) return differ(origin, fmt::format("{}: {}", name, derived.error().message));
-    derived_ = *derived;
+    earlier_ = recorded.value("format", "") != "helicarm-case/2";
+    derived_ = earlier_ ? as_read_earlier(*derived) : *derived;
     const Json now_written = pipeline::to_json(*derived);
     compare(case_in_present_form(recorded, now_written, plan_), now_written, origin, "case");
   }
@@ -233,11 +264,12 @@ class Replay {
     measurement_ = *measured;
     newest_ = measured->result;
     if (!verifies_) result_ = newest_;
-    if (record.content.at("digest") != digest_of(*newest_))
-      differ(origin, fmt::format("{}: the result differs from the recorded one on recomputation", folder));
     const auto then = read_json(inside / "result.json");
-    const Json now = without_timing(pipeline::to_json(*newest_));
     if (!then) return differ(origin, then.error().message);
+    Json now = without_timing(pipeline::to_json(*newest_));
+    if (earlier_) now = in_keys_of(*then, now);
+    if (record.content.at("digest") != xray::digest(to_text(now)))
+      differ(origin, fmt::format("{}: the result differs from the recorded one on recomputation", folder));
     if (const Json written = without_timing(*then); written != now)
       differ(origin, fmt::format("{}/result.json differs from the recomputed result{}", folder,
                                  differing_fields(written, now)));
@@ -268,6 +300,7 @@ class Replay {
   OperationPlan plan_;
   std::optional<pipeline::Result> result_;  ///< of the last measurement
   std::optional<pipeline::Result> newest_;  ///< also of a verification
+  bool earlier_ = false;                    ///< the last case is of an earlier version
   bool verifies_ = false;                   ///< the last case is that of a verification
   std::optional<FreehandGuide> guide_;
   std::optional<pipeline::Case> derived_;             ///< of the last case record

@@ -363,6 +363,9 @@ Json to_json(const Case& written) {
 
 Expected<Case> checked_case(Case given) {
   return guarded([&] {
+    Json picks = Json::array();
+    for (const Pick& pick : given.picks) picks.push_back(to_json(pick));
+    value_or_throw(picks_from(picks, "case.json", given.views, given.bones));
     for (const Pick& pick : given.picks)
       if (find_named(given.calibrator.targets, pick.name, &phantom::CalibratorTarget::name))
         throw BadInput(Reason::name_clash,

@@ -94,8 +94,8 @@ Expected<Case> read_case(const std::filesystem::path& path);
 /// case.json, the inverse of `read_case`. Its images, calibrator and plate must lie in the folder.
 Json to_json(const Case& written);
 
-/// What `read_case` checks of values that do not come from a file: poses that look like metres and picks
-/// named as targets are refused (bad_value, name_clash); adds the warnings.
+/// What `read_case` checks of picks and poses, for values that are from no file; adds the warnings. Fails as
+/// `picks_from`, with name_clash for a pick named as a target, and with bad_value for poses in metres.
 Expected<Case> checked_case(Case given);
 
 /// The case.json of a case given by its folder or by that file, and its folder.

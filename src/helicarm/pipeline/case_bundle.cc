@@ -60,7 +60,7 @@ class Bundler {
     picks_ = numbered(json_, "picks", "pick");
     tunnels_ = numbered(json_, "tunnels", "tunnel");
     lines_ = numbered(json_, "tool_lines", "line");
-    if (json_.contains("bones") && !json_["bones"].is_null())
+    if (given_.bones != guidance::knee_bones())
       for (const guidance::Bone& bone : given_.bones)
         tracked_.emplace(bone, fmt::format("tracked_bone{}", tracked_.size() + 1));
   }

@@ -83,12 +83,15 @@ guidance::Poses poses_from(JsonReader reader, const std::vector<guidance::Bone>&
   std::optional<JsonReader> by_name;
   if (reader.has("tracker_from_bone")) by_name.emplace(reader.object("tracker_from_bone"));
   reader.raw("tracker_from_bone");
+  const std::vector<guidance::Bone> of_knee = guidance::knee_bones();
   for (const guidance::Bone& bone : bones) {
-    const std::string key = key_of_bone(bone);
     auto own = by_name ? pose_from(*by_name, bone) : std::nullopt;
-    if (own && reader.has(key.c_str()))
-      reader.refuse(Reason::name_clash, key.c_str(), "is given in \"tracker_from_bone\" too");
-    if (!own) own = pose_from(reader, key);
+    if (std::ranges::find(of_knee, bone) != of_knee.end()) {
+      const std::string key = key_of_bone(bone);
+      if (own && reader.has(key.c_str()))
+        reader.refuse(Reason::name_clash, key.c_str(), "is given in \"tracker_from_bone\" too");
+      if (!own) own = pose_from(reader, key);
+    }
     if (own) poses.tracker_from_bone.emplace(bone, *own);
   }
   if (by_name) by_name->finish();

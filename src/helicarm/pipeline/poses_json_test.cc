@@ -49,6 +49,12 @@ TEST(PosesJson, AreReadByTheBonesNames) {
   EXPECT_FALSE(poses->tracker_from("pelvis"));
 }
 
+TEST(PosesJson, BoneMayBeNamedBone) {
+  const auto poses = poses_of(std::string(R"({"tracker_from_bone": {"bone": )") + shifted + "}}", {"bone"});
+  ASSERT_TRUE(poses) << poses.error().message;
+  EXPECT_TRUE(poses->tracker_from("bone"));
+}
+
 TEST(PosesJson, OfTheKneeAreReadFromTheirOwnKeys) {
   const auto poses =
       poses_of(std::string(R"({"tracker_from_tibia": )") + shifted + "}", guidance::knee_bones());

@@ -173,7 +173,8 @@ std::vector<Warning> handedness_notes(const CaseCalibration& calibration) {
 }
 
 std::vector<Warning> one_view_notes(const CaseCalibration& calibration) {
-  if (calibration.views.size() != 1 || calibration.views.front().covariance.isZero(0)) return {};
+  if (calibration.views.size() != 1 || calibration.history || calibration.views.front().covariance.isZero(0))
+    return {};
   const calibration::CalibratedView& view = calibration.views.front();
   const auto sigma = [&](Eigen::Index i) { return std::sqrt(view.covariance(i, i)); };
   const double focal_percent = 100 * sigma(0) / std::abs(view.view.intrinsics.fx);

@@ -53,11 +53,12 @@ std::vector<Warning> handedness_notes(const CaseCalibration& calibration);
 /// Note `ambiguous_handedness` of images that are all mirrored as stated.
 Warning mirrored_as_stated();
 
-/// Effect of an error of the calibrator's scale, which the images do not constrain: mm per per cent at each
-/// point, and the source distances for a comparison by tape measure. Empty if the file states scale_sigma.
-/// Of one view: how well it determines its intrinsics and source (intrinsics_weak).
+/// Of one view: how well it determines its intrinsics and source without
+/// a C-arm history (intrinsics_weak).
 std::vector<Warning> one_view_notes(const CaseCalibration& calibration);
 
+/// Effect of an error of the calibrator's scale, which the images do not constrain: mm per per cent at each
+/// point, and the source distances for a comparison by tape measure. Empty if the file states scale_sigma.
 std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calibration,
                                  const std::vector<PointResult>& points);
 
