@@ -9,6 +9,7 @@
 #include "gui/controller/application_state.h"
 #include "gui/controller/live.h"
 #include "gui/controller/worker.h"
+#include "helicarm/case_registration/register_case.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/registration/motion.h"
 #include "helicarm/virtual_devices/virtual_devices.h"
