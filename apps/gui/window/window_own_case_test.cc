@@ -250,7 +250,7 @@ TEST_F(WindowWithOwnImages, SelectedOnesAreRemovedAndWhatIsMissingIsSaidBesideIt
   wait_checked();
   ASSERT_EQ(images->rowCount(), 1);
   EXPECT_EQ(images->item(0, 0)->text(), "IM2");
-  EXPECT_THAT(part<QLabel>("imagesLack")->text().toStdString(), HasSubstr("needs a second image"));
+  EXPECT_TRUE(part<QLabel>("imagesLack")->text().isEmpty());
 }
 
 TEST_F(WindowWithOwnImages, APresetIsKeptChosenAndDeleted) {

@@ -123,7 +123,7 @@ TEST(StoppedOrder, MovesNoFurtherThanItsBrakingDistance) {
   }
 }
 
-/// In wall time a loaded machine delays a stop, so only the final rest is tested.
+/// In wall time a loaded machine delays a stop or the link's states, so only the final rest is tested.
 TEST(StoppedOrder, RestsInWallTimeToo) {
   for (const double acceleration : {250.0, 1200.0}) {
     StopDrill drill(60, false);
@@ -138,7 +138,7 @@ TEST(StoppedOrder, RestsInWallTimeToo) {
     drill.link.stop();
     while (drill.robot->truth().moving) std::this_thread::sleep_for(100us);
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - told_at;
-    EXPECT_EQ(done.get().error().reason, Reason::robot_stopped);
+    EXPECT_THAT(done.get().error().reason, testing::AnyOf(Reason::robot_stopped, Reason::stale_state));
     const Eigen::Vector3d stopped_at = drill.tip();
     drill.pass(0.2);
     EXPECT_EQ((drill.tip() - stopped_at).norm(), 0);
