@@ -14,10 +14,10 @@ const std::string rtk_xml = R"(<?xml version="1.0"?>
   <SourceToIsocenterDistance>1000</SourceToIsocenterDistance>
   <SourceToDetectorDistance>1536</SourceToDetectorDistance>
   <!-- <GantryAngle>7</GantryAngle> -->
-  <geometry::Projection>
+  <Projection>
     <GantryAngle>0</GantryAngle>
-  </geometry::Projection>
-  <geometry::Projection>
+  </Projection>
+  <Projection>
     <GantryAngle>30</GantryAngle>
     <OutOfPlaneAngle>4</OutOfPlaneAngle>
     <InPlaneAngle>-7</InPlaneAngle>
@@ -30,7 +30,7 @@ const std::string rtk_xml = R"(<?xml version="1.0"?>
         -222.0196354675674 -1519.8954471837728 -10.166665967134872 10428.0
         0.49878202512991204 -0.0697564737441253 0.8639158094271043 -1000.0
     </Matrix>
-  </geometry::Projection>
+  </Projection>
 </RTKThreeDCircularGeometry>
 )";
 const ImportOptions second{
