@@ -10,6 +10,7 @@
 #include "helicarm/operation/connections.h"
 #include "helicarm/operation/replay.h"
 #include "helicarm/rehearsal/rehearse.h"
+#include "helicarm/virtual_devices/any_ports_test.h"
 
 namespace helicarm::rehearsal {
 namespace {
@@ -26,11 +27,7 @@ constexpr int most_takes = 5;
 class FaultyOperation : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    virtual_devices::VirtualDevicesOptions options;
-    options.image_size = 512;
-    options.tracker_rate_hz = 100;
-    options.tracker_port = options.rtde_port = options.dashboard_port = options.script_port = 0;
-    virtual_or_ = VirtualDevices::open(options).value();
+    virtual_or_ = VirtualDevices::open(virtual_devices::on_any_ports(100)).value();
     folder_ = std::make_unique<TemporaryFolder>();
     plan_ = plan_for(*virtual_or_, virtual_or_->tracker().port());
     devices_ = std::make_unique<operation::Connections>(

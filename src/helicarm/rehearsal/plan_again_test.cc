@@ -7,6 +7,7 @@
 #include "helicarm/operation/connections.h"
 #include "helicarm/operation/replay.h"
 #include "helicarm/rehearsal/rehearse.h"
+#include "helicarm/virtual_devices/any_ports_test.h"
 
 namespace helicarm::rehearsal {
 namespace {
@@ -20,11 +21,7 @@ using virtual_devices::VirtualDevices;
 class PlanAgain : public testing::Test {
  protected:
   void SetUp() override {
-    virtual_devices::VirtualDevicesOptions options;
-    options.image_size = 512;
-    options.tracker_rate_hz = 60;
-    options.tracker_port = options.rtde_port = options.dashboard_port = options.script_port = 0;
-    virtual_or_ = VirtualDevices::open(options).value();
+    virtual_or_ = VirtualDevices::open(virtual_devices::on_any_ports(60)).value();
     plan_ = plan_for(*virtual_or_, virtual_or_->tracker().port());
     devices_ = std::make_unique<operation::Connections>(
         plan_, receiver::Inbox::open(folder_.path() / "inbox").value());

@@ -15,19 +15,12 @@
 #include "helicarm/devices/tracker/mount_calibration.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/geometry/pose_step.h"
+#include "helicarm/virtual_devices/any_ports_test.h"
 
 namespace helicarm::virtual_devices {
 namespace {
 
-constexpr int small = 512;
-
-VirtualDevicesOptions any_ports() {
-  VirtualDevicesOptions options;
-  options.image_size = small;
-  options.tracker_rate_hz = 200;
-  options.tracker_port = options.rtde_port = options.dashboard_port = options.script_port = 0;
-  return options;
-}
+VirtualDevicesOptions any_ports() { return on_any_ports(200); }
 
 class VirtualDevicesTest : public testing::Test {
  protected:
