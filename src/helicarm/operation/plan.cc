@@ -67,7 +67,7 @@ void read_markers(JsonReader& reader, const std::vector<guidance::Bone>& bones, 
     for (const guidance::Bone& bone : bones) tracker.markers[bone] = names.text(bone.c_str());
     tracker.tool = names.text("tool");
   };
-  if (!reader.has("markers")) return read(reader);
+  if (!reader.has("markers") && bones == guidance::knee_bones()) return read(reader);
   JsonReader names = reader.object("markers");
   read(names);
   names.finish();

@@ -153,6 +153,14 @@ TEST_F(PlanOfBones, BoneWithoutAMarkerIsRefused) {
   EXPECT_THAT(refusal(), testing::HasSubstr("\"L5\""));
 }
 
+TEST_F(PlanOfBones, OtherKeysOfTheTrackerAreNoMarkers) {
+  json_["bones"] = {"address"};
+  json_["tunnels"][0]["bone"] = "address";
+  json_["tracker"].erase("markers");
+  json_["tracker"]["tool"] = "d";
+  EXPECT_THAT(refusal(), testing::HasSubstr("\"markers\""));
+}
+
 TEST_F(PlanOfBones, OneMarkerOfTwoBonesIsRefused) {
   json_["tracker"]["markers"]["L5"] = "a";
   EXPECT_THAT(refusal(), testing::HasSubstr("\"a\" is another body's marker"));
