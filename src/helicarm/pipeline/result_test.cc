@@ -82,7 +82,7 @@ TEST(ResultJson, PlacesInBonesAreNamedAsTheCaseNamesThem) {
   const Json& in_bone = json["points"][0]["in_bones"]["L4"];
   EXPECT_EQ(in_bone["xyz_mm"], Json({1, 2, 3}));
   EXPECT_EQ(in_bone["covariance_mm2"][1], Json({0, 4, 0}));
-  EXPECT_NEAR(in_bone["error_95_mm"].get<double>(), 2 * std::sqrt(7.815), 0.02);
+  EXPECT_EQ(in_bone["error_95_mm"], localization::length_at_95(4 * Eigen::Matrix3d::Identity()));
   EXPECT_FALSE(json["points"][0]["in_bones"].contains("pelvis"));
   EXPECT_FALSE(json["points"][0].contains("in_femur"));
   EXPECT_EQ(json["tunnels"][0]["in_bones"]["L4"]["end"], in_bone);

@@ -235,7 +235,7 @@ std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calib
       "it and state scale_sigma, or compare the distances of the fiducials' centre from the source with a "
       "tape "
       "measure: {}",
-      strain, points.empty() ? "1 % of their distance from its middle" : fmt::format("up to {:.2g} mm", most),
+      strain, most == 0 ? "1 % of their distance from its middle" : fmt::format("up to {:.2g} mm", most),
       distances);
   return {note};
 }
