@@ -89,9 +89,7 @@ pipeline::Case with_picks(pipeline::Case given, const std::vector<pipeline::Pick
 Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipeline::Pick>& picks) {
   if (equipment.given) {
     const pipeline::Case picked = with_picks(*equipment.given, picks);
-    auto measured = equipment.measurement
-                        ? pipeline::measure_again(*equipment.measurement, picked, equipment.options.run)
-                        : pipeline::measure(picked, equipment.options.run);
+    auto measured = pipeline::measure_again(equipment.measurement, picked, equipment.options.run);
     if (!measured) return tl::unexpected<Failure>(measured.error());
     equipment.measurement = *std::move(measured);
     return equipment.measurement->result;

@@ -163,14 +163,15 @@ Expected<pipeline::Measurement> measure_case(const pipeline::Case& given, const 
                                              const std::optional<pipeline::Measurement>& earlier) {
   pipeline::RunOptions options;
   options.max_error_mm = plan.max_error_mm;
-  return earlier ? pipeline::measure_again(*earlier, given, options) : pipeline::measure(given, options);
+  return pipeline::measure_again(earlier, given, options);
 }
 
-std::string digest_of(const pipeline::Result& result) {
-  Json json = pipeline::to_json(result);
-  json.erase("timing_ms");
-  return xray::digest(to_text(json));
+Json without_timing(Json result) {
+  result.erase("timing_ms");
+  return result;
 }
+
+std::string digest_of(const Json& result) { return xray::digest(to_text(without_timing(result))); }
 
 Expected<Digests> write_result(const pipeline::Result& result, const fs::path& folder) {
   return guarded([&] {

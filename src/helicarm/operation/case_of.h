@@ -58,8 +58,10 @@ Expected<void> check_digests(const std::filesystem::path& folder, const Digests&
 Expected<pipeline::Measurement> measure_case(const pipeline::Case& given, const OperationPlan& plan,
                                              const std::optional<pipeline::Measurement>& earlier);
 
-/// Of result.json without its timing: equal cases have equal digests.
-std::string digest_of(const pipeline::Result& result);
+/// result.json without its timing, which differs from run to run.
+Json without_timing(Json result);
+/// Of that: equal cases have equal digests.
+std::string digest_of(const Json& result);
 
 /// Writes result.json and the report into the case's folder; returns their digests.
 Expected<Digests> write_result(const pipeline::Result& result, const std::filesystem::path& folder);

@@ -143,7 +143,9 @@ pipeline::Result Operation::run(const guidance::Poses& now,
   if (measurement_->calibration != earlier || !earlier) ++calibrations_;
   const Digests written = value_or_throw(write_result(measurement_->result, given.folder));
   value_or_throw(check_digests(given.folder, files));
-  record("result", {{"folder", name}, {"digest", digest_of(measurement_->result)}, {"files", written}});
+  record(
+      "result",
+      {{"folder", name}, {"digest", digest_of(pipeline::to_json(measurement_->result))}, {"files", written}});
   newest_ = measurement_->result;
   if (newest_->failure) throw BadInput(*newest_->failure);
   return *newest_;

@@ -23,10 +23,11 @@ namespace helicarm::operation {
 namespace {
 
 constexpr std::uintmax_t most_image_bytes = std::uintmax_t{256} << 20;
+constexpr const char* earlier_format = "helicarm-case/1";
 
 /// The case of an operation of an earlier version in the present form; `present` has its format and bones.
 Json case_in_present_form(const Json& recorded, const Json& present, const OperationPlan& plan) {
-  if (recorded.value("format", "") != "helicarm-case/1") return recorded;
+  if (recorded.value("format", "") != earlier_format) return recorded;
   Json json = present;
   for (const auto& [key, value] : recorded.items())
     if (key != "format" && (key != "tracker" || present.contains(key))) json[key] = value;
@@ -74,11 +75,6 @@ Json in_keys_of(const Json& then, const Json& now) {
   Json kept = Json::array();
   for (std::size_t i = 0; i < then.size(); ++i) kept.push_back(in_keys_of(then[i], now[i]));
   return kept;
-}
-
-Json without_timing(Json result) {
-  result.erase("timing_ms");
-  return result;
 }
 
 class Replay {
@@ -228,7 +224,7 @@ class Replay {
     const auto derived =
         guarded([&] { return derived_case(recorded, value_or_throw(path_inside(session_, folder))); });
     if (!derived) return differ(origin, fmt::format("{}: {}", name, derived.error().message));
-    earlier_ = recorded.value("format", "") != "helicarm-case/2";
+    earlier_ = recorded.value("format", "") == earlier_format;
     derived_ = earlier_ ? as_read_earlier(*derived) : *derived;
     const Json now_written = pipeline::to_json(*derived);
     compare(case_in_present_form(recorded, now_written, plan_), now_written, origin, "case");
@@ -275,7 +271,7 @@ class Replay {
     if (!then) return differ(origin, then.error().message);
     Json now = without_timing(pipeline::to_json(*newest_));
     if (earlier_) now = in_keys_of(*then, now);
-    if (record.content.at("digest") != xray::digest(to_text(now)))
+    if (record.content.at("digest") != digest_of(now))
       differ(origin, fmt::format("{}: the result differs from the recorded one on recomputation", folder));
     if (const Json written = without_timing(*then); written != now)
       differ(origin, fmt::format("{}/result.json differs from the recomputed result{}", folder,

@@ -25,6 +25,16 @@ Expected<Measurement> located(const Case& given, std::shared_ptr<const CaseCalib
   });
 }
 
+/// Whether a calibration by the one options serves the others.
+bool ask_for_one_calibration(const RunOptions& a, const RunOptions& b) {
+  const auto same = [](const calibration::HistoryEntry& one, const calibration::HistoryEntry& other) {
+    return one.image == other.image && one.estimate_mm == other.estimate_mm &&
+           one.information == other.information;
+  };
+  return a.method == b.method && a.history.has_value() == b.history.has_value() &&
+         (!a.history || std::ranges::equal(a.history->entries, b.history->entries, same));
+}
+
 }  // namespace
 
 Expected<Measurement> measure(const Case& given, const RunOptions& options, const Progress& progress) {
@@ -39,20 +49,11 @@ Expected<Measurement> measure(const Case& given, const RunOptions& options, cons
   });
 }
 
-Expected<Measurement> measure_again(const Measurement& earlier, const Case& changed,
+Expected<Measurement> measure_again(const std::optional<Measurement>& earlier, const Case& changed,
                                     const RunOptions& options, const Progress& progress) {
-  if (!earlier.calibration || !ask_for_one_calibration(earlier.result.options, options))
+  if (!earlier || !earlier->calibration || !ask_for_one_calibration(earlier->result.options, options))
     return measure(changed, options, progress);
-  return in_total([&] { return located(changed, earlier.calibration, options, progress); });
-}
-
-bool ask_for_one_calibration(const RunOptions& a, const RunOptions& b) {
-  const auto same = [](const calibration::HistoryEntry& one, const calibration::HistoryEntry& other) {
-    return one.image == other.image && one.estimate_mm == other.estimate_mm &&
-           one.information == other.information;
-  };
-  return a.method == b.method && a.history.has_value() == b.history.has_value() &&
-         (!a.history || std::ranges::equal(a.history->entries, b.history->entries, same));
+  return in_total([&] { return located(changed, earlier->calibration, options, progress); });
 }
 
 }  // namespace helicarm::pipeline

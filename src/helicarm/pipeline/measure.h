@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "helicarm/pipeline/calibrate_case.h"
 #include "helicarm/pipeline/case.h"
@@ -20,12 +21,9 @@ struct Measurement {
 Expected<Measurement> measure(const Case& given, const RunOptions& options, const Progress& progress = {});
 
 /// As `measure`, of the same images, calibrator and plate, by the earlier calibration: picks, tunnels, tool
-/// lines, present poses and the tracker's noise may differ. Calibrates again where there is no calibration,
-/// or one by another method or C-arm history than `options` ask for.
-Expected<Measurement> measure_again(const Measurement& earlier, const Case& changed,
+/// lines, present poses and the tracker's noise may differ. Calibrates where there is no calibration, or one
+/// by another method or C-arm history than `options` ask for.
+Expected<Measurement> measure_again(const std::optional<Measurement>& earlier, const Case& changed,
                                     const RunOptions& options, const Progress& progress = {});
-
-/// Whether a calibration by the one options serves the others.
-bool ask_for_one_calibration(const RunOptions& a, const RunOptions& b);
 
 }  // namespace helicarm::pipeline
