@@ -6,6 +6,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "helicarm/core/statistics.h"
+
 namespace helicarm::calibration {
 namespace {
 
@@ -62,11 +64,6 @@ std::optional<double> log_likelihood_enlarged(std::vector<ViewProblem> problems,
 
 }  // namespace
 
-double excess_of(double chi2, int dof) {
-  const double width = 2.0 / (9 * dof);
-  return (std::cbrt(chi2 / dof) - 1 + width) / std::sqrt(width);
-}
-
 bool rejects_many(const CleanFit& clean, const std::vector<ViewProblem>& problems) {
   return clean.removed.size() > std::max(problems.size(), count_of(problems) / 10);
 }
@@ -77,7 +74,7 @@ std::optional<OffsetFit> fit_ball_offsets(const std::vector<ViewProblem>& proble
     auto clean =
         refine_without_outliers(with_tolerance(problems, tolerance), common, probability, least_kept);
     if (!clean || rejects_many(*clean, problems)) continue;
-    if (clean->fit.dof < 1 || excess_of(clean->fit.chi2, clean->fit.dof) > consistent_excess) continue;
+    if (clean->fit.dof < 1 || chi2_excess(clean->fit.chi2, clean->fit.dof) > consistent_excess) continue;
     const auto enlarged = log_likelihood_enlarged(clean->problems, common);
     if (!enlarged || log_likelihood(clean->fit) <= *enlarged) return std::nullopt;
     return OffsetFit{*std::move(clean), tolerance};

@@ -19,9 +19,6 @@ struct OffsetFit {
 std::optional<OffsetFit> fit_ball_offsets(const std::vector<ViewProblem>& problems, const CommonPrior& common,
                                           double probability, std::size_t least_kept);
 
-/// Standard deviations by which chi2 exceeds its degrees of freedom (Wilson and Hilferty 1931).
-double excess_of(double chi2, int dof);
-
 /// More than one fiducial (in all views) and more than a tenth of the observations are rejected.
 bool rejects_many(const CleanFit& clean, const std::vector<ViewProblem>& problems);
 

@@ -12,6 +12,7 @@
 #include "helicarm/calibration/image_residuals.h"
 #include "helicarm/calibration/outliers.h"
 #include "helicarm/calibration/view_problem.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/ray.h"
 
 namespace helicarm::calibration {
@@ -87,7 +88,7 @@ void warn_of_few_fiducials(CalibrationResult& result) {
 }
 
 void inflate_if_inconsistent(CalibrationResult& result) {
-  if (result.dof < 1 || excess_of(result.chi2, result.dof) < inconsistent_sigmas) return;
+  if (result.dof < 1 || chi2_excess(result.chi2, result.dof) < inconsistent_sigmas) return;
   result.variance_scale = result.chi2 / result.dof;
   result.joint_covariance *= result.variance_scale;
   for (CalibratedView& view : result.views) view.covariance *= result.variance_scale;
@@ -126,7 +127,7 @@ Expected<CleanFit> clean_fit(const std::vector<ViewProblem>& problems, const Cal
   if (!clean || !as_in_file || problems.size() < 2 || options.rejection_probability <= 0 ||
       clean->fit.dof < 1)
     return clean;
-  if (excess_of(clean->fit.chi2, clean->fit.dof) < inconsistent_sigmas && !rejects_many(*clean, problems))
+  if (chi2_excess(clean->fit.chi2, clean->fit.dof) < inconsistent_sigmas && !rejects_many(*clean, problems))
     return clean;
   auto offsets = fit_ball_offsets(problems, options.common, options.rejection_probability, least_fiducials);
   if (!offsets) return clean;

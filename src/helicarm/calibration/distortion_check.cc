@@ -9,6 +9,7 @@
 
 #include "helicarm/calibration/ball_offsets.h"
 #include "helicarm/calibration/view_problem.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::calibration {
@@ -84,7 +85,7 @@ std::optional<Warning> check_distortion(const std::vector<ViewFiducials>& views,
     problems.push_back(*std::move(problem));
   }
   const auto fit = refine(problems, common);
-  if (!fit || fit->dof < 1 || excess_of(fit->chi2, fit->dof) < excess_sigmas) return std::nullopt;
+  if (!fit || fit->dof < 1 || chi2_excess(fit->chi2, fit->dof) < excess_sigmas) return std::nullopt;
   const auto modes = double(modes_of_view) * double(views.size());
   const double dof = fit->dof - modes;
   if (dof < least_dof) return std::nullopt;

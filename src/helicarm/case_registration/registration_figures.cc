@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/image/grey_window.h"
 #include "helicarm/image/opencv.h"
 #include "helicarm/image/png.h"
@@ -77,9 +78,7 @@ Image<std::uint8_t> displayed(const Image<float>& integrals) {
   std::ranges::copy_if(integrals.pixels(), std::back_inserter(matter), [](float value) { return value > 0; });
   Image<std::uint8_t> grey(integrals.width(), integrals.height(), 255);
   if (matter.empty()) return grey;
-  const auto strong = matter.begin() + std::ptrdiff_t(dark_quantile * double(matter.size() - 1));
-  std::ranges::nth_element(matter, strong);
-  const double rate = std::log(dark_share) / double(*strong);
+  const double rate = std::log(dark_share) / double(quantile(matter, dark_quantile));
   std::ranges::transform(integrals.pixels(), grey.pixels().begin(), [&](float value) {
     return static_cast<std::uint8_t>(std::lround(255 * std::exp(rate * std::max(0.0, double(value)))));
   });

@@ -8,6 +8,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/image/opencv.h"
 
 namespace helicarm::detection {
@@ -25,12 +26,9 @@ float threshold(const cv::Mat& view_image, double sigmas) {
     for (int u = 3; u < view_image.cols; u += 5)
       if (const float x = std::abs(view_image.at<float>(v, u)); x > 0) values.push_back(x);
   if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  const auto strong = values.begin() + static_cast<std::ptrdiff_t>(values.size() - 1 - values.size() / 1000);
-  std::nth_element(values.begin(), middle, values.end());
-  const float typical = 1.4826f * *middle;
-  std::nth_element(values.begin(), strong, values.end());
-  return std::min(float(sigmas) * typical, 0.25f * *strong);
+  const float typical = 1.4826f * value_of_rank(values, values.size() / 2);
+  const float strong = value_of_rank(values, values.size() - 1 - values.size() / 1000);
+  return std::min(float(sigmas) * typical, 0.25f * strong);
 }
 
 /// In space and scale; of equal values the first counts.

@@ -9,6 +9,7 @@
 
 #include <Eigen/Dense>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/detection/robust.h"
 
@@ -59,8 +60,7 @@ std::optional<Arms> arms_at(const image::Image<float>& image, const Vector2d& pl
     dark[static_cast<std::size_t>(k)] = -brightest;
   }
   auto sorted = dark;
-  std::nth_element(sorted.begin(), sorted.begin() + ring_steps / 3, sorted.end());
-  const double background = sorted[ring_steps / 3];
+  const double background = value_of_rank(sorted, ring_steps / 3);
   const auto strongest_outside = [&](int forbidden, int gap) {
     int best = -1;
     for (int k = 0; k < ring_steps; ++k) {

@@ -8,6 +8,7 @@
 
 #include <Eigen/QR>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/detection/robust.h"
 
 namespace helicarm::detection {
@@ -103,12 +104,6 @@ std::optional<Lags> lags_of_block(const xray::XrayImage& xray_image, int u, int 
   block.array() *= open.array();
   const Lags lags = lags_of(block, open);
   return lags.along[0] > 0 ? std::optional(lags) : std::nullopt;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "helicarm/core/statistics.h"
+
 namespace helicarm::detection {
 
 /// Residual at which Tukey's weight becomes 0: 4.7 robust standard deviations (95 % efficient for normal
@@ -17,9 +19,7 @@ Real tukey_cut(std::span<const Real> residuals, Real least) {
   const std::size_t stride = 1 + residuals.size() / enough;
   sizes.reserve(residuals.size() / stride + 1);
   for (std::size_t i = 0; i < residuals.size(); i += stride) sizes.push_back(std::abs(residuals[i]));
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return Real(4.7) * std::max(Real(1.4826) * *middle, least);
+  return Real(4.7) * std::max(Real(1.4826) * median(std::move(sizes)), least);
 }
 
 /// Tukey's biweight.

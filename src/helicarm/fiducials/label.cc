@@ -85,12 +85,6 @@ bool contradicts(const Hypothesis& rival, const Hypothesis& h) {
   return rival.mirrored() != h.mirrored() || count_labelled(agreed) < count_labelled(h);
 }
 
-/// Chi-square over its degrees of freedom as a standard normal deviate (Wilson and Hilferty 1931).
-double deviate(double chi2, int dof) {
-  const double spread = 2.0 / (9 * dof);
-  return (std::cbrt(chi2 / dof) - (1 - spread)) / std::sqrt(spread);
-}
-
 /// The best hypothesis with enlarged errors. It exceeds the best one if the file describes a similar but
 /// different calibrator, of which a few fiducials fit by chance.
 Hypothesis loose_best(const LabelSearch& search, const LabellingOptions& options) {
@@ -123,12 +117,12 @@ double variance_allowance(const Scene& scene) { return scene.balls.front().sigma
 /// Whether chi-square exceeds its limit, also without the worst fiducial, which may be an outlier.
 bool is_inconsistent(const Scene& scene, const Hypothesis& h) {
   const double allowance = variance_allowance(scene);
-  if (deviate(h.fit.chi2 / allowance, 2 * h.matched - 6) < chi2_sigmas) return false;
+  if (chi2_excess(h.fit.chi2 / allowance, 2 * h.matched - 6) < chi2_sigmas) return false;
   Hypothesis kept = h;
   if (const auto off = outlying(scene, h); !off.empty()) kept = without(scene, h, off.front());
   const int labelled = count_labelled(kept);
   return labelled < std::max(least_balls, h.matched - 1) ||
-         deviate(kept.fit.chi2 / allowance, 2 * labelled - 6) > chi2_sigmas;
+         chi2_excess(kept.fit.chi2 / allowance, 2 * labelled - 6) > chi2_sigmas;
 }
 
 /// The reason to refuse the best hypothesis, if any.

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/label.h"
@@ -116,12 +117,6 @@ class BallFitter {
   }
 
  private:
-  static double median(std::vector<double> values) {
-    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  }
-
   /// Mean grey value of the pixels at distances from `least` to `most` of a point.
   double mean_between(const Vector2d& middle, double least, double most) const {
     const auto& pixels = image_.pixels;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "helicarm/core/statistics.h"
+
 namespace helicarm::image {
 
 GreyWindow usual_window(const Image<float>& grey_image, float lowest) {
@@ -16,13 +18,8 @@ GreyWindow usual_window(const Image<float>& grey_image, float lowest) {
     for (int u = 0; u < grey_image.width(); u += step)
       if (const float value = grey_image(u, v); value > lowest) values.push_back(value);
   if (values.empty()) return {lowest, lowest + 1};
-  const auto at_share = [&](double share) {
-    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * double(values.size() - 1));
-    std::nth_element(values.begin(), nth, values.end());
-    return *nth;
-  };
-  const float low = at_share(0.005);
-  return {low, at_share(0.995)};
+  const float low = quantile(values, 0.005);
+  return {low, quantile(values, 0.995)};
 }
 
 Image<std::uint8_t> eight_bit(const Image<float>& grey_image, GreyWindow window) {

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/centred_view.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/ray.h"
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/localization/error_bound.h"
@@ -91,11 +92,11 @@ Expected<Eigen::Vector3d> published_point(std::span<const geometry::RayObservati
 }
 
 /// Chi-square over its degrees of freedom that errors as assumed exceed with the probability of three
-/// standard deviations, 0.0027: 9 for two views (Wilson and Hilferty 1931).
+/// standard deviations, 0.0027: 9 for two views.
 double largest_excess(std::size_t views) {
   constexpr double of_two_views = 9, normal_deviate = 2.782;
-  const double spread = 2.0 / (9.0 * double(2 * views - 3));
-  return views == 2 ? of_two_views : std::pow(1 - spread + normal_deviate * std::sqrt(spread), 3);
+  const auto dof = double(2 * views - 3);
+  return views == 2 ? of_two_views : chi2_quantile(dof, normal_deviate) / dof;
 }
 
 void inflate_if_rays_miss(LocatedPoint& located) {

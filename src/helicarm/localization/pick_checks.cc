@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
+
 namespace helicarm::localization {
 namespace {
 
@@ -49,12 +51,10 @@ void inflate_if_views_contradict(std::span<Expected<LocatedPoint>> points) {
     missing += point->missing_rays ? 1 : 0;
   }
   if (2 * missing <= excesses.size()) return;
-  const auto middle = excesses.begin() + std::ptrdiff_t((excesses.size() - 1) / 2);
-  std::ranges::nth_element(excesses, middle);
-  const double median = *middle;
+  const double typical = quantile(excesses, 0.5);
   for (Expected<LocatedPoint>& point : points) {
     if (!point) continue;
-    const double factor = median / (point->missing_rays ? excess_of(*point) : 1);
+    const double factor = typical / (point->missing_rays ? excess_of(*point) : 1);
     if (factor > 1) {
       point->covariance_in_anchor *= factor;
       point->by_calibration *= std::sqrt(factor);
@@ -67,7 +67,7 @@ void inflate_if_views_contradict(std::span<Expected<LocatedPoint>> points) {
             "views "
             "contradict each other, or the picks are wrong, and the errors of all points are enlarged {:.3g} "
             "times; check the calibration, the picks and --raw",
-            point->name, missing, excesses.size(), std::sqrt(median)),
+            point->name, missing, excesses.size(), std::sqrt(typical)),
         {},
         {{"ray_gap_mm", point->ray_gap_mm}, {"chi2", point->chi2}, {"missing", double(missing)}}};
   }

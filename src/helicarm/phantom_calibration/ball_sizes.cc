@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/phantom_calibration/correspondence.h"
 #include "helicarm/phantom_calibration/diameter_scale.h"
 
@@ -22,8 +23,7 @@ constexpr double same_scale = 0.03;      // alternatives within it are one
 
 double median_log(std::vector<double> values) {
   for (double& value : values) value = std::log(value);
-  std::ranges::nth_element(values, values.begin() + std::ptrdiff_t(values.size() / 2));
-  return values[values.size() / 2];
+  return median(std::move(values));
 }
 
 /// With the unit adjusted to the assigned sizes, and the chi-square of the sizes.

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/phantom_calibration/bundle.h"
 
@@ -176,8 +177,7 @@ void drop_contradicting_views(Reconstruction& r, const std::vector<PhantomView>&
       r.views[v].reset();
       continue;
     }
-    std::ranges::nth_element(errors, errors.begin() + std::ptrdiff_t(errors.size() / 2));
-    if (errors[errors.size() / 2] > limit_scale(views[v]) * largest_median_px) r.views[v].reset();
+    if (median(std::move(errors)) > limit_scale(views[v]) * largest_median_px) r.views[v].reset();
   }
 }
 

@@ -3,17 +3,11 @@
 
 #include <algorithm>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/pipeline/diagnosis/calibrator_checks.h"
 
 namespace helicarm::phantom_calibration {
-namespace {
-
-double middle_value(std::vector<double> values) {
-  std::ranges::nth_element(values, values.begin() + std::ptrdiff_t(values.size() / 2));
-  return values[values.size() / 2];
-}
-
-}  // namespace
+namespace {}  // namespace
 
 DiameterScale diameter_scale(const AdjustedViews& found) {
   std::vector<double> factors, sigmas;
@@ -23,7 +17,7 @@ DiameterScale diameter_scale(const AdjustedViews& found) {
         factors.push_back(found.diameters_mm[i] / view[i]->diameter_mm);
         sigmas.push_back(view[i]->diameter_sigma);
       }
-  return {middle_value(std::move(factors)), middle_value(std::move(sigmas))};
+  return {median(std::move(factors)), median(std::move(sigmas))};
 }
 
 std::vector<std::optional<double>> seen_diameters(const AdjustedViews& found) {
@@ -32,7 +26,7 @@ std::vector<std::optional<double>> seen_diameters(const AdjustedViews& found) {
     std::vector<double> of_views;
     for (const auto& view : found.observed)
       if (view[i]) of_views.push_back(view[i]->diameter_mm);
-    seen.push_back(of_views.empty() ? std::nullopt : std::optional(middle_value(std::move(of_views))));
+    seen.push_back(of_views.empty() ? std::nullopt : std::optional(median(std::move(of_views))));
   }
   return seen;
 }
@@ -55,7 +49,7 @@ DepthLimits depth_limits(const AdjustedViews& found, const std::vector<pipeline:
       sigmas.push_back(pipeline::patient_distance_sigma_mm / *stated.source_patient_mm);
     }
   }
-  if (!factors.empty()) limits.by_tag = {middle_value(std::move(factors)), middle_value(std::move(sigmas))};
+  if (!factors.empty()) limits.by_tag = {median(std::move(factors)), median(std::move(sigmas))};
   return limits;
 }
 

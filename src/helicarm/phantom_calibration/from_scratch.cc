@@ -11,6 +11,7 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/phantom_calibration/correspondence.h"
 #include "helicarm/phantom_calibration/pair_match.h"
@@ -221,9 +222,7 @@ Expected<Reconstruction> start_of(const std::vector<PhantomView>& given, const s
     magnifications.push_back(2 * given[t.views[0]].candidates[first].radius_px / diameter);
     for (std::size_t v = 0; v < 3; ++v) r.candidate_of[t.views[v]][i] = t.tracks[i][v];
   }
-  std::ranges::nth_element(magnifications,
-                           magnifications.begin() + std::ptrdiff_t(magnifications.size() / 2));
-  const double magnification = magnifications[magnifications.size() / 2];
+  const double magnification = median(std::move(magnifications));
   for (Eigen::Index i = 0; i < points.cols(); ++i) r.centres.push_back(points.col(i) / magnification);
   for (std::size_t v = 0; v < 3; ++v) {
     const PlainView& view = views[t.views[v]];

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 
@@ -11,11 +12,6 @@ namespace helicarm::phantom_calibration {
 namespace {
 
 using Eigen::Vector3d;
-
-double median(std::vector<double> values) {
-  std::ranges::nth_element(values, values.begin() + std::ptrdiff_t(values.size() / 2));
-  return values[values.size() / 2];
-}
 
 Vector3d weighted_mean(std::span<const Vector3d> points, const Eigen::VectorXd& weights) {
   Vector3d sum = Vector3d::Zero();

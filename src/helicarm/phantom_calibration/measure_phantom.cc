@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/ray.h"
 #include "helicarm/phantom/ball_covariance.h"
@@ -28,12 +29,6 @@ using Eigen::Vector3d;
 constexpr double least_angle_deg = 15;
 constexpr double least_move_mm = 0.4;
 constexpr double chi2_contradiction = 3;  // standard deviations of chi2 beyond which the sigmas are enlarged
-
-/// Standard deviations by which chi2 exceeds its degrees of freedom (Wilson and Hilferty 1931).
-double excess_of(double chi2, int dof) {
-  const double width = 2.0 / (9 * dof);
-  return (std::cbrt(chi2 / dof) - 1 + width) / std::sqrt(width);
-}
 
 Expected<void> check_apart(const AdjustedViews& found) {
   Vector3d middle = Vector3d::Zero();
@@ -71,7 +66,7 @@ Expected<void> check_unmoved(const AdjustedViews& found) {
 
 /// Covariance inflation, as the calibration of views does it.
 double variance_scale_of(const BundleFit& fit, PhantomResult& result) {
-  if (fit.dof < 1 || excess_of(fit.chi2, fit.dof) < chi2_contradiction) return 1;
+  if (fit.dof < 1 || chi2_excess(fit.chi2, fit.dof) < chi2_contradiction) return 1;
   const double scale = fit.chi2 / fit.dof;
   result.warnings.push_back(
       {Reason::residual_too_large,
@@ -126,8 +121,7 @@ Expected<void> check_not_mirrored(const std::vector<Vector3d>& centres, std::vec
     std::vector<double> off;
     for (std::size_t i = 0; i < places.size(); ++i)
       off.push_back((fit.a_from_b * centres[i] - places[i]).norm());
-    std::ranges::nth_element(off, off.begin() + std::ptrdiff_t(off.size() / 2));
-    return off[off.size() / 2];
+    return median(std::move(off));
   };
   const double as_is = off_by();
   for (Vector3d& place : places) place.x() = -place.x();

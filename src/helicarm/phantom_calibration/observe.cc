@@ -5,6 +5,7 @@
 #include <cmath>
 #include <ranges>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/label_fiducials.h"
@@ -42,8 +43,7 @@ phantom::Calibrator balls_of(const std::vector<double>& diameters_mm) {
 double median_contrast(const std::vector<detection::Dot>& dots) {
   std::vector<double> contrasts;
   for (const detection::Dot& dot : dots) contrasts.push_back(dot.contrast);
-  std::ranges::nth_element(contrasts, contrasts.begin() + std::ptrdiff_t(contrasts.size() / 2));
-  return contrasts[contrasts.size() / 2];
+  return median(std::move(contrasts));
 }
 
 /// Whether the image of another fiducial touches that of this one: each would disturb the other's place.

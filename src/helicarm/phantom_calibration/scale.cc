@@ -6,19 +6,13 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/phantom_calibration/gauge.h"
 
 namespace helicarm::phantom_calibration {
 namespace {
 
 using Eigen::Vector3d;
-
-/// 99.9th percentile of chi-square (Wilson and Hilferty 1931).
-double chi2_limit(int dof) {
-  constexpr double deviate = 3.09;
-  const double spread = 2.0 / (9 * dof);
-  return dof * std::pow(1 - spread + deviate * std::sqrt(spread), 3);
-}
 
 /// d distance / d points.
 Eigen::MatrixXd by_points(const std::vector<Vector3d>& centres,
@@ -74,7 +68,8 @@ Expected<ScaledPoints> scaled_by(const std::vector<Vector3d>& centres, const Eig
   factor = reckoned.dot(weight.solve(measured)) / reckoned.dot(weight.solve(reckoned));
   const Eigen::VectorXd residual = measured - factor * reckoned;
   const double chi2 = residual.dot(weight.solve(residual));
-  if (count > 1 && chi2 > chi2_limit(int(count) - 1)) {
+  const double limit = count > 1 ? chi2_quantile(double(count) - 1, normal_at_999) : 0;
+  if (count > 1 && chi2 > limit) {
     Eigen::Index worst = 0;
     (residual.array() / covariance.diagonal().array().sqrt()).abs().maxCoeff(&worst);
     const CentreDistance& d = distances[std::size_t(worst)];
@@ -83,7 +78,7 @@ Expected<ScaledPoints> scaled_by(const std::vector<Vector3d>& centres, const Eig
         fmt::format("the distances are inconsistent: {} to {} is {:.3f} mm as measured by hand, {:.3f} mm as "
                     "computed from the images and the other distances; measure them again",
                     labels[d.a], labels[d.b], d.mm, factor * reckoned[worst]),
-        {{"chi2", chi2}, {"limit", chi2_limit(int(count) - 1)}, {"difference_mm", residual[worst]}});
+        {{"chi2", chi2}, {"limit", limit}, {"difference_mm", residual[worst]}});
   }
   // The scale is not known beforehand: 100 % of a prior error change nothing.
   ScaledPoints scaled = scaled_by(centres, covariance_mm2, factor, 1);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
 #include "helicarm/phantom_calibration/diameter_scale.h"
@@ -22,13 +23,12 @@ constexpr std::size_t least_views = 2;
 constexpr std::size_t least_kept = 6;
 
 /// The percentile of chi-square with 3 degrees of freedom that one of `count` unmoved balls exceeds with a
-/// probability of 5 % (Wilson and Hilferty 1931; the normal quantile by Abramowitz and Stegun 26.2.23).
+/// probability of 5 % (the normal quantile by Abramowitz and Stegun 26.2.23).
 double chi2_limit(std::size_t count) {
   const double t = std::sqrt(-2 * std::log(0.05 / double(count)));
   const double deviate =
       t - (2.515517 + t * (0.802853 + t * 0.010328)) / (1 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
-  constexpr double spread = 2.0 / 27;
-  return 3 * std::pow(1 - spread + deviate * std::sqrt(spread), 3);
+  return chi2_quantile(3, deviate);
 }
 
 /// The balls at their places in the file, whose own errors are added to their images'.

@@ -8,6 +8,7 @@
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/rectification/models/monomials.h"
 #include "helicarm/rectification/models/polynomial.h"
 
@@ -31,11 +32,6 @@ Normalisation normalisation_of(const std::vector<Vector2d>& places) {
     high = high.cwiseMax(p);
   }
   return {0.5 * (low + high), 0.5 * (high - low).maxCoeff()};
-}
-
-double median(VectorXd values) {
-  std::nth_element(values.data(), values.data() + values.size() / 2, values.data() + values.size());
-  return values[values.size() / 2];
 }
 
 PlateDots gather(const std::vector<Correspondence>& dots, const std::vector<Vector2d>& places,
@@ -97,8 +93,7 @@ void reject_outliers(const std::vector<Correspondence>& dots, const std::vector<
         std::vector<double> beside;
         for (const std::size_t j : neighbours[i])
           if (used[j]) beside.push_back(residuals[j][axis]);
-        if (beside.size() > 2)
-          shared[axis] = median(Eigen::Map<VectorXd>(beside.data(), Index(beside.size())));
+        if (beside.size() > 2) shared[axis] = median(beside);
       }
       contradiction[static_cast<Index>(row++)] =
           std::min((residuals[i] - shared).norm(), residuals[i].norm());

@@ -7,6 +7,8 @@
 
 #include <Eigen/Dense>
 
+#include "helicarm/core/statistics.h"
+
 namespace helicarm::rectification {
 namespace {
 
@@ -24,9 +26,7 @@ float median_of(const image::Image<float>& image, int left, int top, int width, 
   std::vector<float> values;
   for (int v = top; v < top + height; ++v)
     values.insert(values.end(), image.row(v) + left, image.row(v) + left + width);
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return median(std::move(values));
 }
 
 /// Grey value between the dark corners and the field; nothing if fewer than three corners are dark.

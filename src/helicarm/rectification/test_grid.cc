@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/detection/find_crosses.h"
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/rectification/lattice.h"
@@ -105,9 +106,9 @@ struct Likeness {
       misfits.push_back(cross.misfit);
     }
     if (crosses.empty()) return;
-    radius_px = middle_of(radii);
-    sigma_px = middle_of(sigmas);
-    misfit = middle_of(misfits);
+    radius_px = median(radii);
+    sigma_px = median(sigmas);
+    misfit = median(misfits);
   }
   bool fits(const detection::Dot& cross) const {
     return cross.radius_px > 0.6 * radius_px && cross.radius_px < 1.7 * radius_px &&
@@ -116,11 +117,6 @@ struct Likeness {
   bool holds(const detection::Dot& cross) const { return fits(cross) && cross.sigma_px < 4 * sigma_px; }
 
  private:
-  static double middle_of(std::vector<double> values) {
-    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  }
 };
 
 /// Plate dots that cover crossings: those found, and those that a wire hides from the search, between or

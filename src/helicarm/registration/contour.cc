@@ -8,6 +8,7 @@
 
 #include <Eigen/LU>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/triangulation.h"
 
 namespace helicarm::registration {
@@ -141,9 +142,7 @@ double common_offset(const std::vector<VisiblePoint>& points, const ContourOptio
   for (const VisiblePoint& point : points)
     if (point.residual) residuals.push_back(*point.residual);
   if (residuals.empty()) return 0;
-  const auto middle = residuals.begin() + std::ptrdiff_t(residuals.size() / 2);
-  std::ranges::nth_element(residuals, middle);
-  double offset = *middle;
+  double offset = median(residuals);
   constexpr int means = 10;
   for (int i = 0; i < means; ++i) {
     double sum = 0, weights = 0;

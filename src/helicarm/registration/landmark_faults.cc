@@ -9,6 +9,7 @@
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::registration {
@@ -150,13 +151,6 @@ double chi2_of(const std::vector<Landmark>& landmarks, const LandmarkRegistratio
   return sum;
 }
 
-/// 99.9 % quantile of chi-square (Wilson and Hilferty 1931).
-double chi2_999(double dof) {
-  constexpr double normal_quantile = 3.0902;
-  const double spread = 2 / (9 * dof);
-  return dof * std::pow(1 - spread + normal_quantile * std::sqrt(spread), 3);
-}
-
 /// The middle, and the normal of the plane that fits the landmarks of the model best.
 std::pair<Vector3d, Vector3d> plane_of(const std::vector<Vector3d>& points) {
   const Vector3d middle = mean_of(points);
@@ -170,7 +164,7 @@ std::pair<Vector3d, Vector3d> plane_of(const std::vector<Vector3d>& points) {
 std::optional<LandmarkFault> landmark_fault(const std::vector<Landmark>& landmarks,
                                             const LandmarkRegistration& found) {
   const double dof = 3 * double(landmarks.size()) - 6;
-  const double limit = chi2_999(dof);
+  const double limit = chi2_quantile(dof, normal_at_999);
   if (chi2_of(landmarks, found, least_sigma_mm) <= limit) return std::nullopt;
   const auto largest = std::ranges::max_element(found.residuals_mm) - found.residuals_mm.begin();
   const std::string& name = landmarks[std::size_t(largest)].name;

@@ -6,6 +6,7 @@
 
 #include <Eigen/LU>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/registration/contour.h"
 
 namespace helicarm::registration {
@@ -28,11 +29,10 @@ std::vector<Vector2d> ridges(const image::Image<float>& drr, const Vector2d& low
       if ((slope(u, v) = along(u, v).norm()) > 0) all.push_back(slope(u, v));
   std::vector<Vector2d> points;
   if (all.empty()) return points;
-  const auto strong = all.begin() + std::ptrdiff_t(all.size() * 19 / 20);
-  std::ranges::nth_element(all, strong);
+  const auto strong = value_of_rank(all, all.size() * 19 / 20);
   for (int v = 2; v + 2 < drr.height(); ++v)
     for (int u = 2; u + 2 < drr.width(); ++u) {
-      if (slope(u, v) < least_edge * *strong) continue;
+      if (slope(u, v) < least_edge * strong) continue;
       const Eigen::Vector2f across = along(u, v);
       const bool flat = std::abs(across.x()) > std::abs(across.y());
       const float before = flat ? slope(u - 1, v) : slope(u, v - 1);

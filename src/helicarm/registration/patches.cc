@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/core/statistics.h"
 
 namespace helicarm::registration {
 namespace {
@@ -266,9 +267,8 @@ ViewObservation compare_patches(const Raster& raster, const geometry::View& view
     if (patch.contrast > 0) contrasts.push_back(patch.contrast);
   ViewObservation observation;
   if (contrasts.empty()) return observation;
-  const auto strong = contrasts.begin() + std::ptrdiff_t(contrasts.size() * 9 / 10);
-  std::ranges::nth_element(contrasts, strong);
-  const auto limit = static_cast<float>(options.least_contrast) * *strong;
+  const auto limit =
+      static_cast<float>(options.least_contrast) * value_of_rank(contrasts, contrasts.size() * 9 / 10);
   double total = 0;
   for (const Patch& patch : patches)
     total += patch.contrast * (patch.share + hidden_weight * (1 - patch.share));

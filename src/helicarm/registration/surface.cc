@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/registration/surface_file.h"
 #include "helicarm/registration/vtp.h"
 #include "helicarm/registration/weld.h"
@@ -77,9 +78,7 @@ Vector3d middle_corner(const TriangleMesh& mesh) {
     std::vector<double> values;
     for (std::size_t i = 0; i < mesh.triangles.size(); i += stride)
       for (const std::uint32_t corner : mesh.triangles[i]) values.push_back(mesh.corners[corner][axis]);
-    const auto half = values.begin() + std::ptrdiff_t(values.size() / 2);
-    std::ranges::nth_element(values, half);
-    middle[axis] = *half;
+    middle[axis] = median(std::move(values));
   }
   return middle;
 }

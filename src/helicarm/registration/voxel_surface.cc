@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "helicarm/core/statistics.h"
+
 namespace helicarm::registration {
 namespace {
 
@@ -50,13 +52,8 @@ double voxel_size_mm(const Surface& surface) {
   std::vector<double> lengths;
   for (const Surface::Edge& edge : surface.edges)
     lengths.push_back((surface.mesh.corners[edge.corners[0]] - surface.mesh.corners[edge.corners[1]]).norm());
-  const auto quantile = [&](double share) {
-    const auto at = lengths.begin() + std::ptrdiff_t(share * double(lengths.size() - 1));
-    std::ranges::nth_element(lengths, at);
-    return *at;
-  };
-  const double longest = quantile(0.95);
-  return longest <= most_unequal * quantile(0.5) ? std::min(longest, largest_voxel_mm) : 0;
+  const double longest = quantile(lengths, 0.95);
+  return longest <= most_unequal * quantile(lengths, 0.5) ? std::min(longest, largest_voxel_mm) : 0;
 }
 
 void smooth_steps(Surface& surface, double most_mm) {

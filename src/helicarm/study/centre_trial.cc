@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "helicarm/core/random.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/label_fiducials.h"
@@ -49,9 +50,8 @@ void clip(xray::XrayImage& xray_image, const BallScene& scene, double share) {
       const double distance = (Vector2d(u, v) - middle).norm();
       if (distance > radius + 2 && distance < 2 * radius) background.push_back(grey);
     });
-    const auto at = background.begin() + std::ptrdiff_t((1 - share) * double(background.size()));
-    std::nth_element(background.begin(), at, background.end());
-    const float gain = xray_image.highest / *at;
+    const float gain =
+        xray_image.highest / value_of_rank(background, std::size_t((1 - share) * double(background.size())));
     each_pixel([&](int, int, float& grey) { grey = std::min(xray_image.highest, std::round(gain * grey)); });
   }
 }

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "helicarm/core/statistics.h"
+
 namespace helicarm::xray {
 namespace {
 
@@ -42,10 +44,9 @@ std::optional<bool> metal_looks_bright(const image::Image<float>& image) {
       if (value < low) below.push_back(low - value);
     }
   if (noise.empty()) return std::nullopt;
-  const auto middle = noise.begin() + static_cast<std::ptrdiff_t>(noise.size() / 2);
-  std::nth_element(noise.begin(), middle, noise.end());
+  const float typical = median(std::move(noise));
   const auto stand_out = [&](const std::vector<float>& excess) {
-    return static_cast<std::size_t>(std::ranges::count_if(excess, [&](float e) { return e > 2 * *middle; }));
+    return static_cast<std::size_t>(std::ranges::count_if(excess, [&](float e) { return e > 2 * typical; }));
   };
   const std::size_t bright = stand_out(above), dark = stand_out(below);
   if (std::max(bright, dark) < enough) return std::nullopt;

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
@@ -22,19 +23,13 @@ constexpr int samples_for_full_scatter = 25;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 /// The sample pose with the smallest sum of distances to the others: a start robust to outliers.
 geometry::RigidTransform median_pose(const std::vector<geometry::RigidTransform>& poses) {
-  geometry::RigidTransform median;
+  geometry::RigidTransform middle;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const geometry::RigidTransform& pose : poses) values.push_back(pose.translation[axis]);
-    median.translation[axis] = median_of(std::move(values));
+    middle.translation[axis] = median(std::move(values));
   }
   double least = std::numeric_limits<double>::infinity();
   for (const geometry::RigidTransform& pose : poses) {
@@ -42,10 +37,10 @@ geometry::RigidTransform median_pose(const std::vector<geometry::RigidTransform>
     for (const geometry::RigidTransform& other : poses) sum += (pose.rotation - other.rotation).norm();
     if (sum < least) {
       least = sum;
-      median.rotation = pose.rotation;
+      middle.rotation = pose.rotation;
     }
   }
-  return median;
+  return middle;
 }
 
 /// Position and rotation vector of a pose relative to another.
@@ -57,17 +52,17 @@ Vector6 deviation(const geometry::RigidTransform& pose, const geometry::RigidTra
 }
 
 std::vector<Vector6> near_ones(const std::vector<geometry::RigidTransform>& poses,
-                               const geometry::RigidTransform& median) {
+                               const geometry::RigidTransform& middle) {
   std::vector<Vector6> deviations;
   std::vector<double> lengths, angles;
   for (const geometry::RigidTransform& pose : poses) {
-    deviations.push_back(deviation(pose, median));
+    deviations.push_back(deviation(pose, middle));
     lengths.push_back(deviations.back().head<3>().norm());
     angles.push_back(deviations.back().tail<3>().norm());
   }
   // Rounding to 32 bits must not make outliers of otherwise equal poses.
-  const double longest = outlier_medians * median_of(lengths) + 1e-3;
-  const double widest = outlier_medians * median_of(angles) + 1e-5;
+  const double longest = outlier_medians * median(lengths) + 1e-3;
+  const double widest = outlier_medians * median(angles) + 1e-5;
   std::erase_if(deviations, [&](const Vector6& d) {
     return d.head<3>().norm() > longest || d.tail<3>().norm() > widest;
   });
@@ -113,8 +108,8 @@ Expected<ExposurePose> exposure_pose(std::span<const PoseSample> samples, double
                             options.min_samples),
                 figures);
 
-  const geometry::RigidTransform median = median_pose(poses);
-  const std::vector<Vector6> kept = near_ones(poses, median);
+  const geometry::RigidTransform middle = median_pose(poses);
+  const std::vector<Vector6> kept = near_ones(poses, middle);
   const double count = static_cast<double>(kept.size());
   Vector6 mean = Vector6::Zero();
   for (const Vector6& d : kept) mean += d / count;
@@ -139,8 +134,8 @@ Expected<ExposurePose> exposure_pose(std::span<const PoseSample> samples, double
         {{"spread_mm", result.spread_mm},
          {"spread_deg", result.spread_deg},
          {"outliers", static_cast<double>(result.outliers)}});
-  result.tracker_from_tool = {geometry::rotation_from_vector(mean.tail<3>()) * median.rotation,
-                              median.translation + mean.head<3>()};
+  result.tracker_from_tool = {geometry::rotation_from_vector(mean.tail<3>()) * middle.rotation,
+                              middle.translation + mean.head<3>()};
   result.covariance = scatter_of(kept, mean) / count;
   return result;
 }

@@ -8,7 +8,7 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
-#include "helicarm/devices/tracker/consistency.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/least_squares.h"
 #include "helicarm/geometry/pose_step.h"
 
@@ -69,7 +69,8 @@ FusedPose fuse(const std::vector<SeenFacet>& seen) {
 }
 
 bool agrees(const FusedPose& fused) {
-  return fused.used.size() < 2 || fused.chi2 <= chi2_limit(6 * static_cast<double>(fused.used.size() - 1));
+  return fused.used.size() < 2 ||
+         fused.chi2 <= chi2_quantile(6 * static_cast<double>(fused.used.size() - 1), normal_at_999);
 }
 
 /// The best fusion without one of the facets.
@@ -99,7 +100,8 @@ Expected<FusedPose> fuse_facets(std::span<const Facet> facets, std::span<const F
     throw BadInput(
         {Reason::residual_too_large,
          fmt::format("poses of {} facets of the calibrator are inconsistent: chi2 {:.4g}, limit {:.4g}",
-                     seen.size(), all.chi2, chi2_limit(6 * static_cast<double>(seen.size() - 1))),
+                     seen.size(), all.chi2,
+                     chi2_quantile(6 * static_cast<double>(seen.size() - 1), normal_at_999)),
          {},
          {{"chi2", all.chi2}, {"facets", static_cast<double>(seen.size())}}});
   });

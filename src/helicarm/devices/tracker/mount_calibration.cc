@@ -10,7 +10,7 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
-#include "helicarm/devices/tracker/consistency.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/least_squares.h"
 #include "helicarm/geometry/pose_step.h"
@@ -233,7 +233,7 @@ Observations without(Observations observations, const std::string& label) {
 bool is_consistent(double chi2, const Places& places, const Observations& observations,
                    const MountOptions& options) {
   const int dof = equations_of(places, observations) - unknowns_of(observations, options);
-  return dof > 0 && chi2 <= chi2_limit(dof);
+  return dof > 0 && chi2 <= chi2_quantile(dof, normal_at_999);
 }
 
 /// Pairs of places whose exchange leaves consistent residuals.
@@ -331,7 +331,7 @@ Expected<MountCalibration> calibrate_mount(const Places& places, std::span<const
           {Reason::residual_too_large,
            fmt::format("the touched places deviate from the calibrator by {:.2f} mm rms (chi2 {:.4g}, "
                        "limit {:.4g}): {}",
-                       mount.fre_mm, mount.chi2, chi2_limit(mount.dof),
+                       mount.fre_mm, mount.chi2, chi2_quantile(mount.dof, normal_at_999),
                        likely_cause(places, observations, options)),
            {},
            {{"fre_mm", mount.fre_mm}, {"chi2", mount.chi2}}});

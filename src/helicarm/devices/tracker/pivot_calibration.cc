@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 
@@ -70,9 +71,7 @@ std::vector<geometry::RigidTransform> without_outliers(const std::vector<geometr
                                                        const PivotFit& fit) {
   std::vector<double> misses;
   for (const geometry::RigidTransform& pose : poses) misses.push_back(miss(pose, fit).norm());
-  std::vector<double> sorted = misses;
-  std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
-  const double limit = pivot_outlier_medians * sorted[sorted.size() / 2] + 1e-6;
+  const double limit = pivot_outlier_medians * median(misses) + 1e-6;
   std::vector<geometry::RigidTransform> kept;
   for (std::size_t i = 0; i < poses.size(); ++i)
     if (misses[i] <= limit) kept.push_back(poses[i]);

@@ -8,6 +8,7 @@
 
 #include "helicarm/calibration/distortion_check.h"
 #include "helicarm/calibration/intrinsics_check.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/rectification/round_field.h"
 
 namespace helicarm::pipeline {
@@ -54,11 +55,10 @@ std::optional<Fit> fit_of(const std::vector<calibration::ViewFiducials>& views,
   return fit ? std::optional(Fit{fit->chi2, fit->dof}) : std::nullopt;
 }
 
-/// Whether chi2 exceeds its degrees of freedom by three standard deviations (Wilson and Hilferty 1931).
+/// Whether chi2 exceeds its degrees of freedom by three standard deviations.
 bool is_excessive(double chi2, int dof) {
   constexpr double most = 3;
-  const double width = 2.0 / (9 * dof);
-  return dof < 1 || (std::cbrt(chi2 / dof) - 1 + width) / std::sqrt(width) > most;
+  return dof < 1 || chi2_excess(chi2, dof) > most;
 }
 
 /// The amount of least chi2, by iterated parabolic interpolation.
