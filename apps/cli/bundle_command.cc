@@ -1,14 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bundle_command.h"
+#include <filesystem>
+#include <optional>
 
 #include <fmt/format.h>
 
+#include "command_line.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/private_files.h"
 #include "helicarm/pipeline/case_bundle.h"
+#include "helicarm/pipeline/result.h"
+#include "helicarm/pipeline/run_fields.h"
 
 namespace helicarm::cli {
+
+struct BundleArguments {
+  std::filesystem::path folder;                 ///< holds case.json
+  std::optional<std::filesystem::path> result;  ///< folder of an earlier run
+  std::filesystem::path out = "helicarm-bundle.tar.gz";
+  bool no_run = false;                ///< without measuring the bundled case
+  pipeline::RunOptions options = {};  ///< of the measurement
+};
+
 namespace {
 
 void print(const pipeline::CaseBundle& bundle, const std::filesystem::path& out, Console& console) {
@@ -32,6 +45,7 @@ void print(const pipeline::CaseBundle& bundle, const std::filesystem::path& out,
 
 }  // namespace
 
+/// Packs a de-identified case, its result and a log into one file for a bug report.
 CommandResult bundle_command(const BundleArguments& arguments, Console& console) {
   return guarded([&] {
     forget_files(arguments.out.parent_path(), {arguments.out.filename().string()});
@@ -46,6 +60,20 @@ CommandResult bundle_command(const BundleArguments& arguments, Console& console)
     value_or_throw(write_private_file(arguments.out, pipeline::tar_gz(bundle.files)));
     print(bundle, arguments.out, console);
   });
+}
+
+void add_bundle(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, group::measure, "bundle",
+                  "Pack a de-identified case with its result and a log into one file for a bug report",
+                  "helicarm bundle my-case --result my-result --out report.tar.gz");
+  auto& a = arguments_of(command, action, bundle_command);
+  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
+  command->add_option("--result", a.result,
+                      "Folder of an earlier run: its result.json is added without its texts");
+  command->add_option("--out", a.out, "The file: a gzip-compressed tar archive")->capture_default_str();
+  command->add_flag("--no-run", a.no_run, "Do not measure the packed case, for a case that ends the program");
+  add_fields(command, a.options, pipeline::run_fields);
 }
 
 }  // namespace helicarm::cli

@@ -30,6 +30,30 @@ class CommandLine(SimulatedCase):
         machine.write_text("{}")
         self.assertEqual(run("run", self.root / "case", "--machine", machine).returncode, 2)
 
+    def test_c_arm_is_recorded_reported_and_checked(self):
+        record = self.root / "arm.json"
+        other = self.root / "other"
+        self.assertEqual(run("simulate", other, "--seed", 9, "--size", 512).returncode, 0)
+        self.assertEqual(run("c-arm", "report", record, "--out", self.root / "arm").returncode, 2)  # no file yet
+        done = run("c-arm", "add", record, other, "--json")
+        self.assertEqual(json.loads(done.stdout)["added"][0]["added"], 2, done.stderr)
+        self.assertEqual(run("c-arm", "check", record, other).returncode, 3)  # only its own acquisitions
+        done = run("c-arm", "check", record, self.root / "case", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertLess(json.loads(done.stdout)["chi2"], json.loads(done.stdout)["limit"])
+        self.assertEqual(run("c-arm", "report", record, "--out", self.root / "arm").returncode, 0)
+        self.assertEqual(len((self.root / "arm/c_arm.csv").read_text().splitlines()), 3)
+        moved = json.loads(record.read_text())
+        for shot in moved["shots"]:
+            shot["estimate_mm"][1] += 60
+        record.write_text(json.dumps(moved))
+        done = run("c-arm", "check", record, self.root / "case", "--json")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["failure"]["code"], "c_arm_changed")
+        moved["tolerances"] = {"focal_mm": 100, "principal_mm": 100}
+        record.write_text(json.dumps(moved))
+        self.assertEqual(run("c-arm", "check", record, self.root / "case").returncode, 0)
+
     def test_run_writes_result_report_and_overlays(self):
         done = run("run", self.root / "case", "--out", self.root / "out", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)

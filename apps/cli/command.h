@@ -19,8 +19,8 @@ struct Console {
   bool answered = false;  ///< the command printed its own answer to a refusal, with --json
 };
 
-/// A command is `Expected<void> name_command(const NameArguments&, Console&)` in name_command.h/.cc; main.cc
-/// converts its failure to a message and an exit code.
+/// A command is `CommandResult name_command(const NameArguments&, Console&)` in name_command.cc, with its
+/// options in `add_name`; main.cc converts its failure to a message and an exit code.
 using CommandResult = Expected<void>;
 
 }  // namespace helicarm::cli

@@ -19,7 +19,7 @@ namespace helicarm::cli {
 /// The selected command with its arguments; set while the command line is parsed.
 using Action = std::function<CommandResult(Console&)>;
 
-/// Headings of `helicarm --help`, in the order of their first commands.
+/// Headings of `helicarm --help`.
 namespace group {
 inline constexpr const char* measure = "Measure";
 inline constexpr const char* images = "Images and cameras";
@@ -90,13 +90,20 @@ Arguments& arguments_of(CLI::App* command, Action& action, CommandResult (*run)(
   return *arguments;
 }
 
-/// Cases: made of files, picked in.
-void add_case_commands(CLI::App& app, Action& action);
-/// From images to points with confidence regions.
-void add_measuring_commands(CLI::App& app, Action& action);
-/// Commands without hardware: simulations, studies, the phantom.
-void add_rehearsal_commands(CLI::App& app, Action& action);
-/// Commands that communicate with C-arm, tracker and robot.
-void add_device_commands(CLI::App& app, Action& action);
+/// The number of one field, for a command that takes no more of its options.
+template <class Options, class Number>
+void add_number(CLI::App* command, const Field<Options>& field, Number& value) {
+  auto* option = command->add_option(std::string(field.flag), value, std::string(field.help))
+                     ->check(within(field.range.low, field.range.high));
+  if constexpr (std::is_arithmetic_v<Number>) option->capture_default_str();
+}
+
+inline CLI::Option* add_port(CLI::App* command, const char* name, std::uint16_t& port, const char* what) {
+  return command->add_option(name, port, what)->check(within(0, 65535))->capture_default_str();
+}
+
+/// All commands, in the order of CMakeLists.txt. `void add_NAME(CLI::App&, Action&)` of each is in
+/// NAME_command.cc.
+void add_commands(CLI::App& app, Action& action);
 
 }  // namespace helicarm::cli

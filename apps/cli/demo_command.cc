@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "findings.h"
 #include "helicarm/pipeline/measure.h"
 #include "helicarm/report/earlier_results.h"
 #include "helicarm/simulation/write_case.h"
@@ -78,7 +79,8 @@ CommandResult demo_command(const DemoArguments& arguments, Console& console) {
     run.threads = console.threads;
     const pipeline::Result result =
         value_or_throw(pipeline::measure(value_or_throw(pipeline::read_case(folder)), run)).result;
-    if (!console.quiet) print_findings(result, console.progress);
+    print_warnings(result.warnings, console);
+    print_notes(result.notes, console);
     value_or_throw(write_result(result, out, false));
     if (result.failure) throw BadInput(*result.failure);
     if (!console.json) console.out << summary_of(result);

@@ -1,18 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "detect_command.h"
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "command_line.h"
+#include "findings.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/detection/find_marks.h"
+#include "helicarm/pipeline/result.h"
 #include "helicarm/xray/read_xray_image.h"
 #include "image_files.h"
-#include "image_warnings.h"
 
 namespace helicarm::cli {
+
+struct DetectArguments {
+  std::vector<std::filesystem::path> images;  ///< and folders of images
+  std::optional<int> frame;
+  std::string kind = "balls";                     ///< balls, holes or crosses
+  std::optional<std::filesystem::path> out = {};  ///< CSV
+};
+
 namespace {
 
 struct Detected {
@@ -33,11 +46,12 @@ Json json_of(const std::vector<detection::Dot>& dots) {
 
 Json json_of(const std::vector<Detected>& all) {
   if (all.size() == 1)
-    return {{"dots", json_of(all[0].dots)}, {"warnings", json_of_warnings(all[0].warnings)}};
+    return {{"dots", json_of(all[0].dots)}, {"warnings", pipeline::json_list_of(all[0].warnings)}};
   Json list = Json::array();
   for (const Detected& one : all)
-    list.push_back(
-        {{"image", one.image}, {"dots", json_of(one.dots)}, {"warnings", json_of_warnings(one.warnings)}});
+    list.push_back({{"image", one.image},
+                    {"dots", json_of(one.dots)},
+                    {"warnings", pipeline::json_list_of(one.warnings)}});
   return {{"images", std::move(list)}};
 }
 
@@ -62,6 +76,8 @@ void print_table(const std::vector<Detected>& all, std::ostream& out) {
 
 }  // namespace
 
+/// Sub-pixel positions of all dots or wire crossings in X-ray images, raw px. One image is printed as
+/// {"dots", "warnings"}, several as {"images": [{"image", "dots", "warnings"}]}.
 CommandResult detect_command(const DetectArguments& arguments, Console& console) {
   return guarded([&] {
     if (arguments.out)
@@ -84,6 +100,20 @@ CommandResult detect_command(const DetectArguments& arguments, Console& console)
     else if (!arguments.out)
       print_table(all, console.out);
   });
+}
+
+void add_detect(CLI::App& app, Action& action) {
+  auto* command = add_command(app, group::images, "detect",
+                              "Detect balls, holes or wire crossings with sub-pixel precision",
+                              "helicarm detect AP.dcm --kind balls --json\n"
+                              "  helicarm detect series/ --out dots.csv");
+  auto& a = arguments_of(command, action, detect_command);
+  command->add_option("IMAGE", a.images, "DICOM, PNG, TIFF, JPEG or BMP; several, and folders of images")
+      ->required();
+  command->add_option("--frame", a.frame, "Number of the image in a multi-frame file, from 1")
+      ->check(within(1, 100000));
+  command->add_option("--kind", a.kind, "balls, holes or crosses")->type_name("WORD")->capture_default_str();
+  command->add_option("--out", a.out, "CSV: image,u_px,v_px,sigma_px,radius_px of all images");
 }
 
 }  // namespace helicarm::cli

@@ -8,6 +8,8 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "command_line.h"
+#include "findings.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
@@ -77,8 +79,7 @@ CommandResult drr_command(const DrrArguments& arguments, Console& console) {
       throw BadInput(Reason::usage, "--centre takes three numbers");
     check_outputs(arguments, console);
     const volume::Volume volume = value_or_throw(volume::read_volume(arguments.volume));
-    for (const Warning& warning : volume.warnings)
-      console.progress << fmt::format("helicarm: {}: {}\n", code(warning.reason), warning.message);
+    print_warnings(volume.warnings, console);
     const Vector3d centre =
         arguments.centre_mm.empty() ? volume.centre() : Vector3d::Map(arguments.centre_mm.data());
     const geometry::View view = view_of(arguments, centre);
@@ -111,6 +112,45 @@ CommandResult drr_command(const DrrArguments& arguments, Console& console) {
     console.out << fmt::format("{} x {} pixels, line integrals {:.4g} to {:.4g}, {:.0f} ms\n", arguments.size,
                                arguments.size, least, greatest, prepare_ms + project_ms);
   });
+}
+
+void add_drr(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, group::studies, "drr", "Project a CT volume: its line integrals on a flat detector",
+                  "helicarm drr knee.nii.gz --angle 90 --out lateral.png --raw lateral.f32");
+  auto& a = arguments_of(command, action, drr_command);
+  command->add_option("VOLUME", a.volume, "MetaImage, NRRD, NIfTI-1, or a folder of DICOM CT slices")
+      ->required();
+  command->add_option("--out", a.out, "PNG, 16 bits: black = no attenuation, white = maximum");
+  command->add_option("--raw", a.raw, "The line integrals as 32-bit floats, little endian, row by row");
+  command->add_option("--size", a.size, "Pixels per side")->check(within(1, 8192))->capture_default_str();
+  command->add_option("--pixel", a.pixel_mm, "Pixel on the detector, mm")
+      ->check(within(0.01, 20))
+      ->capture_default_str();
+  command->add_option("--source-detector", a.source_detector_mm, "mm")
+      ->check(within(10, 1e5))
+      ->capture_default_str();
+  command->add_option("--source-centre", a.source_centre_mm, "mm")
+      ->check(within(1, 1e5))
+      ->capture_default_str();
+  command
+      ->add_option("--centre", a.centre_mm,
+                   "x,y,z (L, P, S; mm) on the central ray; default: the volume's centre")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(within(-1e5, 1e5));
+  command->add_option("--angle", a.angle_deg, "Position of the source: 0 anterior, 90 at the patient's left")
+      ->check(within(-360, 360))
+      ->capture_default_str();
+  command->add_option("--tilt", a.tilt_deg, "Tilt of the source towards the head")
+      ->check(within(-89, 89))
+      ->capture_default_str();
+  command
+      ->add_option("--values", a.values,
+                   "hu: attenuation by Hounsfield units, water 0.02059 / mm, 0 below -800\n"
+                   "raw: integrate the voxels' values unchanged")
+      ->type_name("WORD")
+      ->capture_default_str();
 }
 
 }  // namespace helicarm::cli

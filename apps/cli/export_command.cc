@@ -1,14 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "export_command.h"
-
 #include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "command_line.h"
+#include "helicarm/case_registration/register_fields.h"
 #include "helicarm/core/json.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/exports.h"
+#include "run_command.h"
 
 namespace helicarm::cli {
+
+struct ExportArguments {
+  RunArguments run = {.folder = {}, .out = "helicarm-export"};
+  std::vector<std::string> as;  ///< of `export_words`; empty: all
+};
+
 namespace {
 
 std::vector<report::Export> exports_named(const std::vector<std::string>& words) {
@@ -26,6 +37,7 @@ std::vector<report::Export> exports_named(const std::vector<std::string>& words)
 
 }  // namespace
 
+/// Measures a case as `run` does and writes the result for other programs; no result.json, no report.
 CommandResult export_command(const ExportArguments& arguments, Console& console) {
   return guarded([&] {
     report::forget_exports(arguments.run.out);
@@ -46,6 +58,24 @@ CommandResult export_command(const ExportArguments& arguments, Console& console)
       for (const auto& path : written) console.out << path.string() << '\n';
     }
   });
+}
+
+void add_export(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, group::images, "export", "Measure a case and write the result for other programs",
+                  "helicarm export my-case --out exported\n"
+                  "  helicarm export my-case --out exported --as csv,slicer");
+  auto& a = arguments_of(command, action, export_command);
+  command->add_option("CASE", a.run.folder, "Folder that holds case.json")->required();
+  command->add_option("--out", a.run.out, "Folder for the files")->capture_default_str();
+  command
+      ->add_option("--as", a.as,
+                   fmt::format("One or more of {}, separated by commas (default: all)",
+                               fmt::join(report::export_words, ", ")))
+      ->type_name("WORD")
+      ->delimiter(',');
+  add_run_options(command, a.run, "The C-arm's history (JSON), read only");
+  add_fields(command, a.run.options.search, case_registration::search_fields);
 }
 
 }  // namespace helicarm::cli

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "command_line.h"
+#include "findings.h"
 #include "helicarm/core/json.h"
 #include "helicarm/exchange/import_matrix.h"
 #include "helicarm/exchange/itk_transform.h"
@@ -95,13 +97,55 @@ CommandResult import_command(const ImportArguments& arguments, Console& console)
   }
   const auto imported = exchange::import_matrix(arguments.file, options);
   if (!imported) return tl::unexpected<Failure>(imported.error());
-  for (const Warning& warning : imported->warnings)
-    console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
+  print_warnings(imported->warnings, console);
   if (console.json)
     console.out << to_text(json_of(*imported)) << '\n';
   else
     print_table(*imported, console.out);
   return {};
+}
+
+void add_import(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, group::images, "import",
+      "Read a projection or transform of another program: MayaCam, DLT, NRRD, OpenCV, RTK, ITK",
+      "helicarm import camera.txt --unit cm --json\n"
+      "  helicarm import MergedDlts.csv --column 2 --image-size 1760,1700 --json\n"
+      "  helicarm import geometry.xml --column 1 --pixel-mm 0.388,0.388 --image-size 1024,768 --json\n"
+      "  helicarm import femur.tfm --json");
+  auto& a = arguments_of(command, action, import_command);
+  command
+      ->add_option(
+          "FILE", a.file,
+          "MayaCam 1 or 2, NRRD header, OpenCV (YAML, XML, JSON), RTK (XML), a 3x4 matrix as text or JSON, "
+          "XMALab's DLT coefficients, an ITK transform (.tfm, .h5), or a rigid 4x4 matrix")
+      ->required();
+  command
+      ->add_option("--unit", a.unit,
+                   "Unit of length in the file: mm, cm or m; needed where mm would be implausible")
+      ->type_name("WORD");
+  command
+      ->add_option("--column", a.column,
+                   "Camera of DLT coefficients, projection of RTK, image of OpenCV; from 1")
+      ->check(within(1, 100));
+  command
+      ->add_option("--image-size", a.image_size,
+                   "Width,height in px; DLT coefficients count rows upwards from 1, RTK's mm from the centre")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(within(1, 16384));
+  command->add_option("--pixel-mm", a.pixel_mm, "RTK: spacing of the projection images, column,row")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(within(1e-4, 100));
+  command
+      ->add_option("--origin-mm", a.origin_mm,
+                   "RTK: origin of the projection images (default: the image's centre is 0,0)")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(within(-1e5, 1e5));
+  command->add_flag("--undistorted", a.undistorted,
+                    "The images are undistorted already: a lens distortion in the file is left out");
 }
 
 }  // namespace helicarm::cli

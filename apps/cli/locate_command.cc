@@ -8,12 +8,14 @@
 
 #include <fmt/format.h>
 
+#include "command_line.h"
 #include "helicarm/calibration/camera_files.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/localization/located_point_json.h"
 #include "helicarm/localization/pick_checks.h"
 #include "helicarm/pipeline/result.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/rectification/distortion_map.h"
 
 namespace helicarm::cli {
@@ -189,6 +191,25 @@ CommandResult locate_command(const LocateArguments& arguments, Console& console)
   else
     print_table((*answer)["points"], console.out);
   return {};
+}
+
+void add_locate(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, group::images, "locate", "Triangulate picked pixels in calibrated views (Eq. 8)",
+      "helicarm locate --calibration my-result/result.json --picks picks.csv --json\n"
+      "  helicarm locate --calibration AP=cam1.json --calibration LAT=cam2.json --picks picks.csv");
+  auto& a = arguments_of(command, action, locate_command);
+  command
+      ->add_option("--calibration", a.calibrations,
+                   "result.json of a run; or for each view VIEW=FILE: result.json, the output of solve or "
+                   "import, or a file that import reads, all in one frame and in mm")
+      ->allow_extra_args(false)
+      ->required();
+  command->add_option("--picks", a.picks, "CSV: name,view,u_px,v_px[,sigma_px], rectified pixels")
+      ->required();
+  command->add_flag("--raw", a.raw, "The picks are raw pixels");
+  add_number(command, field_named<pipeline::RunOptions>(pipeline::run_fields, "motion_sigma_mm"),
+             a.motion_sigma_mm);
 }
 
 }  // namespace helicarm::cli

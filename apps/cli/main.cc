@@ -46,10 +46,7 @@ int run(int argc, char** argv) {
   app.add_option("--seed", console.seed, "Seed of the random numbers")
       ->check(within(0, 1e19))
       ->capture_default_str();
-  add_case_commands(app, action);
-  add_measuring_commands(app, action);
-  add_rehearsal_commands(app, action);
-  add_device_commands(app, action);
+  add_commands(app, action);
   try {
     const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
     if (argc > 1 && argv[1][0] != '-' &&

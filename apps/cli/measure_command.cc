@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "command_line.h"
 #include "helicarm/calibration/saved_calibration.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/fiducials/find_target.h"
@@ -301,6 +302,42 @@ CommandResult measure_command(const MeasureArguments& arguments, Console& consol
     }
     console.out << to_text({{"measures", std::move(all)}, {"notes", pipeline::json_list_of(notes)}}) << '\n';
   });
+}
+
+void add_measure(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, group::measure, "measure",
+      "Measure in single images: distance, angle, circle, positions in femur and tibia",
+      "helicarm measure --clicks clicks.csv --calibration my-result/result.json\n"
+      "  helicarm measure --clicks clicks.csv      without a calibration: lengths in pixels\n\n"
+      "kind and the names of its clicks:\n"
+      "  distance           from, to\n"
+      "  angle              first, vertex, second\n"
+      "  line_angle         line1_from, line1_to, line2_from, line2_to\n"
+      "  circle             rim1, rim2, rim3 and any further ones\n"
+      "  femoral_quadrants  blumensaat_posterior, blumensaat_anterior, inferior[, posterior, anterior]\n"
+      "  tibia_ap           anterior, posterior[, plateau1, plateau2]\n"
+      "  tibia_ml           medial, lateral\n"
+      "In the last three, clicks of other names are points whose positions are given in per cent; a point\n"
+      "without pixels is the located one of this name in result.json.");
+  auto& a = arguments_of(command, action, measure_command);
+  command
+      ->add_option("--clicks", a.clicks,
+                   "CSV: measure,kind,view,name,u_px,v_px[,sigma_px], rectified pixels; a row per click")
+      ->required();
+  command->add_option("--calibration", a.calibration, "result.json of a run: gives lengths in mm");
+  command->add_option("--registration", a.registration,
+                      "registration.json of the same views: its planned points may be named too");
+  command->add_flag("--raw", a.raw, "The clicks are raw pixels");
+  command
+      ->add_option("--depth", a.depth_mm,
+                   "Distance of the plane of lengths from the source, mm (default: through the fiducials' "
+                   "centre)")
+      ->check(within(1, 10000));
+  command->add_option("--depth-sigma", a.depth_sigma_mm, "Its standard deviation, mm")
+      ->check(within(0, 1000))
+      ->capture_default_str();
+  command->add_option("--at", a.at, "A located point of result.json in that plane");
 }
 
 }  // namespace helicarm::cli

@@ -3,16 +3,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "command_line.h"
+#include "findings.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/file_lock.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
+#include "helicarm/devices/tracker/mount_calibration.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/devices/tracker/sequence_stream.h"
 #include "helicarm/devices/tracker/tracker_registry.h"
@@ -23,8 +30,26 @@
 #include "line_input.h"
 #include "stop_signal.h"
 #include "touch_points.h"
+#include "tracker_command.h"
 
 namespace helicarm::cli {
+
+struct MountArguments {
+  TrackerLinkArguments link;           ///< its peer is empty if all places come from recordings
+  std::string facet;                   ///< name of the calibrator's marker
+  std::string pointer = "pointer";     ///< name of the pointer's marker
+  std::filesystem::path tip;           ///< as `tracker pivot --json` writes
+  std::string calibrator = "udcsc";    ///< a built-in or a file
+  std::vector<std::string> divots;     ///< NAME=X,Y,Z in the calibrator's frame, mm
+  std::vector<std::string> touch;      ///< places to touch, in order
+  std::vector<std::string> recorded;   ///< LABEL=FILE: the pointer at rest on a place
+  std::vector<std::string> pivoted;    ///< LABEL=FILE: the calibrator turned about a place
+  std::optional<double> tip_sigma_mm;  ///< per axis, of a tip whose file has no covariance
+  double tip_radius_mm = 0;            ///< of the pointer, on balls
+  std::filesystem::path out = "mount.json";
+  std::filesystem::path plan;  ///< its facet of this name is replaced or added
+  tracker::MountOptions options;
+};
 namespace {
 
 using geometry::RigidTransform;
@@ -228,6 +253,7 @@ void print(const tracker::MountCalibration& mount, const MountArguments& argumen
 
 }  // namespace
 
+/// Finds `calibrator_from_facet` of the user's own mount and writes it with its covariance.
 CommandResult calibrate_mount_command(const MountArguments& arguments, Console& console) {
   return guarded([&] {
     forget_files(arguments.out.parent_path(), {arguments.out.filename().string()},
@@ -260,8 +286,7 @@ CommandResult calibrate_mount_command(const MountArguments& arguments, Console& 
     if (!tip.covariance) {
       const Warning warning = without_covariance(arguments, mount);
       json["warnings"].push_back(pipeline::to_json(warning));
-      if (!console.quiet)
-        console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
+      print_finding("warning", warning, console);
     }
     value_or_throw(write_file(arguments.out, to_text(json)));
     if (!arguments.plan.empty()) put_into_plan(arguments.plan, json["facet"]);
@@ -270,6 +295,52 @@ CommandResult calibrate_mount_command(const MountArguments& arguments, Console& 
     else
       print(mount, arguments, console);
   });
+}
+
+void add_calibrate_mount(CLI::App* tracker, Action& action) {
+  auto* command = tracker->add_subcommand(
+      "calibrate-mount", "Find the pose of your marker in the calibrator by touching its balls or divots");
+  auto& a = arguments_of(command, action, calibrate_mount_command);
+  command->add_option("PEER", a.link.peer, "address:port of an OpenIGTLink server, for --touch");
+  command->add_option("--facet", a.facet, "Name of the calibrator's marker")->required();
+  command->add_option("--pointer", a.pointer, "Name of the pointer's marker")->capture_default_str();
+  command->add_option("--tip", a.tip, "The pointer's tip, as `tracker pivot --json` prints it");
+  command
+      ->add_option(
+          "--tip-sigma", a.tip_sigma_mm,
+          "Standard deviation of the tip per axis, mm, if its file has no covariance; without either "
+          "the touches determine the tip")
+      ->check(within(0, 10));
+  command->add_option("--tip-radius", a.tip_radius_mm, "Radius of the pointer's tip, mm; counts on balls")
+      ->check(within(0, 20))
+      ->capture_default_str();
+  command->add_option("--calibrator", a.calibrator, "A built-in or a file")->capture_default_str();
+  command->add_option("--divot", a.divots,
+                      "NAME=X,Y,Z: a point of the calibrator that holds the tip, mm; repeatable");
+  command
+      ->add_option("--touch", a.touch,
+                   "Balls and divots to touch in this order, each as often as it is named")
+      ->delimiter(',');
+  command->add_option("--recorded", a.recorded,
+                      "LABEL=FILE: a recording of the pointer at rest on it; repeatable");
+  command->add_option(
+      "--pivoted", a.pivoted,
+      "LABEL=FILE: a recording of the calibrator turned about this point; repeatable. It gives "
+      "one point: three are needed");
+  command->add_option("--sigma-mm", a.options.sigma_mm, "Error of a reading per axis, mm")
+      ->check(within(0, 10))
+      ->capture_default_str();
+  command->add_option("--sigma-deg", a.options.sigma_deg, "Error of a reading per axis, degrees")
+      ->check(within(0, 10))
+      ->capture_default_str();
+  command->add_option("--seat", a.options.seat_mm, "Error of the tip in a divot or on a ball per axis, mm")
+      ->check(within(0.001, 10))
+      ->capture_default_str();
+  command->add_option("--max-error", a.options.max_tre_mm, "Largest predicted error at a ball, mm")
+      ->check(within(0.01, 100))
+      ->capture_default_str();
+  command->add_option("--out", a.out, "The file to write")->capture_default_str();
+  command->add_option("--plan", a.plan, "A plan.json whose facet of this name is replaced or added");
 }
 
 }  // namespace helicarm::cli

@@ -1,27 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "navigate_command.h"
-
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <numbers>
+#include <optional>
 #include <thread>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "command_line.h"
 #include "consent.h"
 #include "guide_by_hand.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/private_files.h"
 #include "helicarm/core/text.h"
+#include "helicarm/devices/receiver/receiver.h"
+#include "helicarm/devices/receiver/receiver_fields.h"
 #include "helicarm/operation/connections.h"
+#include "helicarm/operation/plan_fields.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/plate.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "line_input.h"
+#include "run_command.h"
 #include "touch_points.h"
 
 namespace helicarm::cli {
+
+struct NavigateArguments {
+  std::filesystem::path plan;
+  std::filesystem::path out = "session";
+  std::filesystem::path picks;  ///< awaited after the images; empty: those of the plan
+  std::optional<double> plan_age_s, max_error_mm, motion_sigma_mm;  ///< override the plan's
+  std::optional<std::string> method;                                ///< overrides the plan's
+  std::optional<std::filesystem::path> history;                     ///< the C-arm's, read only
+  receiver::ReceiverOptions receiver;
+  bool yes = false;  ///< confirm every order automatically: for rehearsals
+};
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -246,13 +264,23 @@ void carry_out(const operation::OperationPlan& plan, const NavigateArguments& ar
     drive_robot(plan, arguments, operation, devices.robot(), input, ending, console);
 }
 
+/// What the command line states instead of the plan.
+void put_options(const NavigateArguments& arguments, operation::OperationPlan& plan) {
+  plan.limits.age_s = arguments.plan_age_s.value_or(plan.limits.age_s);
+  plan.max_error_mm = arguments.max_error_mm.value_or(plan.max_error_mm);
+  plan.motion_sigma_mm = arguments.motion_sigma_mm.value_or(plan.motion_sigma_mm);
+  if (arguments.method) plan.method = value_or_throw(method_named(*arguments.method));
+  if (arguments.history) plan.history = value_or_throw(calibration::read_history(*arguments.history));
+}
+
 }  // namespace
 
+/// A whole operation from a plan: images, measurement, robot or hand-held drill, verification.
 CommandResult navigate_command(const NavigateArguments& arguments, Console& console) {
   return guarded([&] {
     operation::OperationPlan plan = value_or_throw(
         operation::plan_from(value_or_throw(read_json(arguments.plan)), arguments.plan.string()));
-    if (arguments.plan_age_s) plan.limits.age_s = *arguments.plan_age_s;
+    put_options(arguments, plan);
     check_plan(plan, arguments);
     StopSignal stop;
     value_or_throw(make_private_folder(arguments.out));
@@ -264,6 +292,41 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     value_or_throw(done);
     value_or_throw(recorded);
   });
+}
+
+void add_navigate(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, group::operation, "navigate",
+      "Carry out an operation by a plan: X-ray images, measurement, robot or drill held by hand, "
+      "verification",
+      "helicarm virtual-or --plan plan.json        (in one terminal; --freehand: without a robot)\n"
+      "  helicarm navigate plan.json --out session   (in another; then: shoot AP, shoot LAT)\n"
+      "  helicarm navigate plan.json --json          (freehand: a line of JSON ten times a second)");
+  auto& a = arguments_of(command, action, navigate_command);
+  command->add_option("PLAN", a.plan, "plan.json (docs/formats.md)")->required();
+  command->add_option("--out", a.out, "Folder of the session: images, cases, record")->capture_default_str();
+  command->add_option(
+      "--picks", a.picks,
+      "JSON file with \"picks\" as in case.json; it may be written after the images have arrived");
+  command->add_option("--address", a.receiver.address, "Address to listen on for images")
+      ->capture_default_str();
+  constexpr auto& age = field_named<operation::OperationPlan>(operation::plan_fields, "plan_stale_s");
+  command
+      ->add_option("--plan-age", a.plan_age_s,
+                   "Age in s at which an unconfirmed plan expires; overrides the plan's plan_stale_s")
+      ->check(within(age.range.low, age.range.high));
+  add_number(command, field_named<pipeline::RunOptions>(pipeline::run_fields, "max_error_mm"),
+             a.max_error_mm);
+  add_number(command, field_named<pipeline::RunOptions>(pipeline::run_fields, "motion_sigma_mm"),
+             a.motion_sigma_mm);
+  command->add_option("--method", a.method, "best, or paper: the published recipe; overrides the plan's")
+      ->type_name("WORD");
+  command->add_option("--machine", a.history, "The C-arm's history (JSON), read only");
+  add_fields(command, a.receiver, receiver::receiver_fields);
+  command->add_option("--title", a.receiver.negotiation.title, "Application entity title of this receiver")
+      ->capture_default_str();
+  command->add_flag("--yes", a.yes,
+                    "Confirm every order automatically; use it only where no person can be injured");
 }
 
 }  // namespace helicarm::cli

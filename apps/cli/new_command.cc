@@ -1,14 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "new_command.h"
-
+#include <filesystem>
 #include <iostream>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "command_line.h"
+#include "findings.h"
 #include "helicarm/pipeline/new_case.h"
+#include "helicarm/xray/dicom_acquisition.h"
 
 namespace helicarm::cli {
+
+struct NewArguments {
+  std::vector<std::string> images;                     ///< [VIEW=]FILE[:FRAME]
+  std::string calibrator;                              ///< a built-in or a file; empty: asked for
+  std::optional<std::string> plate;                    ///< a built-in, a file or none; nothing: by the images
+  std::vector<std::string> plate_images;               ///< VIEW=FILE
+  std::vector<std::string> maps;                       ///< VIEW=FILE
+  std::optional<double> pixel_mm, source_detector_mm;  ///< of every view, where the images do not state it
+  std::filesystem::path out;
+};
+
 namespace {
 
 bool may_ask(const Console& console) {
@@ -84,6 +100,8 @@ void print(const pipeline::NewCase& made, const std::filesystem::path& out, Cons
 
 }  // namespace
 
+/// Makes a case of image files. What the images do not decide is asked for on a terminal, else refused with
+/// the option's name.
 CommandResult new_command(const NewArguments& arguments, Console& console) {
   return guarded([&] {
     pipeline::NewCaseOptions options{arguments.calibrator,
@@ -99,12 +117,44 @@ CommandResult new_command(const NewArguments& arguments, Console& console) {
     const pipeline::NewCase made =
         value_or_throw(pipeline::new_case(std::move(images), options, arguments.out));
     value_or_throw(pipeline::write_new_case(made, arguments.out));
-    if (!console.quiet)
-      for (const Warning& warning : made.warnings)
-        console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,
-                                        warning.view.empty() ? "" : ": ", warning.message);
+    print_warnings(made.warnings, console);
     print(made, arguments.out, console);
   });
+}
+
+void add_new(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, group::measure, "new",
+      "Make a case of image files: what they show decides the views and the plate",
+      "helicarm new IM0001 IM0002 --calibrator my-phantom/calibrator.json --out my-case\n"
+      "  helicarm new AP=front.png LAT=side.png --calibrator udcsc --plate none --out my-case\n"
+      "  helicarm new AP=run.dcm:12 LAT=run.dcm:40 --calibrator c.json --plate plate.json --out my-case");
+  auto& a = arguments_of(command, action, new_command);
+  command
+      ->add_option("IMAGE", a.images,
+                   "[VIEW=]FILE[:FRAME]; points need two or more: DICOM, PNG, TIFF, JPEG or BMP. Without "
+                   "VIEW the views "
+                   "are AP and LAT "
+                   "by their positioner angles, or named as the files")
+      ->required();
+  command->add_option("--calibrator", a.calibrator, "calibrator.json, or udcsc");
+  command->add_option("--plate", a.plate,
+                      "plate.json, plate48, or none for images free of distortion (default: by the images)");
+  command
+      ->add_option("--plate-image", a.plate_images,
+                   "VIEW=FILE: an image of the plate alone in the same C-arm position; repeatable")
+      ->allow_extra_args(false);
+  command->add_option("--map", a.maps, "VIEW=FILE: a map.json of rectify; repeatable")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--pixel-mm", a.pixel_mm,
+                   "Pixel size in the receiver's plane, mm, of images whose files do not state it")
+      ->check(CLI::Range(xray::min_pixel_mm, xray::max_pixel_mm));
+  command
+      ->add_option("--source-detector-mm", a.source_detector_mm,
+                   "Distance of source and receiver, mm, of images whose files do not state it")
+      ->check(CLI::Range(xray::min_source_detector_mm, xray::max_source_detector_mm));
+  command->add_option("--out", a.out, "Folder for the case")->required();
 }
 
 }  // namespace helicarm::cli

@@ -1,18 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "operate_command.h"
-
 #include <atomic>
+#include <filesystem>
 #include <mutex>
 #include <thread>
 
 #include <fmt/format.h>
 
+#include "command_line.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/parallel.h"
 #include "helicarm/rehearsal/rehearsal_files.h"
 #include "stop_signal.h"
 
 namespace helicarm::cli {
+
+struct OperateArguments {
+  int cases = 4;  ///< pairs of bones
+  int size = 1024;
+  double rate_hz = 60;
+  std::filesystem::path out = "operate";
+};
+
 namespace {
 
 /// Two at a time: a small machine still serves the robots in time.
@@ -33,6 +41,7 @@ void refuse_earlier_operation(const std::filesystem::path& folder) {
 
 }  // namespace
 
+/// Table 2's experiment with virtual devices, end to end over sockets.
 CommandResult operate_command(const OperateArguments& arguments, Console& console) {
   return guarded([&] {
     refuse_earlier_operation(arguments.out);
@@ -89,6 +98,22 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
     else
       console.out << rehearsal::table_of(rehearsals);
   });
+}
+
+void add_operate(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, group::operation, "operate", "Table 2's experiment with virtual devices, end to end",
+                  "helicarm operate --cases 4 --out operate");
+  auto& a = arguments_of(command, action, operate_command);
+  command->add_option("--cases", a.cases, "Number of simulated pairs of bones, with four points each")
+      ->check(within(1, 1000))
+      ->capture_default_str();
+  command->add_option("--out", a.out, "Folder for operate.csv, operate.json and the sessions")
+      ->capture_default_str();
+  command->add_option("--size", a.size, "Pixels per side: 512 or 1024")->capture_default_str();
+  command->add_option("--rate", a.rate_hz, "Rate of the tracker, Hz")
+      ->check(within(5, 1000))
+      ->capture_default_str();
 }
 
 }  // namespace helicarm::cli

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "phantom_command.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "command_line.h"
+#include "findings.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/phantom/body.h"
@@ -23,6 +27,32 @@
 #include "phantom_check_command.h"
 
 namespace helicarm::cli {
+
+enum class PhantomAction { show, check, export_files, design, measure, verify };
+
+/// `helicarm phantom show|check|export [NAME_OR_FILE] [--plate] [--stl FILE] [--svg FILE]`. With --json,
+/// `design --knee D1,D2` proposes a calibrator for a knee; with --svg and --file as `export`. With --json,
+/// `show` prints a valid calibrator.json or plate.json. `helicarm phantom measure CASE --out DIR` and
+/// `helicarm phantom verify CASE` read a case instead.
+struct PhantomArguments {
+  PhantomAction action = PhantomAction::show;
+  std::string name_or_file;                      ///< name of a built-in or a file; empty: udcsc or plate48
+  bool plate = false;                            ///< the rectification plate instead of the calibrator
+  std::optional<std::filesystem::path> stl;      ///< export: the printable body
+  std::optional<std::string> body;               ///< export: cone, rings or plate; nothing: the suitable one
+  double clearance_mm = 0;                       ///< export: pocket's diameter less the ball's
+  double step_mm = 1;                            ///< export: of the body's surface
+  std::optional<std::filesystem::path> svg;      ///< export: the drawing
+  std::optional<std::filesystem::path> file;     ///< export: calibrator.json or plate.json
+  std::vector<double> knee_mm;                   ///< design: d1, d2 of Fig. 4
+  std::optional<std::filesystem::path> out;      ///< measure, verify: folder of the result
+  bool from_scratch = false;                     ///< measure: without a nominal file
+  std::vector<std::string> distances;            ///< measure: A,B=MM or u1,v1;u2,v2=MM
+  std::optional<double> distance_sigma_mm;       ///< measure
+  std::string distance_is = "centres";           ///< measure: centres or outer
+  std::optional<std::filesystem::path> history;  ///< verify: JSON, to which this verification is added
+};
+
 namespace {
 
 using Files = std::vector<std::pair<std::filesystem::path, std::string>>;
@@ -155,19 +185,6 @@ void design(const PhantomArguments& arguments, Console& console) {
     value_or_throw(write_file(*arguments.file, to_text(phantom::to_json(calibrator)) + "\n"));
 }
 
-void notify(const std::vector<Warning>& warnings, Console& console) {
-  if (console.quiet) return;
-  for (const Warning& warning : warnings)
-    console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,
-                                    warning.view.empty() ? "" : ": ", warning.message);
-}
-
-void notify_of_notes(const std::vector<Warning>& notes, Console& console) {
-  if (console.quiet) return;
-  for (const Warning& note : notes)
-    console.progress << fmt::format("helicarm: note: {}: {}\n", code(note.reason), note.message);
-}
-
 phantom_calibration::PhantomOptions options_of(const PhantomArguments& arguments, const Console& console) {
   phantom_calibration::PhantomOptions options;
   options.from_scratch = arguments.from_scratch;
@@ -237,8 +254,8 @@ void measure(const PhantomArguments& arguments, Console& console) {
   refuse_own_calibrator(arguments.name_or_file, out);
   forget_files(out, {"calibrator.json", "result.json", "report.html"});
   const phantom_calibration::PhantomResult result = measured(arguments, console);
-  notify(result.warnings, console);
-  notify_of_notes(result.notes, console);
+  print_warnings(result.warnings, console);
+  print_notes(result.notes, console);
   value_or_throw(phantom_calibration::write_phantom(result, out));
   if (result.failure) throw BadInput(*result.failure);
   if (console.json)
@@ -276,8 +293,8 @@ void verify(const PhantomArguments& arguments, Console& console) {
   if (arguments.out)
     value_or_throw(
         write_file(*arguments.out / "result.json", to_text(phantom_calibration::to_json(result)) + "\n"));
-  notify(result.warnings, console);
-  if (console.json) notify_of_notes(result.notes, console);
+  print_warnings(result.warnings, console);
+  if (console.json) print_notes(result.notes, console);
   if (console.json && !result.failure) console.out << to_text(phantom_calibration::to_json(result)) << "\n";
   if (!console.json && !console.quiet) print(result, console);
   if (result.failure) throw BadInput(*result.failure);
@@ -307,6 +324,93 @@ CommandResult phantom_command(const PhantomArguments& arguments, Console& consol
         return verify(arguments, console);
     }
   });
+}
+
+void add_phantom(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, group::phantom, "phantom", "Show, check, design, export, measure or verify the calibrator",
+      "helicarm phantom show\n  helicarm phantom check calibrator.json\n"
+      "  helicarm phantom design --knee 66.7,57.2 --file knee.json\n"
+      "  helicarm phantom export --stl calibrator.stl --svg calibrator.svg\n"
+      "  helicarm phantom export my-balls.json --body rings --clearance -0.1 --step 0.5 --stl body.stl\n"
+      "  helicarm phantom measure eight-views --distance P1,P7=118.42 --distance-is outer --out my-phantom\n"
+      "  helicarm phantom measure eight-views --from-scratch --distance \"212,480;803,466=83.4\" --out "
+      "my-phantom\n"
+      "  helicarm phantom verify two-views --history my-phantom/history.json");
+  auto& a = arguments_of(command, action, phantom_command);
+  command
+      ->add_option(
+          "ACTION", a.action,
+          "show, check, export: a calibrator or plate\n"
+          "design: a calibrator for a knee's dimensions\n"
+          "measure: ball coordinates as built, from a case of three views or more (6 to 10 advised, 10 to "
+          "30 degrees apart)\n"
+          "verify: whether the balls are still at the file's positions, from a case of two views or more")
+      ->transform(CLI::CheckedTransformer(
+                      std::map<std::string, PhantomAction>{{"show", PhantomAction::show},
+                                                           {"check", PhantomAction::check},
+                                                           {"export", PhantomAction::export_files},
+                                                           {"design", PhantomAction::design},
+                                                           {"measure", PhantomAction::measure},
+                                                           {"verify", PhantomAction::verify}})
+                      .description("{show, check, export, design, measure, verify}"))
+      ->type_name("WORD")
+      ->required();
+  command->add_option(
+      "NAME_OR_FILE", a.name_or_file,
+      "Name of a built-in or a file (default: udcsc or plate48). measure, verify: the case's folder");
+  command->add_flag("--plate", a.plate, "The rectification plate instead of the calibrator");
+  command->add_option("--stl", a.stl, "export: the body for 3D printing, as STL");
+  command
+      ->add_option("--body", a.body,
+                   "export: shape of the body\n"
+                   "cone: balls on the wall of the built-in calibrator's cone\n"
+                   "rings: any layout, a ring through each ball and four ribs\n"
+                   "plate: any layout, a plate with a post under each ball\n"
+                   "(default: cone if the balls lie on its wall, else rings)")
+      ->type_name("WORD");
+  command
+      ->add_option("--clearance", a.clearance_mm,
+                   "export: diameter of a ball's pocket less that of the ball, mm; negative: press fit")
+      ->check(within(-0.5, 2))
+      ->capture_default_str();
+  command->add_option("--step", a.step_mm, "export: step of the body's surface, mm; fine for a press fit")
+      ->check(within(0.2, 3))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--knee", a.knee_mm,
+          "design: D1,D2: width between lateral femoral wall and medial condyle, and height from the "
+          "top of the knee to the resident's ridge, mm (Fig. 4)")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(within(phantom::knee_range_mm.low, phantom::knee_range_mm.high));
+  command->add_option("--svg", a.svg, "export, design: the drawing with all coordinates, as SVG");
+  command->add_option("--file", a.file, "export, design: calibrator.json or plate.json");
+  command->add_option("--out", a.out,
+                      "measure: folder for calibrator.json, result.json and report.html; verify: for "
+                      "result.json");
+  command->add_flag(
+      "--from-scratch", a.from_scratch,
+      "measure: without a nominal file; the case gives \"diameters_mm\" and each view \"mirrored\"");
+  command
+      ->add_option(
+          "--distance", a.distances,
+          "measure: distance of two balls by caliper, A,B=MM with labels (from scratch those that a first "
+          "measurement gives, see its report) or u1,v1;u2,v2=MM with raw pixels in the first view; "
+          "repeatable. "
+          "Without it the scale has a sigma of 3 %")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--distance-sigma", a.distance_sigma_mm,
+                   "measure: standard error of each distance, mm (default: 0.05)")
+      ->check(within(1e-4, 10));
+  command
+      ->add_option("--distance-is", a.distance_is,
+                   "measure: centres (centre to centre) or outer (outside dimension across both balls)")
+      ->type_name("WORD")
+      ->capture_default_str();
+  command->add_option("--history", a.history, "verify: JSON file to which this verification is added");
 }
 
 }  // namespace helicarm::cli

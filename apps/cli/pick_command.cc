@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pick_command.h"
-
 #include <array>
 #include <cstdlib>
+#include <filesystem>
 #include <optional>
 #include <sstream>
 #include <vector>
@@ -10,12 +9,19 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "command_line.h"
 #include "helicarm/core/file_lock.h"
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/case_picks.h"
 
 namespace helicarm::cli {
+
+struct PickArguments {
+  std::filesystem::path folder;              ///< holds case.json
+  std::optional<std::filesystem::path> csv;  ///< name,view,u_px,v_px[,sigma_px]
+};
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -58,6 +64,8 @@ void add_from(const fs::path& csv, const PickArguments& arguments, Console& cons
 
 }  // namespace
 
+/// Opens the desktop application on a case, which replaces this process; with a table, writes its picks into
+/// case.json.
 CommandResult pick_command(const PickArguments& arguments, Console& console) {
   return guarded([&] {
     if (arguments.csv) return add_from(*arguments.csv, arguments, console);
@@ -76,6 +84,19 @@ CommandResult pick_command(const PickArguments& arguments, Console& console) {
     open_desktop(*program, pipeline::folder_of_case(arguments.folder));
     throw BadInput(Reason::missing_file, program->string() + " cannot be started");
   });
+}
+
+void add_pick(CLI::App& app, Action& action) {
+  auto* command = add_command(app, group::measure, "pick",
+                              "Pick points in a case: in the desktop application, or by a table",
+                              "helicarm pick my-case\n"
+                              "  helicarm pick my-case --csv picks.csv");
+  auto& a = arguments_of(command, action, pick_command);
+  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
+  command->add_option(
+      "--csv", a.csv,
+      "name,view,u_px,v_px[,sigma_px], raw pixels: written into case.json; a pick of the same "
+      "name and view is replaced");
 }
 
 }  // namespace helicarm::cli

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "predict_command.h"
-
 #include <charconv>
 #include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
-#include "helicarm/calibration/c_arm_history.h"
+#include "command_line.h"
+#include "findings.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/view_json.h"
@@ -15,10 +18,21 @@
 #include "helicarm/localization/tre_volume.h"
 #include "helicarm/pipeline/calibrate_case.h"
 #include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/tre_figure.h"
 #include "run_command.h"
 
 namespace helicarm::cli {
+
+struct PredictArguments {
+  std::vector<std::string> at;  ///< "x,y,z" each, mm in the calibrator's frame
+  double sigma_px = 0.5;        ///< of a pick, per axis
+  RunArguments run = {.folder = {}, .options = {.run = {.max_error_mm = 2}}};
+  std::optional<std::filesystem::path> map = {};  ///< folder for tre.csv, tre.vtk, tre.svg
+  double half_mm = 150;                           ///< of the map's edge
+  double step_mm = 10;
+};
+
 namespace {
 
 constexpr double most_points_per_edge = 201;
@@ -40,8 +54,8 @@ Eigen::Vector3d place_from(const std::string& word) {
 Json prediction(const Eigen::Vector3d& place, const calibration::Calibration& calibration,
                 const PredictArguments& arguments) {
   Json json{{"xyz_mm", {place.x(), place.y(), place.z()}}};
-  const auto covariance =
-      localization::predict_covariance(place, arguments.sigma_px, calibration, arguments.motion_sigma_mm);
+  const auto covariance = localization::predict_covariance(place, arguments.sigma_px, calibration,
+                                                           arguments.run.options.run.motion_sigma_mm);
   if (!covariance) {
     json["decision"] = "refuse";
     json["reason"] = code(covariance.error().reason);
@@ -51,8 +65,9 @@ Json prediction(const Eigen::Vector3d& place, const calibration::Calibration& ca
   json["tre_mm"] = std::sqrt(covariance->trace());
   json["error_95_mm"] = within;
   json["covariance_mm2"] = geometry::json_rows(*covariance);
-  json["decision"] = within <= arguments.max_error_mm ? "accept" : "refuse";
-  json["reason"] = within <= arguments.max_error_mm ? Json(nullptr) : Json(code(Reason::uncertain));
+  json["decision"] = within <= *arguments.run.options.run.max_error_mm ? "accept" : "refuse";
+  json["reason"] =
+      within <= *arguments.run.options.run.max_error_mm ? Json(nullptr) : Json(code(Reason::uncertain));
   return json;
 }
 
@@ -64,6 +79,7 @@ void write_map(const localization::TreVolume& volume, const std::filesystem::pat
 
 }  // namespace
 
+/// Predicted error of a point picked in all views of a case, without picks.
 CommandResult predict_command(const PredictArguments& arguments, Console& console) {
   return guarded([&] {
     if (arguments.map) forget_files(*arguments.map, {"tre.csv", "tre.vtk", "tre.svg"});
@@ -73,15 +89,13 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
                                  arguments.step_mm, arguments.half_mm, most_points_per_edge));
     std::vector<Eigen::Vector3d> places;
     for (const std::string& word : arguments.at) places.push_back(place_from(word));
-    const pipeline::Case given = value_or_throw(pipeline::read_case(arguments.folder));
+    const pipeline::Case given = value_or_throw(pipeline::read_case(arguments.run.folder));
     if (given.views.size() < 2)
       throw BadInput(Reason::too_few_views,
                      "one view locates no point: the case needs a second view, of another direction");
     const Eigen::Vector3d middle = phantom::middle_of(given.calibrator);
     if (places.empty()) places.push_back(middle);
-    pipeline::RunOptions options;
-    options.threads = console.threads;
-    if (arguments.history) options.history = value_or_throw(calibration::read_history(*arguments.history));
+    const pipeline::RunOptions options = value_or_throw(options_of(arguments.run, console)).run;
     const auto calibrated = pipeline::calibrate_case(given, options);
     if (!calibrated) throw BadInput(calibrated.error().failure);
     const calibration::Calibration& calibration = *calibrated;
@@ -90,21 +104,20 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
     std::vector<Warning> notes;
     for (const Eigen::Vector3d& place : places) {
       points.push_back(prediction(place, calibration, arguments));
-      notes.push_back(
-          localization::unobservable_motion(fmt::format("{:g},{:g},{:g}", place.x(), place.y(), place.z()),
-                                            place, calibration.views.front(), arguments.motion_sigma_mm));
+      notes.push_back(localization::unobservable_motion(
+          fmt::format("{:g},{:g},{:g}", place.x(), place.y(), place.z()), place, calibration.views.front(),
+          arguments.run.options.run.motion_sigma_mm));
     }
-    if (!console.quiet)
-      for (const Warning& warning : calibrated->warnings)
-        console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
+    print_warnings(calibrated->warnings, console);
     if (arguments.map)
       write_map(localization::predict_tre(calibration, middle, arguments.half_mm, arguments.step_mm,
-                                          arguments.sigma_px, console.threads, arguments.motion_sigma_mm),
+                                          arguments.sigma_px, console.threads,
+                                          arguments.run.options.run.motion_sigma_mm),
                 *arguments.map);
     if (console.json) {
       console.out << to_text(Json{{"sigma_px", arguments.sigma_px},
-                                  {"motion_sigma_mm", arguments.motion_sigma_mm},
-                                  {"max_error_mm", arguments.max_error_mm},
+                                  {"motion_sigma_mm", arguments.run.options.run.motion_sigma_mm},
+                                  {"max_error_mm", *arguments.run.options.run.max_error_mm},
                                   {"warnings", pipeline::json_list_of(calibrated->warnings)},
                                   {"notes", pipeline::json_list_of(notes)},
                                   {"points", points}})
@@ -125,6 +138,27 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
     if (arguments.map && !console.quiet)
       console.out << fmt::format("\n  map written to {}\n", arguments.map->string());
   });
+}
+
+void add_predict(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, group::measure, "predict", "Predict the error of a point before it is picked",
+                  "helicarm predict my-case --at 0,0,40 --at 60,0,40 --map tre");
+  auto& a = arguments_of(command, action, predict_command);
+  command->add_option("CASE", a.run.folder, "Folder that holds case.json")->required();
+  command->add_option("--at", a.at,
+                      "x,y,z in the calibrator's frame, mm; repeatable (default: the calibrator's centre)");
+  command->add_option("--sigma-px", a.sigma_px, "Standard deviation of a picked point, per axis, px")
+      ->check(within(0, 100))
+      ->capture_default_str();
+  add_run_options(command, a.run, "The C-arm's history (JSON), read only");
+  command->add_option("--map", a.map, "Folder for a map about the calibrator: tre.csv, tre.vtk, tre.svg");
+  command->add_option("--half", a.half_mm, "Half the side of the map, mm")
+      ->check(within(1, 1000))
+      ->capture_default_str();
+  command->add_option("--step", a.step_mm, "Spacing of the map's points, mm")
+      ->check(within(0.5, 100))
+      ->capture_default_str();
 }
 
 }  // namespace helicarm::cli

@@ -1,15 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "receive_command.h"
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "command_line.h"
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
 #include "helicarm/devices/receiver/image_registry.h"
+#include "helicarm/devices/receiver/receiver.h"
+#include "helicarm/devices/receiver/receiver_fields.h"
 #include "helicarm/pipeline/result.h"
 #include "stop_signal.h"
 
 namespace helicarm::cli {
+
+struct ReceiveArguments {
+  std::filesystem::path out = "inbox";
+  receiver::ReceiverOptions receiver;
+  std::vector<std::string> report_peers;                ///< TITLE=ADDRESS:PORT
+  std::filesystem::path certificate, key, authorities;  ///< all or none
+  std::filesystem::path watch;                          ///< empty: listen
+  std::optional<std::uint64_t> count;
+  std::optional<double> seconds;
+};
+
 namespace {
 
 /// Prints images as they arrive, from any thread.
@@ -69,6 +86,7 @@ void check_titles(const receiver::dicom::NegotiationOptions& options) {
 
 }  // namespace
 
+/// Prints one line (or one line of JSON) for each image until stopped.
 CommandResult receive_command(const ReceiveArguments& arguments, Console& console) {
   return guarded([&] {
     receiver::ReceiverOptions options = arguments.receiver;
@@ -99,6 +117,46 @@ CommandResult receive_command(const ReceiveArguments& arguments, Console& consol
     }
     stop.wait(arguments.seconds);
   });
+}
+
+void add_receive(CLI::App& app, Action& action) {
+  auto* command = add_command(app, group::operation, "receive",
+                              "Receive X-ray images from a C-arm by DICOM (C-STORE) or from a folder",
+                              "helicarm receive --out inbox\n"
+                              "  helicarm receive --out inbox --address 192.168.7.2 --peer C_ARM\n"
+                              "  helicarm receive --out inbox --watch /mnt/c-arm");
+  auto& a = arguments_of(command, action, receive_command);
+  command->add_option("--out", a.out, "Folder for the images; one program at a time")->capture_default_str();
+  auto* address = command
+                      ->add_option("--address", a.receiver.address,
+                                   "Address to listen on; other than 127.0.0.1 opens the port to the network")
+                      ->capture_default_str();
+  add_fields(command, a.receiver, receiver::receiver_fields);
+  auto* port = command->get_option("--port");
+  auto* title =
+      command
+          ->add_option("--title", a.receiver.negotiation.title, "Application entity title of this receiver")
+          ->capture_default_str();
+  auto* peer = command->add_option("--peer", a.receiver.negotiation.peers,
+                                   "Title of a C-arm that may send; repeatable (default: any)");
+  auto* commitment =
+      command->add_option("--commitment", a.report_peers,
+                          "TITLE=ADDRESS:PORT: where this C-arm or archive listens for storage commitment "
+                          "reports; repeatable (default: on its own association)");
+  auto* certificate =
+      command->add_option("--tls-certificate", a.certificate,
+                          "PEM file of this receiver's certificate; only TLS connections are then accepted");
+  auto* key = command->add_option("--tls-key", a.key, "PEM file of the certificate's private key");
+  auto* authorities = command->add_option("--tls-authorities", a.authorities,
+                                          "PEM file of the authorities that sign the C-arms' certificates");
+  certificate->needs(key, authorities);
+  key->needs(certificate);
+  authorities->needs(certificate);
+  auto* watch =
+      command->add_option("--watch", a.watch, "Read images from this folder instead; its files are kept");
+  for (auto* of_network : {address, port, title, peer, commitment, certificate}) watch->excludes(of_network);
+  command->add_option("--count", a.count, "End after this number of images")->check(within(1, 1e9));
+  command->add_option("--seconds", a.seconds, "End after this time")->check(within(0, 1e9));
 }
 
 }  // namespace helicarm::cli

@@ -1,16 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "rectify_command.h"
-
+#include <filesystem>
 #include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "command_line.h"
 #include "distinct_names.h"
+#include "findings.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/image/png.h"
+#include "helicarm/pipeline/result.h"
 #include "helicarm/rectification/displacement_field.h"
+#include "helicarm/rectification/distortion_model.h"
 #include "helicarm/rectification/inpaint.h"
 #include "helicarm/rectification/paper_dots.h"
 #include "helicarm/rectification/rectified_dicom.h"
@@ -20,11 +26,28 @@
 #include "helicarm/xray/uid.h"
 #include "helicarm/xray/write_dicom.h"
 #include "image_files.h"
-#include "image_warnings.h"
 #include "named_files.h"
 #include "run_command.h"
 
 namespace helicarm::cli {
+
+/// One of: an image with a plate; images, points or an image of the test grid with a map.
+struct RectifyArguments {
+  std::vector<std::filesystem::path> images;  ///< with a map several, and folders of images
+  std::optional<int> frame;
+  std::optional<std::string> plate;  ///< plate.json or plate48
+  std::optional<std::filesystem::path> map;
+  std::optional<std::filesystem::path> points;  ///< CSV: u_px,v_px
+  std::optional<double> test_grid_mm;           ///< pitch of the grid of 3.1
+  std::filesystem::path out = "helicarm-rectified";
+  std::string method = "best";
+  std::optional<std::string> model;  ///< distortion model; nothing: automatic
+  bool inverse = false;              ///< points: rectified -> raw
+  bool stages = false;               ///< also the images of the paper's Fig. 2
+  bool field = false;                ///< also displacement.nrrd
+  bool keep_patient = false;         ///< written images stay with the patient and the study of theirs
+};
+
 namespace {
 
 void write(const std::filesystem::path& to, xray::DerivedImage image, const std::filesystem::path& source,
@@ -74,7 +97,7 @@ Json figures_of(const rectification::Rectification& r, const std::vector<Warning
           {"held_out_rms_px", r.map.held_out_rms_px},
           {"raw_mean_px", r.raw_mean_px},
           {"raw_max_px", r.raw_max_px},
-          {"warnings", json_of_warnings(warnings)}};
+          {"warnings", pipeline::json_list_of(warnings)}};
 }
 
 /// Fig. 2 a to e.
@@ -151,7 +174,8 @@ void map_images(const RectifyArguments& arguments, Console& console) {
       console.out << fmt::format("[{}/{}] {}\n", i + 1, files.size(), to.string());
   }
   if (console.json)
-    console.out << to_text(Json{{"written", std::move(written)}, {"warnings", json_of_warnings(warnings)}})
+    console.out << to_text(
+                       Json{{"written", std::move(written)}, {"warnings", pipeline::json_list_of(warnings)}})
                 << '\n';
 }
 
@@ -200,7 +224,7 @@ void measure_grid(const RectifyArguments& arguments, Console& console) {
                                 {"rectified", json_of(grid.rectified)},
                                 {"n", grid.crosses},
                                 {"crossings", crossings_of(grid)},
-                                {"warnings", json_of_warnings(image.warnings)}})
+                                {"warnings", pipeline::json_list_of(image.warnings)}})
                 << '\n';
   else
     console.out << fmt::format(
@@ -238,6 +262,9 @@ void forget(const RectifyArguments& arguments) {
 
 }  // namespace
 
+/// Fits the distortion of an image and writes rectified.dcm, map.json and residuals.csv; or applies a map to
+/// images (rectified.dcm, of several NAME_rectified.dcm) or points; or measures the residual errors of a map
+/// on the test grid (Eq. 14-15).
 CommandResult rectify_command(const RectifyArguments& arguments, Console& console) {
   return guarded([&] {
     const RectifyArguments& a = arguments;
@@ -257,6 +284,46 @@ CommandResult rectify_command(const RectifyArguments& arguments, Console& consol
                    "rectify: give IMAGE --plate, or IMAGE... --map, or --map --points, or IMAGE --map "
                    "--test-grid (see --help)");
   });
+}
+
+void add_rectify(CLI::App& app, Action& action) {
+  auto* command = add_command(app, group::images, "rectify",
+                              "Correct an intensifier's distortion by its plate, or apply a known map (2.1)",
+                              "helicarm rectify AP.dcm --plate plate48 --out rectified\n"
+                              "  helicarm rectify series/ --map rectified/map.json --out straight\n"
+                              "  helicarm rectify --map rectified/map.json --points raw.csv --json\n"
+                              "  helicarm rectify GRID.dcm --map rectified/map.json --test-grid 20 --json");
+  auto& a = arguments_of(command, action, rectify_command);
+  command->add_option("IMAGE", a.images,
+                      "DICOM, PNG, TIFF, JPEG or BMP; with --map several, and folders of images");
+  command->add_option("--frame", a.frame, "Number of the image in a multi-frame file, from 1")
+      ->check(within(1, 100000));
+  command->add_option("--plate", a.plate, "plate.json, or plate48");
+  command->add_option("--map", a.map, "map.json of an earlier rectification");
+  command->add_option("--points", a.points, "CSV: u_px,v_px, raw pixels");
+  command->add_flag("--inverse", a.inverse, "The points are rectified pixels; return raw ones");
+  command->add_option("--test-grid", a.test_grid_mm, "Pitch of the test grid, mm: report Eq. 14-15")
+      ->check(within(0.1, 1000));
+  command
+      ->add_option("--out", a.out,
+                   "Folder for rectified.dcm (of several images NAME_rectified.dcm), inpainted.dcm, "
+                   "map.json and residuals.csv")
+      ->capture_default_str();
+  command->add_flag("--field", a.field,
+                    "Also displacement.nrrd: the map as displacement field of ITK and 3D Slicer");
+  command->add_flag("--keep-patient", a.keep_patient,
+                    "Written images keep the patient and the study of theirs, to be stored with it (default: "
+                    "neither name nor dates nor UIDs)");
+  command->add_option("--method", a.method, "best, or paper: Hough circles and a quadratic")
+      ->type_name("WORD")
+      ->capture_default_str();
+  command
+      ->add_option("--model", a.model,
+                   "Distortion model, with --method best: " + rectification::model_names() +
+                       " (default: by the number of dots and their held-out errors)")
+      ->type_name("WORD");
+  command->add_flag("--stages", a.stages,
+                    "With --method paper: also the paper's Fig. 2, stage-raw.png to stage-inpainted.png");
 }
 
 }  // namespace helicarm::cli

@@ -1,17 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "register_command.h"
-
+#include <filesystem>
 #include <sstream>
+#include <string>
 
 #include <fmt/format.h>
 
+#include "command_line.h"
+#include "findings.h"
 #include "helicarm/case_registration/follow_case.h"
+#include "helicarm/case_registration/register_fields.h"
 #include "helicarm/core/json.h"
 #include "helicarm/pipeline/registration_case.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/earlier_results.h"
 #include "progress_line.h"
+#include "run_command.h"
 
 namespace helicarm::cli {
+
+/// `helicarm register CASE --out DIR [--frames A-B[:STEP]]`.
+struct RegisterArguments {
+  RunArguments run = {.folder = {}, .out = "registration"};  ///< the C-arm's history is only read
+  std::string frames;                                        ///< A-B[:STEP]; empty: one image per view
+};
+
 namespace {
 
 using case_registration::RegisteredModel;
@@ -49,9 +61,7 @@ void follow(const RegisterArguments& arguments, const case_registration::Registe
   ProgressLine progress(console);
   const auto sequence = value_or_throw(case_registration::follow_case(
       given, range, options, [&](double share) { progress.notify(share); }, steps));
-  if (!console.quiet)
-    for (const Warning& warning : sequence.warnings)
-      console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
+  print_warnings(sequence.warnings, console);
   if (sequence.failure) throw BadInput(*sequence.failure);
   value_or_throw(case_registration::write_sequence(sequence, arguments.run.out));
   Json summary = {
@@ -97,11 +107,11 @@ CommandResult register_command(const RegisterArguments& arguments, Console& cons
     const auto given = value_or_throw(pipeline::read_registration_case(arguments.run.folder));
     const auto result = value_or_throw(case_registration::register_case(given, options, progress));
     value_or_throw(case_registration::write_registration(result, arguments.run.out));
-    if (!console.quiet)
-      for (const RegisteredModel& model : result.models)
-        for (const Warning& warning : model.registration.warnings)
-          console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason),
-                                          warning.message);
+    print_warnings(result.warnings, console);
+    for (const RegisteredModel& model : result.models) {
+      print_warnings(model.registration.warnings, console);
+      print_notes(model.registration.notes, console);
+    }
     if (console.json && !result.refused())
       console.out << to_text(case_registration::to_json(result)) << '\n';
     else if (!console.quiet && !console.json) {
@@ -111,6 +121,30 @@ CommandResult register_command(const RegisterArguments& arguments, Console& cons
     for (const RegisteredModel& model : result.models)
       if (model.registration.failure) throw BadInput(*model.registration.failure);
   });
+}
+
+void add_register(CLI::App& app, Action& action) {
+  auto* command = add_command(app, group::motion, "register",
+                              "Register CT volumes and surfaces of bones or implants to the views of a case",
+                              "helicarm register my-case --out my-registration\n\n"
+                              "case.json holds \"models\": a CT (\"volume\", with \"mask\" or \"window_hu\") "
+                              "or a closed surface (\"surface\",\n"
+                              "STL, PLY or VTP), a \"start\" (a pose, landmarks, or none) and a \"plan\" (3D "
+                              "Slicer's markups). The views are\n"
+                              "calibrated by the program, or bring cameras: \"camera\": \"camera.json\" as "
+                              "helicarm import --json prints it.\n"
+                              "Exit code 3: a registration is refused; registration.json holds the figures. "
+                              "See docs/registration.md.");
+  auto& a = arguments_of(command, action, register_command);
+  command->add_option("CASE", a.run.folder, "Folder that holds case.json")->required();
+  command->add_option("--out", a.run.out, "Folder for registration.json, report.html and the overlays")
+      ->capture_default_str();
+  add_run_options(command, a.run, "The C-arm's history (JSON), read only");
+  add_fields(command, a.run.options.search, case_registration::search_fields);
+  command->add_option("--frames", a.frames,
+                      "Follow the models through the frames A-B[:STEP] of files with several frames, or of "
+                      "numbered files (\"image\": \"ap_{frame:03d}.tif\"); writes registration.csv and "
+                      "relative.csv");
 }
 
 }  // namespace helicarm::cli

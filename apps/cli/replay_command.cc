@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "replay_command.h"
+#include <filesystem>
 
 #include <fmt/format.h>
 
+#include "command_line.h"
 #include "helicarm/core/json.h"
 #include "helicarm/operation/replay.h"
 
 namespace helicarm::cli {
+
+struct ReplayArguments {
+  std::filesystem::path session;
+};
+
 namespace {
 
 std::string end_of(const operation::ReplayReport& report) {
@@ -16,6 +22,7 @@ std::string end_of(const operation::ReplayReport& report) {
 
 }  // namespace
 
+/// Recomputes an operation from its record and reports differences.
 CommandResult replay_command(const ReplayArguments& arguments, Console& console) {
   return guarded([&] {
     const operation::ReplayReport report = value_or_throw(operation::replay(arguments.session));
@@ -57,6 +64,14 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
                                  arguments.session.string()));
     if (!console.json) console.out << "all recorded values are reproduced bit for bit\n";
   });
+}
+
+void add_replay(CLI::App& app, Action& action) {
+  auto* command = add_command(app, group::operation, "replay",
+                              "Recompute an operation from its record and compare bit for bit",
+                              "helicarm replay operate/case-1");
+  auto& a = arguments_of(command, action, replay_command);
+  command->add_option("SESSION", a.session, "Folder that holds session.log")->required();
 }
 
 }  // namespace helicarm::cli

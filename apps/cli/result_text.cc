@@ -1,26 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "result_text.h"
 
-#include <map>
-
 #include <fmt/format.h>
 
 #include "helicarm/pipeline/diagnosis/advice.h"
 #include "helicarm/report/tables.h"
 
 namespace helicarm::cli {
-
-void print_findings(const pipeline::Result& result, std::ostream& out) {
-  for (const Warning& warning : result.warnings)
-    out << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,
-                       warning.view.empty() ? "" : ": ", warning.message);
-  std::map<Reason, std::size_t> more;
-  for (const Warning& note : result.notes) ++more[note.reason];
-  for (const Warning& note : result.notes)
-    if (const auto of_kind = more.extract(note.reason))
-      out << fmt::format("helicarm: note: {}: {}{}\n", code(note.reason), note.message,
-                         of_kind.mapped() > 1 ? fmt::format(" (and {} more)", of_kind.mapped() - 1) : "");
-}
 
 void print_advice(const pipeline::Result& result, const std::string& report, std::ostream& out) {
   const pipeline::Advice advice = pipeline::advice_for(result);

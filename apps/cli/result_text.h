@@ -8,9 +8,6 @@
 
 namespace helicarm::cli {
 
-/// Warnings, then notes: each kind once, with the number of further ones.
-void print_findings(const pipeline::Result& result, std::ostream& out);
-
 /// Likely causes of a refusal, and where to look. `report`: where it is, if it was written; may be empty.
 void print_advice(const pipeline::Result& result, const std::string& report, std::ostream& out);
 

@@ -1,19 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "robot_command.h"
-
 #include <algorithm>
 #include <limits>
 #include <mutex>
+#include <optional>
 
 #include <fmt/format.h>
 
+#include "command_line.h"
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
+#include "helicarm/devices/robot/robot_driver.h"
 #include "helicarm/devices/robot/robot_registry.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "stop_signal.h"
 
 namespace helicarm::cli {
+
+struct RobotWatchArguments {
+  robot::RobotAddress robot = {.rate_hz = 10, .reads_only = true};
+  std::optional<double> seconds;  ///< empty: until interrupted
+};
+
 namespace {
 
 /// What the client's thread has received.
@@ -45,6 +52,7 @@ std::string line_of(Received& received) {
 
 }  // namespace
 
+/// Prints a robot's state. It reads only: nothing is written to the robot, which another program may command.
 CommandResult robot_watch_command(const RobotWatchArguments& arguments, Console& console) {
   return guarded([&] {
     StopSignal interrupt;
@@ -88,6 +96,23 @@ CommandResult robot_watch_command(const RobotWatchArguments& arguments, Console&
       console.out << fmt::format("controller {}, {} states\n{}\n", words_of(*received.version),
                                  received.states, line_of(received));
   });
+}
+
+void add_robot(CLI::App& app, Action& action) {
+  auto* robot =
+      add_command(app, group::operation, "robot", "Watch a robot's state (RTDE); nothing is written to it",
+                  "helicarm robot watch 192.168.7.5\n"
+                  "  helicarm robot watch --seconds 2 --json");
+  robot->require_subcommand(1);
+  auto* watch = robot->add_subcommand("watch", "Print the robot's modes, pose and whether it may move");
+  auto& a = arguments_of(watch, action, robot_watch_command);
+  watch->add_option("ADDRESS", a.robot.address, "Numeric address of the robot")->capture_default_str();
+  add_port(watch, "--port", a.robot.rtde_port, "Port of RTDE");
+  watch->add_option("--rate", a.robot.rate_hz, "Requested states per second")
+      ->check(within(1, 500))
+      ->capture_default_str();
+  watch->add_option("--seconds", a.seconds, "End after this time, s; default: when interrupted")
+      ->check(within(0, 1e6));
 }
 
 }  // namespace helicarm::cli

@@ -6,12 +6,15 @@
 
 #include <fmt/format.h>
 
+#include "command_line.h"
 #include "distinct_names.h"
+#include "helicarm/case_registration/register_fields.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/pipeline/result.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/earlier_results.h"
 
 namespace helicarm::cli {
@@ -150,6 +153,26 @@ CommandResult run_cases_command(const RunCasesArguments& arguments, Console& con
   RunArguments run = arguments.run;
   run.folder = arguments.cases.front();
   return run_command(run, console);
+}
+
+void add_run(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, group::measure, "run",
+      "Measure a case: cameras with covariances from X-ray images, and from two or more points and tunnels",
+      "helicarm run my-case --out my-result\n"
+      "  helicarm run study/* --out results    each case in results/NAME, all in results/summary.csv");
+  auto& [cases, a] = arguments_of(command, action, run_cases_command);
+  command->add_option("CASE", cases, "Folder that holds case.json; several are run one after the other")
+      ->required();
+  command
+      ->add_option("--out", a.out,
+                   "Folder for result.json, report.html and the overlays; with several cases for a folder of "
+                   "each and summary.csv")
+      ->capture_default_str();
+  add_run_options(command, a,
+                  "The C-arm's history (JSON): used as prior; this case's acquisitions are added");
+  add_fields(command, a.options.search, case_registration::search_fields);
+  command->add_flag("--no-report", a.no_report, "Write result.json only");
 }
 
 }  // namespace helicarm::cli

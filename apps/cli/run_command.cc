@@ -5,8 +5,11 @@
 
 #include <fmt/format.h>
 
+#include "findings.h"
 #include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/pipeline/map_cache.h"
 #include "helicarm/pipeline/registration_case.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/earlier_results.h"
 #include "result_files.h"
 #include "result_text.h"
@@ -47,6 +50,16 @@ Expected<Measurement> measurement_of(const std::filesystem::path& folder,
 
 }  // namespace
 
+void add_run_options(CLI::App* command, RunArguments& arguments, const char* machine_help) {
+  add_fields(command, arguments.options.run, pipeline::run_fields);
+  command->add_option("--machine", arguments.history, machine_help);
+  auto* cache = command->add_option("--cache", arguments.cache,
+                                    "Folder that keeps the distortion maps of plate images (default: "
+                                    "helicarm in the user's cache folder)");
+  command->add_flag("--no-cache", arguments.no_cache, "Fit the maps of plate images anew, and keep none")
+      ->excludes(cache);
+}
+
 Expected<std::optional<calibration::CArmHistory>> history_at(
     const std::optional<std::filesystem::path>& path) {
   if (!path) return std::optional<calibration::CArmHistory>();
@@ -65,6 +78,8 @@ Expected<case_registration::RegisterOptions> options_of(const RunArguments& argu
     case_registration::RegisterOptions options = arguments.options;
     options.run.threads = console.threads;
     options.run.history = std::move(history);
+    if (!arguments.no_cache)
+      options.run.cache = arguments.cache ? arguments.cache : pipeline::user_cache_folder();
     return options;
   });
 }
@@ -80,7 +95,8 @@ Expected<Measurement> measure(const RunArguments& arguments, Console& console) {
         return measurement_of(arguments.folder, options, progress);
       })
       .map([&](Measurement measured) {
-        if (!console.quiet) print_findings(measured.result, console.progress);
+        print_warnings(measured.result.warnings, console);
+        print_notes(measured.result.notes, console);
         return measured;
       });
 }

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "command.h"
+#include "command_line.h"
 #include "helicarm/case_registration/measure_case.h"
 
 namespace helicarm::cli {
@@ -16,7 +16,12 @@ struct RunArguments {
   case_registration::RegisterOptions options = {};  ///< threads and C-arm history are filled in
   bool no_report = false;  ///< only result.json, and registration.json with its report
   std::optional<std::filesystem::path> history = {};  ///< the C-arm's history: read and extended
+  std::optional<std::filesystem::path> cache = {};    ///< of plate images' maps; nothing: the user's
+  bool no_cache = false;
 };
+
+/// `run_fields`, --machine, --cache and --no-cache.
+void add_run_options(CLI::App* command, RunArguments& arguments, const char* machine_help);
 
 /// Measures a case and writes result.json, report.html and NAME_overlay.png; of a case with models also
 /// `case_registration::write_models`. A refusal also writes them and then fails with its reason; unusable

@@ -1,16 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "simulate_command.h"
-
 #include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "command_line.h"
 #include "helicarm/simulation/write_case.h"
 #include "helicarm/volume/read_volume.h"
 #include "named_files.h"
 
 namespace helicarm::cli {
+
+/// `helicarm simulate DIR`: a case with known ground truth from `console.seed`.
+struct SimulateArguments {
+  std::filesystem::path folder;
+  std::string kind = "accuracy";  ///< accuracy, tunnels, flat or grid
+  std::string preset;             ///< paper-sim, ii-9in or flat-panel; empty: by kind
+  int size = 1024;                ///< 512 or 1024 pixels per side
+  int bits = 12;                  ///< 8, 10, 12, 14 or 16
+  bool knee = true;
+  std::string calibrator;                 ///< a built-in or a file; empty: udcsc with check targets
+  std::string plate;                      ///< a built-in or a file; empty: plate48
+  std::string response;                   ///< linear or log; empty: log with the knee
+  std::vector<std::string> views;         ///< NAME:PRIMARY,SECONDARY (deg); none: AP and LAT
+  std::optional<std::uint64_t> arm_seed;  ///< none: the seed
+  std::filesystem::path ct;               ///< a CT volume instead of the synthetic knee
+  std::vector<double> ct_centre_mm;       ///< three numbers or none
+  std::vector<double> ct_turn_deg;
+  /// decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL for a missing ball
+  std::vector<std::string> faults;
+  std::vector<double> distances_mm;  ///< kind grid: from the receiver to the wires; none: 45 mm
+};
+
 namespace {
 
 using simulation::Visibility;
@@ -141,6 +167,80 @@ CommandResult simulate_command(const SimulateArguments& arguments, Console& cons
     console.out << fmt::format("  {}{}truth.json\n", grid ? "" : "case.json, calibrator.json, ",
                                simulated.plate ? "plate.json, " : "");
   });
+}
+
+void add_simulate(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, group::studies, "simulate",
+                  "Simulate a case with known ground truth: X-ray images of a knee with the calibrator",
+                  "helicarm simulate my-case --kind tunnels --seed 7\n"
+                  "  helicarm simulate my-case --calibrator my-phantom.json --plate my-plate.json");
+  auto& a = arguments_of(command, action, simulate_command);
+  command->add_option("DIR", a.folder, "Folder for the case and truth.json")->required();
+  command
+      ->add_option("--kind", a.kind,
+                   "accuracy: AP and lateral image, five check targets\n"
+                   "tunnels: balls at the tunnels' ends, tracker and tool\n"
+                   "flat: as accuracy, on a flat panel\n"
+                   "grid: the test grid of wires (3.1), for rectify --test-grid")
+      ->type_name("WORD")
+      ->capture_default_str();
+  command
+      ->add_option("--distance", a.distances_mm,
+                   "grid: distance of the wires from the receiver, mm; one value gives GRID.dcm (default: "
+                   "45), 30,60,90 give GRID-30.dcm and so on")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(within(20, 500));
+  command
+      ->add_option(
+          "--preset", a.preset,
+          "The C-arm; pixel sizes are those of images with 1024 px per side\n"
+          "paper-sim: the paper's simulation (2.3.3): f 900 mm, 0.15 mm pixels, AP and lateral at 800 mm, "
+          "no distortion, no plate\n"
+          "ii-9in: 9 inch intensifier, 997 mm, 0.2295 mm: plate, distortion, sag (default)\n"
+          "flat-panel: 1020 mm, 0.29 mm: sag, no distortion (default of kind flat)")
+      ->type_name("WORD");
+  command->add_option("--size", a.size, "Pixels per side: 512 or 1024")->capture_default_str();
+  command->add_option("--bits", a.bits, "Stored bits: 8, 10, 12, 14 or 16")->capture_default_str();
+  command->add_flag_callback(
+      "--no-knee", [&a] { a.knee = false; }, "Without the knee");
+  command->add_option(
+      "--calibrator", a.calibrator,
+      "calibrator.json instead of udcsc and its check targets; the C-arm turns about its balls' "
+      "centroid, z along the knee");
+  command->add_option("--plate", a.plate,
+                      "plate.json instead of plate48; a lattice without dots fills the field");
+  command
+      ->add_option("--response", a.response,
+                   "Response of the grey values: linear or log (default: log with the knee, else linear)")
+      ->type_name("WORD");
+  command
+      ->add_option("--view", a.views,
+                   "NAME:PRIMARY,SECONDARY, degrees; repeatable, 2 to 20 (grid: one). AP:0,0 has the source "
+                   "below the knee, LAT:90,0 beside it (default: these two, approximately)")
+      ->allow_extra_args(false);
+  command->add_option("--arm-seed", a.arm_seed, "Seed of the C-arm (default: the seed)")
+      ->check(within(0, 1e19));
+  command->add_option("--ct", a.ct,
+                      "A CT instead of the synthetic knee: MHA, NRRD, NIfTI or a folder of DICOM slices");
+  command
+      ->add_option("--ct-centre", a.ct_centre_mm,
+                   "x,y,z (L, P, S; mm) of the CT at the knee's origin; default: its centre")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(within(-1e5, 1e5));
+  command
+      ->add_option("--ct-turn", a.ct_turn_deg,
+                   "x,y,z: rotation of the CT about the knee's distal, lateral and anterior axis, degrees")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(within(-360, 360));
+  command
+      ->add_option(
+          "--fault", a.faults,
+          "decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL; repeatable")
+      ->type_name("WORD");
 }
 
 }  // namespace helicarm::cli

@@ -9,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "command_line.h"
+#include "findings.h"
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/json.h"
@@ -142,13 +144,23 @@ CommandResult solve_command(const SolveArguments& arguments, Console& console) {
   if (!solution) return tl::unexpected<Failure>(solution.error());
   const double rms_px = geometry::reprojection_rms(solution->view, pairs);
   const auto warnings = warnings_of(*solution, rms_px, *points);
-  for (const Warning& warning : warnings)
-    console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
+  print_warnings(warnings, console);
   if (console.json)
     console.out << to_text(json_of(*solution, rms_px, warnings)) << '\n';
   else
     print_table(*solution, rms_px, *points, console.out);
   return {};
+}
+
+void add_solve(CLI::App& app, Action& action) {
+  auto* command = add_command(app, group::images, "solve",
+                              "Calibrate one view from known 3-D points and their pixels (Eq. 4-7)",
+                              "helicarm solve --points points.csv --method ml --json");
+  auto& a = arguments_of(command, action, solve_command);
+  command->add_option("--points", a.points, "CSV: label,x_mm,y_mm,z_mm,u_px,v_px[,sigma_px]")->required();
+  command->add_option("--method", a.method, "dlt, homogeneous or ml")
+      ->type_name("WORD")
+      ->capture_default_str();
 }
 
 }  // namespace helicarm::cli

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "study_command.h"
-
 #include <algorithm>
 #include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "command_line.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
@@ -24,6 +27,27 @@
 #include "progress_line.h"
 
 namespace helicarm::cli {
+
+/// Omitted options take the study's defaults.
+struct StudyArguments {
+  /// number, uniformity, location, biplane, biplane-images, calibration, rectification, design, limit or
+  /// centres
+  std::string name;
+  std::optional<std::size_t> groups;
+  std::filesystem::path out = "helicarm-study";
+  bool resume = false;
+  std::vector<int> balls;
+  std::vector<std::string> sigmas;
+  std::vector<std::string> readings;
+  std::optional<double> fle;
+  std::string origin;
+  std::optional<int> draws;
+  std::string calibrator;
+  std::string surface;
+  study::BiplaneOptions biplane;               ///< of biplane_fields
+  study::CalibrationStudyOptions calibration;  ///< of calibration_fields
+};
+
 namespace {
 
 /// Context of a study besides its own options.
@@ -201,6 +225,8 @@ const KnownStudy& study_named(const std::string& name) {
 
 }  // namespace
 
+/// Runs a simulated experiment and writes NAME.csv, NAME.json and NAME.svg. The same seed gives the same
+/// bytes, whatever the number of threads and ranks.
 CommandResult study_command(const StudyArguments& arguments, Console& console) {
   return guarded([&] {
     const KnownStudy& study = study_named(arguments.name);
@@ -238,6 +264,65 @@ CommandResult study_command(const StudyArguments& arguments, Console& console) {
     else if (!console.quiet)
       console.out << files.summary << fmt::format("\n  written to {}\n", out.string());
   });
+}
+
+void add_study(CLI::App& app, Action& action) {
+  auto* command = add_command(app, group::studies, "study",
+                              "The paper's simulations, and the estimators against the Cramer-Rao bound",
+                              "helicarm study number --out number\n"
+                              "  helicarm study location --calibrator udcsc --out location\n"
+                              "  helicarm study limit --groups 10000 --seed 1 --out limit");
+  auto& a = arguments_of(command, action, study_command);
+  command
+      ->add_option("NAME", a.name,
+                   "number: FRE and TRE by number of balls (Fig. 5)\n"
+                   "uniformity: E(A) against TRE (Fig. 6)\n"
+                   "location: TRE by position of the target (Fig. 7)\n"
+                   "biplane: the cone against plates on the receiver (Table 1)\n"
+                   "biplane-images: the plates from images; leaves biplane-case, a case for run (Table 1)\n"
+                   "calibration: ten simulated tests, measured (Table 1, Fig. 14)\n"
+                   "rectification: the test grid at ten distances, by ten intensifiers (Figs. 9 to 11)\n"
+                   "design: ball positions of least TRE under the rules\n"
+                   "limit: error over the Cramer-Rao bound, and coverage of the confidence regions\n"
+                   "centres: errors of ball centres under wrong assumptions about the image")
+      ->type_name("WORD")
+      ->required();
+  command
+      ->add_option("--groups", a.groups,
+                   "Number of trials per setting; centres: number of balls per situation")
+      ->check(within(1, 1e6));
+  command->add_option("--out", a.out, "Folder for NAME.csv, NAME.json and NAME.svg")->capture_default_str();
+  command->add_flag("--resume", a.resume, "Continue an interrupted run that wrote to the same folder");
+  command
+      ->add_option("--balls", a.balls,
+                   "Number of balls; study number takes several, as 6,7,8; uniformity, design and biplane "
+                   "(default 8) take one")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(within(6, 64));
+  command
+      ->add_option("--sigma", a.sigmas,
+                   "Interpretation of N(0, 2.34): std, var, mean_distance, rms_distance; study number takes "
+                   "several (default: all)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command
+      ->add_option("--reading", a.readings,
+                   "number: back-projected pixels: calibration_pixels, fresh_noise, exact (default: all)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("--fle", a.fle, "Value instead of 2.34")->check(within(0, 1000));
+  command
+      ->add_option("--origin", a.origin,
+                   "Origin of the world frame on the cone's axis: base (as published) or centre")
+      ->type_name("WORD");
+  command->add_option("--draws", a.draws, "uniformity: noise draws to average over")->check(within(1, 1e5));
+  command->add_option("--surface", a.surface, "design: balls on the helix, the cone or a dome")
+      ->type_name("WORD");
+  command->add_option("--calibrator", a.calibrator,
+                      "location: name of a built-in or a file (default: random balls)");
+  add_fields(command, a.biplane, study::biplane_fields);
+  add_fields(command, a.calibration, study::calibration_fields);
 }
 
 }  // namespace helicarm::cli

@@ -10,12 +10,14 @@
 
 #include <fmt/format.h>
 
+#include "command_line.h"
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/devices/tracker/sequence_stream.h"
 #include "helicarm/devices/tracker/tracker_registry.h"
 #include "helicarm/geometry/view_json.h"
+#include "mount_command.h"
 #include "stop_signal.h"
 
 namespace helicarm::cli {
@@ -196,6 +198,60 @@ CommandResult tracker_pivot_command(const TrackerPivotArguments& arguments, Cons
                                pivot->outliers);
   }
   return {};
+}
+
+namespace {
+
+void add_tracker_link(CLI::App* command, TrackerLinkArguments& a) {
+  command->add_option("PEER", a.peer, "address:port of an OpenIGTLink server, or file:PATH of a recording")
+      ->required();
+  command->add_option("--seconds", a.seconds, "End after this time, s; default: when interrupted")
+      ->check(within(0, 1e6));
+  command->add_option("--rate", a.tracker.rate_hz, "Rate to request, Hz; default: 60")
+      ->check(within(1, 1000));
+  command->add_flag("--ask,!--no-ask", a.tracker.ask_for_tracking,
+                    "Request tracking (STT_TDATA), which some servers require (default)");
+}
+
+}  // namespace
+
+void add_tracker(CLI::App& app, Action& action) {
+  auto* tracker = add_command(
+      app, group::operation, "tracker",
+      "Watch, record or play a tracker (OpenIGTLink); calibrate pointer and mount",
+      "helicarm tracker watch 127.0.0.1:18944\n"
+      "  helicarm tracker record 127.0.0.1:18944 poses.mha --seconds 20\n"
+      "  helicarm tracker replay poses.mha --port 18944\n"
+      "  helicarm tracker pivot poses.mha --tool PointerToTracker\n"
+      "  helicarm tracker calibrate-mount 127.0.0.1:18944 --facet calibrator --tip tip.json --touch "
+      "P1,P1,P1,P4,P4,P4,P8,P8,P8,P11,P11,P11");
+  tracker->require_subcommand(1);
+  auto* watch = tracker->add_subcommand("watch", "Print the received poses of each tool");
+  add_tracker_link(watch, arguments_of(watch, action, tracker_watch_command));
+
+  auto* record = tracker->add_subcommand("record", "Record into a MetaImage sequence file");
+  auto& recorded = arguments_of(record, action, tracker_record_command);
+  add_tracker_link(record, recorded);
+  record->add_option("FILE", recorded.file, "The file to write")->required();
+
+  auto* replay = tracker->add_subcommand("replay", "Play a MetaImage sequence file as a tracker, repeatedly");
+  auto& replayed = arguments_of(replay, action, tracker_replay_command);
+  replay->add_option("FILE", replayed.file, "The file to play")->required();
+  add_port(replay, "--port", replayed.options.port, "Port to listen on; 0: any free port");
+  replay
+      ->add_option("--address", replayed.options.address,
+                   "Address to listen on; every host that reaches it may connect")
+      ->capture_default_str();
+  replay->add_option("--seconds", replayed.seconds, "End after this time, s; default: when interrupted")
+      ->check(within(0, 1e6));
+  replay->add_flag("--tdata", replayed.as_tracking, "Send TDATA on request instead of TRANSFORM to all");
+
+  auto* pivot = tracker->add_subcommand(
+      "pivot", "Calibrate a pointer's tip from a recording of rotations about the tip");
+  auto& turned = arguments_of(pivot, action, tracker_pivot_command);
+  pivot->add_option("FILE", turned.file, "A MetaImage sequence file")->required();
+  pivot->add_option("--tool", turned.tool, "The pointer's name in the file")->required();
+  add_calibrate_mount(tracker, action);
 }
 
 }  // namespace helicarm::cli

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "virtual_or_command.h"
-
+#include <filesystem>
 #include <mutex>
 #include <numbers>
+#include <optional>
 #include <sstream>
 #include <thread>
 
@@ -10,13 +10,25 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "command_line.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/text.h"
 #include "helicarm/rehearsal/rehearse.h"
+#include "helicarm/virtual_devices/virtual_devices.h"
+#include "helicarm/virtual_devices/virtual_devices_fields.h"
 #include "line_input.h"
 #include "stop_signal.h"
 
 namespace helicarm::cli {
+
+struct VirtualOrArguments {
+  virtual_devices::VirtualDevicesOptions virtual_or;
+  virtual_devices::ImageReceiver receiver;
+  std::filesystem::path plan;  ///< written for `navigate`; empty: none
+  bool check_points = false;   ///< in the plan
+  std::optional<double> seconds;
+};
+
 namespace {
 
 using virtual_devices::VirtualDevices;
@@ -148,6 +160,8 @@ void listen(const std::stop_token& stop, VirtualDevices& virtual_or, const Virtu
 
 }  // namespace
 
+/// A virtual C-arm, tracker and robot on their ports; commands on standard input acquire images, move objects
+/// and inject faults.
 CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& console) {
   return guarded([&] {
     StopSignal end;
@@ -177,6 +191,32 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
         [&](const std::stop_token& stop) { listen(stop, *virtual_or, arguments, console, end); });
     end.wait(arguments.seconds);
   });
+}
+
+void add_virtual_or(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, group::operation, "virtual-or",
+                  "Virtual C-arm, tracker and robot on the protocols of the real ones",
+                  "helicarm virtual-or --plan plan.json\n"
+                  "  (then type: shoot AP, shoot LAT, fault hide:femur on, fault cut_cable on, where, quit)");
+  auto& a = arguments_of(command, action, virtual_or_command);
+  command->add_option("--plan", a.plan, "Write a plan for navigate, with simulated picks");
+  command->add_flag("--check-points", a.check_points, "The plan requires a check point on each bone");
+  command->add_flag(
+      "--freehand", a.virtual_or.freehand,
+      "A person holds the drill; there is no robot, and the plan is one for freehand navigation");
+  add_fields(command, a.virtual_or, virtual_devices::virtual_devices_fields);
+  add_port(command, "--tracker-port", a.virtual_or.tracker_port,
+           "Port of the tracker (OpenIGTLink); 0: a free port, as for the ports below");
+  add_port(command, "--rtde-port", a.virtual_or.rtde_port, "of the robot");
+  add_port(command, "--dashboard-port", a.virtual_or.dashboard_port, "of the robot");
+  add_port(command, "--script-port", a.virtual_or.script_port, "of the robot");
+  a.virtual_or.primary_port = 30001;
+  add_port(command, "--primary-port", a.virtual_or.primary_port, "of the robot");
+  add_port(command, "--receiver-port", a.receiver.port, "Port to which the C-arm sends its images");
+  command->add_option("--receiver-title", a.receiver.title, "Application entity title of the receiver")
+      ->capture_default_str();
+  command->add_option("--seconds", a.seconds, "End after this time")->check(within(0, 1e9));
 }
 
 }  // namespace helicarm::cli

@@ -34,9 +34,9 @@ case_registration::Measurement run(const std::filesystem::path& folder, const st
                                    std::optional<double> max_error_mm, double motion_sigma_mm,
                                    double search_mm, double search_deg, unsigned threads,
                                    const std::optional<std::filesystem::path>& history,
-                                   const py::object& progress) {
+                                   const py::object& cache, const py::object& progress) {
   const case_registration::RegisterOptions options = measuring_options(
-      "run_case", method, max_error_mm, motion_sigma_mm, search_mm, search_deg, threads, history);
+      "run_case", method, max_error_mm, motion_sigma_mm, search_mm, search_deg, threads, history, cache);
   if (history) value_or_raise(calibration::check_history_file(*history));
   const RunHooks hooks = run_hooks(progress);
   case_registration::Measurement measured = value_or_raise(without_gil([&] {
@@ -52,7 +52,7 @@ case_registration::Measurement run(const std::filesystem::path& folder, const st
 HeldCalibration calibration_of(const pipeline::Result& result) {
   HeldCalibration held;
   held.joint_covariance = result.joint_covariance;
-  held.warnings = result.warnings;
+  held.warnings.assign(result.warnings.begin(), result.warnings.end());
   for (const pipeline::ViewResult& view : result.views) {
     if (!view.calibrated || !view.rectification || !view.found)
       raise({result.failure ? result.failure->reason : Reason::too_few_fiducials,
@@ -282,14 +282,16 @@ void add_cases(py::module_& module) {
       py::arg("method") = std::string(pipeline::method_words[std::size_t(usual.method)]),
       py::arg("max_error_mm") = usual.max_error_mm, py::arg("motion_sigma_mm") = usual.motion_sigma_mm,
       py::arg("search_mm") = searched.search.shift_mm, py::arg("search_deg") = searched.search.turn_deg,
-      py::arg("threads") = usual.threads, py::arg("history") = py::none(), py::arg("progress") = py::none(),
+      py::arg("threads") = usual.threads, py::arg("history") = py::none(), py::arg("cache") = true,
+      py::arg("progress") = py::none(),
       R"(Measures a case: X-ray images to cameras, and of two or more to points with confidence regions, tunnels and diagnostics, as
 `helicarm run` does; a case's models are registered too.
 
 folder: holds case.json. method: best, or paper. max_error_mm: refuse (uncertain) where a point, or a point of a model
 or of its plan, may be off by more (95 %). motion_sigma_mm: standard deviation per axis of the motion of an untracked
 bone or model between the acquisitions. search_mm, search_deg: about each model's start, per axis. history: a C-arm's history
-file, which serves as prior and to which this case is added unless it is refused; made where there is none. progress:
+file, which serves as prior and to which this case is added unless it is refused; made where there is none. cache: a
+folder that keeps the distortion maps of plate images, True for the user's cache folder, False for none. progress:
 called with the name of each stage (read, rectify, detect, label, calibrate, locate) before it begins; an exception
 from it ends the run, and Ctrl-C does between two views. Releases the GIL. Returns a Result.
 Raises InputError; RefusedError with .result, which holds all that was computed until then.)");

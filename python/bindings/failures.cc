@@ -12,12 +12,6 @@ py::dict warning_dict(const Warning& warning) {
   return dict;
 }
 
-py::list warning_list(const std::vector<Warning>& warnings) {
-  py::list list;
-  for (const Warning& warning : warnings) list.append(warning_dict(warning));
-  return list;
-}
-
 void raise(const Failure& failure, const py::object& result) {
   const py::object type = py::module_::import("helicarm.errors")
                               .attr(exit_code(failure.reason) == 2 ? "InputError" : "RefusedError");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <ranges>
 #include <utility>
 #include <vector>
 
@@ -36,7 +37,12 @@ auto without_gil(Work&& work) {
 
 /// {"code", "message", "view", "figures"} as in result.json.
 py::dict warning_dict(const Warning& warning);
-py::list warning_list(const std::vector<Warning>& warnings);
+template <std::ranges::range Warnings>
+py::list warning_list(const Warnings& warnings) {
+  py::list list;
+  for (const Warning& warning : warnings) list.append(warning_dict(warning));
+  return list;
+}
 
 /// JSON as Python's own dicts and lists, and back.
 py::object python_from(const Json& json);

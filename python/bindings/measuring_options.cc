@@ -3,6 +3,7 @@
 
 #include "checks.h"
 #include "helicarm/case_registration/register_fields.h"
+#include "helicarm/pipeline/map_cache.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "options.h"
 
@@ -12,7 +13,8 @@ case_registration::RegisterOptions measuring_options(const char* function, const
                                                      std::optional<double> max_error_mm,
                                                      double motion_sigma_mm, double search_mm,
                                                      double search_deg, unsigned threads,
-                                                     const std::optional<std::filesystem::path>& history) {
+                                                     const std::optional<std::filesystem::path>& history,
+                                                     const py::object& cache) {
   case_registration::RegisterOptions options;
   options.run.method = method_of(method);
   for (const auto& field : pipeline::run_fields) {
@@ -26,6 +28,10 @@ case_registration::RegisterOptions measuring_options(const char* function, const
   for (const auto& field : case_registration::search_fields)
     field.set(options.search, checked(field.name == "search_mm" ? search_mm : search_deg, within(field.range),
                                       std::string(field.name)));
+  if (py::isinstance<py::bool_>(cache))
+    options.run.cache = cache.cast<bool>() ? pipeline::user_cache_folder() : std::nullopt;
+  else
+    options.run.cache = cache.cast<std::filesystem::path>();
   if (history) options.run.history = value_or_raise(calibration::history_at(*history));
   return options;
 }

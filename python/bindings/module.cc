@@ -14,6 +14,7 @@ PYBIND11_MODULE(_helicarm, module) {
   add_measures(module);
   add_cases(module);
   add_registration(module);
+  add_c_arm(module);
   add_phantom_calibration(module);
 }
 

@@ -23,6 +23,8 @@ void add_measures(py::module_& module);
 void add_cases(py::module_& module);
 /// register, register_sequence.
 void add_registration(py::module_& module);
+/// check_c_arm, c_arm_report.
+void add_c_arm(py::module_& module);
 /// measure_phantom, MeasuredPhantom, verify_phantom.
 void add_phantom_calibration(py::module_& module);
 

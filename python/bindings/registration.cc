@@ -21,9 +21,10 @@ py::object register_models(const std::filesystem::path& folder,
                            const std::optional<std::filesystem::path>& out, const std::string& method,
                            std::optional<double> max_error_mm, double motion_sigma_mm, double search_mm,
                            double search_deg, unsigned threads,
-                           const std::optional<std::filesystem::path>& history, const py::object& progress) {
+                           const std::optional<std::filesystem::path>& history, const py::object& cache,
+                           const py::object& progress) {
   const auto options = measuring_options("register", method, max_error_mm, motion_sigma_mm, search_mm,
-                                         search_deg, threads, history);
+                                         search_deg, threads, history, cache);
   const RunHooks hooks = run_hooks(progress);
   const auto result = value_or_raise(without_gil([&] {
     return pipeline::read_registration_case(folder)
@@ -119,10 +120,10 @@ py::object register_sequence(const std::filesystem::path& folder, const Frames& 
                              const std::optional<std::filesystem::path>& out, const std::string& method,
                              std::optional<double> max_error_mm, double motion_sigma_mm, double search_mm,
                              double search_deg, unsigned threads,
-                             const std::optional<std::filesystem::path>& history,
+                             const std::optional<std::filesystem::path>& history, const py::object& cache,
                              const py::object& progress) {
   const auto options = measuring_options("register_sequence", method, max_error_mm, motion_sigma_mm,
-                                         search_mm, search_deg, threads, history);
+                                         search_mm, search_deg, threads, history, cache);
   const auto range = frames_from(frames);
   const RunHooks hooks = run_hooks(py::none());
   const auto on_frame = [&](double share) {
@@ -167,7 +168,7 @@ void add_registration(py::module_& module) {
       py::arg("method") = std::string(pipeline::method_words[std::size_t(defaults.run.method)]),
       py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
       py::arg("search_mm") = defaults.search.shift_mm, py::arg("search_deg") = defaults.search.turn_deg,
-      py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(),
+      py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(), py::arg("cache") = true,
       py::arg("progress") = py::none(),
       "Register the CT volumes and surfaces of a case (\"models\" of its case.json) to its views, as\n"
       "`helicarm register` does.\n\n"
@@ -189,7 +190,7 @@ void add_registration(py::module_& module) {
       py::arg("method") = std::string(pipeline::method_words[std::size_t(defaults.run.method)]),
       py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
       py::arg("search_mm") = defaults.search.shift_mm, py::arg("search_deg") = defaults.search.turn_deg,
-      py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(),
+      py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(), py::arg("cache") = true,
       py::arg("progress") = py::none(),
       "Follow the models of a case through a sequence of images, as `helicarm register --frames` does.\n\n"
       "frames: \"A-B[:STEP]\" or a range. Returns frames (N numbers), models (for each: name, "

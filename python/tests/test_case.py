@@ -214,6 +214,25 @@ def test_history_is_made_and_added_to_once(case, tmp_path):
     assert json.loads(history.read_text())["shots"] == entries
 
 
+def test_c_arm_that_has_changed_is_refused(case, tmp_path):
+    record = tmp_path / "arm.json"
+    for seed in (11, 12, 13):
+        helicarm.simulate_case(tmp_path / str(seed), seed=seed, size=512)
+        helicarm.run_case(tmp_path / str(seed), history=record)
+    report = helicarm.c_arm_report(record, out=tmp_path / "report")
+    assert len(report["acquisitions"]) == 6
+    assert (tmp_path / "report" / "report.html").exists()
+    shots = json.loads(record.read_text())
+    for shot in shots["shots"]:
+        shot["estimate_mm"][1] += 60  # as if the receiver had been moved since
+    moved = tmp_path / "moved.json"
+    moved.write_text(json.dumps(shots))
+    with pytest.raises(helicarm.RefusedError) as error:
+        helicarm.check_c_arm(moved, case[0])
+    assert error.value.code == "c_arm_changed"
+    assert error.value.result["chi2"] > error.value.result["limit"]
+
+
 def test_motion_enlarges_the_covariance(tmp_path):
     helicarm.simulate_case(tmp_path, seed=3, size=512, kind="tunnels")
     given = json.loads((tmp_path / "case.json").read_text())

@@ -21,37 +21,27 @@ QString doubts(const std::vector<Warning>& warnings) {
   return warnings.size() == 1 ? first : tr("%1 (and %2 more)").arg(first).arg(warnings.size() - 1);
 }
 
-bool contains(const std::vector<Warning>& warnings, const Warning& wanted) {
-  return std::ranges::any_of(warnings, [&](const Warning& one) {
-    return one.reason == wanted.reason && one.message == wanted.message;
-  });
-}
-
-/// The step that a warning of the result concerns: the stage that gave it, or the one that its reason names.
-Phase phase_of_warning(const Warning& warning, const pipeline::Result& result) {
-  for (const pipeline::ViewResult& view : result.views) {
-    if (view.xray_image && contains(view.xray_image->warnings, warning)) return Phase::acquire;
-    if (view.rectification && contains(view.rectification->warnings, warning)) return Phase::rectify;
-  }
-  switch (warning.reason) {
-    case Reason::tag_disagrees:
-    case Reason::uid_reused:
+Phase phase_of(pipeline::Stage stage) {
+  switch (stage) {
+    case pipeline::Stage::read:
       return Phase::acquire;
-    case Reason::residual_distortion:
+    case pipeline::Stage::rectify:
       return Phase::rectify;
-    case Reason::pick_on_fiducial:
-    case Reason::bone_taken_as_fixed:
-    case Reason::uncertain:
+    case pipeline::Stage::label:
+    case pipeline::Stage::calibrate:
+      return Phase::calibrate;
+    case pipeline::Stage::locate:
       return Phase::plan;
-    default:
-      return warning.figures.contains("ray_gap_mm") ? Phase::plan : Phase::calibrate;
+    case pipeline::Stage::registration:
+      return Phase::registration;
   }
+  return Phase::acquire;
 }
 
 std::vector<Warning> warnings_of(const ApplicationState& state, Phase phase) {
   std::vector<Warning> of_it;
-  for (const Warning& warning : state.result->warnings)
-    if (phase_of_warning(warning, *state.result) == phase) of_it.push_back(warning);
+  for (const pipeline::Finding& warning : state.result->warnings)
+    if (phase_of(warning.stage) == phase) of_it.push_back(warning);
   return of_it;
 }
 

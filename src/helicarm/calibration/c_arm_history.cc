@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 
 #include <Eigen/LU>
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include "helicarm/calibration/c_arm_history_file.h"
@@ -22,6 +24,7 @@ constexpr double prior_weight = 4;
 constexpr int rounds = 50;
 constexpr double least_information = 1e-9;  // 1 / mm^2
 constexpr std::size_t most_entries = 10000;
+constexpr Range tolerance_range_mm{0, 100};
 
 Vector3d squares(double focal, double principal) {
   return {focal * focal, principal * principal, principal * principal};
@@ -33,11 +36,18 @@ double variance(double first, double observed, double n) {
 
 Json row(const Vector3d& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
+std::string today() { return fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))); }
+
 HistoryEntry entry_from(JsonReader& reader) {
   const auto estimate = reader.numbers("estimate_mm", 3, {-1e4, 1e4});
   const auto information = reader.matrix("information_per_mm2", 3, 3, {-1e12, 1e12});
-  HistoryEntry entry{reader.text("picture"), reader.text("view"), Vector3d(estimate.data()),
-                     Matrix3d(information.data())};
+  HistoryEntry entry{reader.text("picture"),
+                     reader.text("view"),
+                     Vector3d(estimate.data()),
+                     Matrix3d(information.data()),
+                     reader.optional_number("primary_deg", {-360, 360}),
+                     reader.optional_number("secondary_deg", {-360, 360}),
+                     reader.optional_text("date").value_or("")};
   reader.finish();
   const double lowest = geometry::symmetric_eigen(entry.information).values[0];
   if (!(lowest > 0) || !entry.information.isApprox(entry.information.transpose(), 1e-9))
@@ -148,7 +158,9 @@ Expected<HistoryGrowth> add_to_history(const std::filesystem::path& path,
     value_or_throw(check_history_file(path));
     const FileLock lock = value_or_throw(FileLock::of(path));
     CArmHistory history = value_or_throw(history_at(lock.file()));
-    HistoryGrowth growth{history.entries.size(), add_entries(history, entries)};
+    std::vector<HistoryEntry> dated(entries.begin(), entries.end());
+    for (HistoryEntry& entry : dated) entry.date = today();
+    HistoryGrowth growth{history.entries.size(), add_entries(history, dated)};
     if (history.entries.size() > most_entries)
       throw BadInput(Reason::cannot_write,
                      fmt::format("{}: holds {} acquisitions, limit {}: begin a new file", path.string(),
@@ -171,20 +183,33 @@ Expected<CArmHistory> history_from_json(const Json& json, const std::string& ori
     CArmHistory history;
     for (JsonReader& entry : reader.objects("shots", true, most_entries))
       history.entries.push_back(entry_from(entry));
+    if (!reader.raw("tolerances").is_null()) {
+      JsonReader stated = reader.object("tolerances");
+      history.tolerances = {stated.optional_number("focal_mm", tolerance_range_mm).value_or(0),
+                            stated.optional_number("principal_mm", tolerance_range_mm).value_or(0)};
+      stated.finish();
+    }
     reader.finish();
     return history;
   });
 }
 
 Json to_json(const CArmHistory& history) {
-  Json json{{"format", "helicarm-machine/1"}, {"shots", Json::array()}};
+  Json json{{"format", "helicarm-machine/1"},
+            {"tolerances",
+             {{"focal_mm", history.tolerances.focal_mm}, {"principal_mm", history.tolerances.principal_mm}}},
+            {"shots", Json::array()}};
+  const auto number = [](const std::optional<double>& angle) { return angle ? Json(*angle) : Json(); };
   for (const HistoryEntry& entry : history.entries)
     json["shots"].push_back(
         {{"picture", entry.image},
          {"view", entry.view},
          {"estimate_mm", row(entry.estimate_mm)},
          {"information_per_mm2", Json::array({row(entry.information.col(0)), row(entry.information.col(1)),
-                                              row(entry.information.col(2))})}});
+                                              row(entry.information.col(2))})},
+         {"primary_deg", number(entry.primary_deg)},
+         {"secondary_deg", number(entry.secondary_deg)},
+         {"date", entry.date.empty() ? Json() : Json(entry.date)}});
   return json;
 }
 

@@ -21,11 +21,20 @@ struct HistoryEntry {
   std::string view;
   Eigen::Vector3d estimate_mm;
   Eigen::Matrix3d information;  ///< inverse covariance, 1 / mm^2
+  std::optional<double> primary_deg = {},
+                        secondary_deg = {};  ///< positioner angles, if the image states them
+  std::string date = {};                     ///< UTC, on which it was added: 2026-11-26
+};
+
+/// Differences from what the history predicts that are no change of the C-arm, mm.
+struct CArmTolerances {
+  double focal_mm = 0, principal_mm = 0;
 };
 
 /// A C-arm's history.
 struct CArmHistory {
   std::vector<HistoryEntry> entries;
+  CArmTolerances tolerances = {};
 };
 
 /// Prior of the next views from a history: mean, and variation about it.

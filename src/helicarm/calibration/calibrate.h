@@ -53,8 +53,10 @@ struct CalibrationResult : Calibration {
   double variance_scale = 1;  ///< covariance inflation where chi2 is inconsistent with the fiducials' sigmas
   /// Of the fiducials' coordinates per axis, estimated where the residuals require more than the file's.
   double found_tolerance_mm = 0;
-  double strain_sigma = 0;        ///< relative, of the calibrator's least observable strain; 0: not known
-  double ball_rms_mm = 0;         ///< of the fiducials' estimated offsets from the file; 0: taken as exact
+  double strain_sigma = 0;  ///< relative, of the calibrator's least observable strain; 0: not known
+  double ball_rms_mm = 0;   ///< of the fiducials' estimated offsets from the file; 0: taken as exact
+  /// Strain, offsets beyond the stated tolerance, or diameters are significant: a warning says which.
+  bool contradicts_calibrator = false;
   std::vector<Warning> warnings;  ///< few_fiducials, residual_too_large (inconsistent sigmas),
                                   ///< calibrator_strained, calibrator_deviates
   std::vector<Warning> notes;     ///< calibrator_deviates, within the stated tolerance

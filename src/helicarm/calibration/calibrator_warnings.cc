@@ -19,6 +19,7 @@ void warn_of_strain(CalibrationResult& result, const CleanFit& clean) {
   result.strain_sigma = strain.sigma;
   const double left = std::max(1.0, (clean.fit.chi2 - strain.chi2_gain) / (clean.fit.dof - 5));
   if (strain.chi2_gain / left < chi2_at_3_sigma) return;
+  result.contradicts_calibrator = true;
   result.warnings.push_back(
       {Reason::calibrator_strained,
        fmt::format(
@@ -46,7 +47,9 @@ void report_offsets(CalibrationResult& result, const CleanFit& clean) {
       {},
       {{"rms_mm", result.ball_rms_mm}}};
   if (result.found_tolerance_mm > 0) deviation.figures["tolerance_found_mm"] = result.found_tolerance_mm;
-  (result.found_tolerance_mm > 0 ? result.warnings : result.notes).push_back(std::move(deviation));
+  const bool beyond = result.found_tolerance_mm > 0;
+  result.contradicts_calibrator |= beyond;
+  (beyond ? result.warnings : result.notes).push_back(std::move(deviation));
 }
 
 }  // namespace helicarm::calibration

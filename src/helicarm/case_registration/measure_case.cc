@@ -9,8 +9,8 @@
 namespace helicarm::case_registration {
 namespace {
 
-void append(std::vector<Warning>& findings, const std::vector<Warning>& more) {
-  findings.insert(findings.end(), more.begin(), more.end());
+void append(std::vector<pipeline::Finding>& findings, const std::vector<Warning>& more) {
+  for (const Warning& warning : more) findings.push_back({warning, pipeline::Stage::registration});
 }
 
 /// The plan of a model, its tunnels' ends counted among all models' points.

@@ -71,6 +71,7 @@ constexpr ReasonEntry entries[] = {
     {Reason::too_few_views, "too_few_views", refused},
     {Reason::distances_disagree, "distances_disagree", refused},
     {Reason::phantom_changed, "phantom_changed", refused},
+    {Reason::c_arm_changed, "c_arm_changed", refused},
     {Reason::unequal_pixels, "unequal_pixels", refused},
     {Reason::name_differs, "name_differs", refused},
     {Reason::bone_taken_as_fixed, "bone_taken_as_fixed", refused},

@@ -72,6 +72,7 @@ enum class Reason {
   too_few_views,
   distances_disagree,
   phantom_changed,
+  c_arm_changed,
   unequal_pixels,
   // Warnings only.
   name_differs,

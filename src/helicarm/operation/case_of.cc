@@ -161,9 +161,7 @@ Expected<void> check_digests(const fs::path& folder, const Digests& files) {
 
 Expected<pipeline::Measurement> measure_case(const pipeline::Case& given, const OperationPlan& plan,
                                              const std::optional<pipeline::Measurement>& earlier) {
-  pipeline::RunOptions options;
-  options.max_error_mm = plan.max_error_mm;
-  return pipeline::measure_again(earlier, given, options);
+  return pipeline::measure_again(earlier, given, run_options(plan));
 }
 
 Json without_timing(Json result) {

@@ -12,6 +12,7 @@
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/plan_fields.h"
 #include "helicarm/pipeline/poses_json.h"
+#include "helicarm/pipeline/run_fields.h"
 
 namespace helicarm::operation {
 namespace {
@@ -237,6 +238,15 @@ Expected<std::vector<pipeline::Pick>> picks_of(const OperationPlan& plan, const 
   return pipeline::picks_from(picks, origin, views, plan.bones);
 }
 
+pipeline::RunOptions run_options(const OperationPlan& plan) {
+  pipeline::RunOptions options;
+  options.method = plan.method;
+  options.max_error_mm = plan.max_error_mm;
+  options.motion_sigma_mm = plan.motion_sigma_mm;
+  options.history = plan.history;
+  return options;
+}
+
 Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(json, origin);
@@ -276,6 +286,12 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
       if (reader.has(key)) *number = planned_number(reader, key);
       reader.raw(key);
     }
+    if (reader.has("method"))
+      plan.method = static_cast<rectification::Method>(
+          reader.choice("method", {pipeline::method_words[0], pipeline::method_words[1]}));
+    if (reader.has("motion_sigma_mm")) plan.motion_sigma_mm = planned_number(reader, "motion_sigma_mm");
+    if (const Json& history = reader.raw("machine"); !history.is_null())
+      plan.history = value_or_throw(calibration::history_from_json(history, origin + ": machine"));
     reader.finish();
     return plan;
   });
@@ -306,6 +322,9 @@ Json to_json(const OperationPlan& plan) {
           {"check_points", std::move(check_points)},
           {"picks", std::move(picks)},
           {"max_error_mm", plan.max_error_mm},
+          {"method", pipeline::method_words[std::size_t(plan.method)]},
+          {"motion_sigma_mm", plan.motion_sigma_mm},
+          {"machine", plan.history ? calibration::to_json(*plan.history) : Json()},
           {"plan_stale_mm", plan.limits.distance_mm},
           {"plan_stale_deg", plan.limits.turn_deg},
           {"plan_stale_s", plan.limits.age_s}};

@@ -8,12 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "helicarm/calibration/c_arm_history.h"
 #include "helicarm/core/json.h"
 #include "helicarm/devices/robot/plan_approach.h"
 #include "helicarm/devices/tracker/check_point.h"
 #include "helicarm/devices/tracker/facets.h"
 #include "helicarm/guidance/poses.h"
 #include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm::operation {
 
@@ -103,8 +105,14 @@ struct OperationPlan {
   std::vector<PlannedCheck> check_points;
   std::vector<pipeline::Pick> picks;  ///< may be set after the acquisition
   double max_error_mm = 2;            ///< limit of a point's 95 % error for robot motion
+  rectification::Method method = rectification::Method::best;
+  double motion_sigma_mm = 0;                       ///< as pipeline::RunOptions::motion_sigma_mm
+  std::optional<calibration::CArmHistory> history;  ///< of the C-arm, used as prior
   PlanLimits limits;
 };
+
+/// Of the plan's measurements.
+pipeline::RunOptions run_options(const OperationPlan& plan);
 
 /// Strict; fails as JsonReader and `picks_of`, and with name_clash for two tunnels or facets of one name.
 Expected<OperationPlan> plan_from(const Json& json, const std::string& origin);

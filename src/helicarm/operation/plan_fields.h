@@ -9,12 +9,19 @@
 namespace helicarm::operation {
 
 /// The plan's numbers that a user may set; the limits of plan.json.
-inline constexpr std::array<Field<OperationPlan>, 13> plan_fields{
+inline constexpr std::array<Field<OperationPlan>, 14> plan_fields{
     bound<&OperationPlan::max_error_mm>({.name = "max_error_mm",
                                          .label = "Limit of a point's error",
                                          .unit = "mm",
                                          .range = {1e-6, 1000},
                                          .help = "The robot uses no point with a larger 95 % error"}),
+    bound<&OperationPlan::motion_sigma_mm>(
+        {.name = "motion_sigma_mm",
+         .label = "Motion of an untracked bone",
+         .unit = "mm",
+         .range = {0, 100},
+         .help =
+             "Standard deviation per axis of the motion of a bone without poses between the acquisitions"}),
     bound<&OperationPlan::limits, &PlanLimits::distance_mm>(
         {.name = "plan_stale_mm",
          .label = "Motion since planning",

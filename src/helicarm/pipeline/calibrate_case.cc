@@ -42,9 +42,12 @@ std::vector<calibration::HistoryEntry> new_entries(const CaseCalibration& calibr
   for (std::size_t i = 0; i < calibration.images.size(); ++i) {
     calibration::ViewFiducials view = fiducials_of(calibration.images[i]);
     view.fiducials = calibration.fiducials[i];
-    if (const auto entry = calibration::history_entry_of(
-            view, calibration.images[i].xray_image->acquisition.instance_key, common))
-      entries.push_back(*entry);
+    const xray::Acquisition& acquisition = calibration.images[i].xray_image->acquisition;
+    if (auto entry = calibration::history_entry_of(view, acquisition.instance_key, common)) {
+      entry->primary_deg = acquisition.primary_angle_deg;
+      entry->secondary_deg = acquisition.secondary_angle_deg;
+      entries.push_back(*std::move(entry));
+    }
   }
   return entries;
 }

@@ -13,10 +13,11 @@
 namespace helicarm::pipeline {
 namespace {
 
-void append(std::vector<Warning>& warnings, const std::vector<Warning>& more, const std::string& view = {}) {
+void append(std::vector<Finding>& findings, const std::vector<Warning>& more, Stage stage,
+            const std::string& view = {}) {
   for (Warning warning : more) {
     if (warning.view.empty()) warning.view = view;
-    warnings.push_back(std::move(warning));
+    findings.push_back({std::move(warning), stage});
   }
 }
 
@@ -30,16 +31,21 @@ std::vector<Warning> notes_of(const std::vector<ViewResult>& views) {
   return notes;
 }
 
-/// Warnings of reading, rectification and labelling.
-std::vector<Warning> warnings_of(const std::vector<ViewResult>& views) {
-  std::vector<Warning> warnings;
+/// Of reading, rectification and labelling.
+void append_warnings(std::vector<Finding>& warnings, const std::vector<ViewResult>& views) {
   for (const ViewResult& view : views) {
-    if (view.xray_image) append(warnings, view.xray_image->warnings, view.name);
+    if (view.xray_image) append(warnings, view.xray_image->warnings, Stage::read, view.name);
     std::erase_if(warnings, is_note);
-    if (view.rectification) append(warnings, view.rectification->warnings, view.name);
-    if (view.found) append(warnings, view.found->warnings, view.name);
+    if (view.rectification) append(warnings, view.rectification->warnings, Stage::rectify, view.name);
+    if (view.found) append(warnings, view.found->warnings, Stage::label, view.name);
   }
-  return warnings;
+}
+
+/// Distortion that the calibration finds was left by the rectification.
+void append_warnings(std::vector<Finding>& warnings, const calibration::CalibrationResult& calibration) {
+  for (const Warning& warning : calibration.warnings)
+    warnings.push_back(
+        {warning, warning.reason == Reason::residual_distortion ? Stage::rectify : Stage::calibrate});
 }
 
 Result initial_result(const Case& given, const RunOptions& options, std::vector<ViewResult> views) {
@@ -50,11 +56,11 @@ Result initial_result(const Case& given, const RunOptions& options, std::vector<
                        given.calibrator.measured, given.calibrator.balls};
   result.views = std::move(views);
   result.tool_lines = given.tool_lines;
-  result.warnings = given.warnings;
-  append(result.warnings, warnings_of(result.views));
-  append(result.notes, notes_of(result.views));
-  append(result.warnings, reused_uids(result.views));
-  append(result.warnings, exchanged_views(result.views));
+  append(result.warnings, given.warnings, Stage::read);
+  append_warnings(result.warnings, result.views);
+  append(result.notes, notes_of(result.views), Stage::read);
+  append(result.warnings, reused_uids(result.views), Stage::read);
+  append(result.warnings, exchanged_views(result.views), Stage::read);
   return result;
 }
 
@@ -66,8 +72,8 @@ Result initial_result(const Case& given, const CaseCalibration& calibration, con
     views[i].calibrated = calibration.views[i];
   }
   Result result = initial_result(given, options, std::move(views));
-  append(result.warnings, calibration.warnings);
-  append(result.notes, calibration.notes);
+  append_warnings(result.warnings, calibration);
+  append(result.notes, calibration.notes, Stage::calibrate);
   result.joint_covariance = calibration.joint_covariance;
   result.history = calibration.history;
   result.entries = calibration.entries;
@@ -98,31 +104,33 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
   const auto located = timed(result.timing_ms.locate, [&] {
     return observe_points(given, calibration, options.threads).map([&](std::vector<PointResult> points) {
       append(result.warnings,
-             locate_points(given, calibration, points, options.motion_sigma_mm));  // Eq. 8, Eq. 16
-      append(result.warnings, picks_on_fiducials(given, calibration, points));
-      append(result.notes, note_motion(given, calibration, points, options.motion_sigma_mm));
+             locate_points(given, calibration, points, options.motion_sigma_mm),  // Eq. 8, Eq. 16
+             Stage::locate);
+      append(result.warnings, picks_on_fiducials(given, calibration, points), Stage::locate);
+      append(result.notes, note_motion(given, calibration, points, options.motion_sigma_mm), Stage::locate);
       result.points = std::move(points);
     });
   });
   if (!located) return tl::unexpected<Failure>(located.error());
   result.accuracy = measure_accuracy(given.calibrator, calibration, result.points);  // Eq. 10-12
-  append(result.warnings, diagnose(given, result));
-  append(result.notes, handedness_notes(calibration));
-  append(result.notes, one_view_notes(calibration));
-  append(result.notes, scale_notes(given, calibration, result.points));
+  append(result.warnings, diagnose(given, result), Stage::calibrate);
+  append(result.notes, handedness_notes(calibration), Stage::label);
+  append(result.notes, one_view_notes(calibration), Stage::calibrate);
+  append(result.notes, scale_notes(given, calibration, result.points), Stage::calibrate);
   result.tunnel_ends = tunnel_ends(given.tunnels, result.points);
-  const auto done =
-      check_picks_agree(result)
-          .and_then([&] { return plan_tunnels(given, result); })  // Eq. 16
-          .and_then([&](std::vector<guidance::Tunnel> tunnels) {
-            result.tunnels = std::move(tunnels);
-            return verify_tool_lines(given, calibration.views, result);  // Eq. 17
-          })
-          .and_then([&](std::vector<guidance::Verification> verifications) {
-            result.verifications = std::move(verifications);
-            return check_certain(result.points, options.max_error_mm, given.calibrator);
-          })
-          .map([&](const std::vector<Warning>& warnings) { append(result.warnings, warnings); });
+  const auto done = check_picks_agree(result.points, calibration)
+                        .and_then([&] { return plan_tunnels(given, result); })  // Eq. 16
+                        .and_then([&](std::vector<guidance::Tunnel> tunnels) {
+                          result.tunnels = std::move(tunnels);
+                          return verify_tool_lines(given, calibration.views, result);  // Eq. 17
+                        })
+                        .and_then([&](std::vector<guidance::Verification> verifications) {
+                          result.verifications = std::move(verifications);
+                          return check_certain(result.points, options.max_error_mm, given.calibrator);
+                        })
+                        .map([&](const std::vector<Warning>& warnings) {
+                          append(result.warnings, warnings, Stage::locate);
+                        });
   if (!done) result.failure = done.error();
   return result;
 }

@@ -71,7 +71,7 @@ TEST_F(SimulatedNavigation, TunnelsAreMeasuredWithinTheirConfidenceRegions) {
   EXPECT_TRUE(result->timing_ms.total);
 }
 
-const Warning* find_reason(const std::vector<Warning>& warnings, Reason reason) {
+const Finding* find_reason(const std::vector<Finding>& warnings, Reason reason) {
   const auto found = std::ranges::find(warnings, reason, &Warning::reason);
   return found == warnings.end() ? nullptr : &*found;
 }

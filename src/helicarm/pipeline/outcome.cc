@@ -95,20 +95,17 @@ Expected<std::vector<guidance::Verification>> verify_tool_lines(
   });
 }
 
-Expected<void> check_picks_agree(const Result& result) {
+Expected<void> check_picks_agree(const std::vector<PointResult>& points,
+                                 const calibration::CalibrationResult& calibration) {
   constexpr std::size_t least_picks = 2;
-  const bool deviates = std::ranges::any_of(result.warnings, [](const Warning& warning) {
-    return warning.reason == Reason::calibrator_deviates || warning.reason == Reason::calibrator_strained ||
-           warning.reason == Reason::scale_disagrees;
-  });
   std::vector<double> gaps;
   std::size_t missed = 0;
-  for (const PointResult& point : result.points)
+  for (const PointResult& point : points)
     if (point.place && point.source == localization::PointSource::pick) {
       gaps.push_back(point.ray_gap_mm);
       missed += point.rays_miss;
     }
-  if (!deviates || gaps.size() < least_picks || missed < gaps.size()) return {};
+  if (!calibration.contradicts_calibrator || gaps.size() < least_picks || missed < gaps.size()) return {};
   const auto [least, largest] = std::ranges::minmax(gaps);
   return fail(
       Reason::calibrator_mismatch,

@@ -31,7 +31,8 @@ std::optional<double> tunnel_end_error_in_tool(const Result& result, const std::
 
 /// Refuses (calibrator_mismatch) where every one of two or more picked points contradicts the calibration,
 /// and the fiducials deviate from the calibrator's file: another calibrator, whose labels fit by chance.
-Expected<void> check_picks_agree(const Result& result);
+Expected<void> check_picks_agree(const std::vector<PointResult>& points,
+                                 const calibration::CalibrationResult& calibration);
 
 /// Different images with one SOP Instance UID (uid_reused).
 std::vector<Warning> reused_uids(const std::vector<ViewResult>& views);

@@ -333,12 +333,6 @@ Json json_of(const std::optional<calibration::LearnedIntrinsics>& history) {
 
 }  // namespace
 
-Json json_list_of(std::span<const Failure> failures) {
-  Json list = Json::array();
-  for (const Failure& failure : failures) list.push_back(to_json(failure));
-  return list;
-}
-
 Json to_json(const Result& result) {
   Json json = {{"format", "helicarm-result/1"}, {"status", result.failure ? "refused" : "ok"}};
   json["failure"] = result.failure ? to_json(*result.failure) : Json(nullptr);

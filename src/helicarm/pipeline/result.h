@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <optional>
-#include <span>
+#include <ranges>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,14 @@
 
 namespace helicarm::pipeline {
 
+/// The step of a measurement whose result a finding concerns.
+enum class Stage { read, rectify, label, calibrate, locate, registration };
+
+/// A warning or a note of a measurement.
+struct Finding : Warning {
+  Stage stage;
+};
+
 struct RunOptions {
   rectification::Method method = rectification::Method::best;
   std::optional<double>
@@ -33,6 +42,9 @@ struct RunOptions {
   std::optional<calibration::CArmHistory> history = {};  ///< C-arm history, used as prior
   /// Motion of an untracked bone between the acquisitions, per axis; in the covariance of its points.
   double motion_sigma_mm = 0;
+  /// Folder for the maps of plate images (`plate_image_map`), which changes no result; nothing: none are
+  /// kept.
+  std::optional<std::filesystem::path> cache = {};
 };
 
 /// Results of the stages for one view; absent if not reached.
@@ -97,8 +109,8 @@ struct CalibratorSource {
 struct Result {
   RunOptions options;
   std::optional<Failure> failure;
-  std::vector<Warning> warnings;
-  std::vector<Warning> notes;  ///< valid for all data of this kind
+  std::vector<Finding> warnings;
+  std::vector<Finding> notes;  ///< valid for all data of this kind
   CalibratorSource calibrator;
   std::vector<guidance::Bone> bones;  ///< of the case
   std::vector<ViewResult> views;
@@ -132,7 +144,12 @@ Json to_json(const guidance::Tunnel& tunnel);
 /// knee's bones also by their own keys, if the case has them.
 Json in_frames(const guidance::PointInFrames* place, const std::vector<guidance::Bone>& bones);
 
-/// A list of them.
-Json json_list_of(std::span<const Failure> failures);
+/// A list of failures, warnings or findings.
+template <std::ranges::range Failures>
+Json json_list_of(const Failures& failures) {
+  Json list = Json::array();
+  for (const Failure& failure : failures) list.push_back(to_json(failure));
+  return list;
+}
 
 }  // namespace helicarm::pipeline

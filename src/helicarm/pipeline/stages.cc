@@ -7,6 +7,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/parallel.h"
+#include "helicarm/pipeline/map_cache.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/intrinsics_prior.h"
 #include "helicarm/rectification/usable.h"
@@ -45,26 +46,21 @@ OrRefusal<std::vector<Next>> joined(std::vector<View> views, std::vector<Expecte
 
 Expected<rectification::DistortionMap> map_of(const xray::XrayImage& xray_image, const CaseView& from,
                                               const std::optional<phantom::Plate>& plate,
-                                              rectification::Method method) {
+                                              const RunOptions& options) {
   if (from.map)
     return read_json(*from.map).and_then([&](const Json& json) {
       return rectification::distortion_map_from_json(json, from.map->filename().string());
     });
-  if (from.plate_image)
-    return plate_image_of(from)
-        .and_then([&](const xray::XrayImage& apart) {
-          return rectification::rectify(apart, *plate, {method, {}});
-        })
-        .map([](const rectification::Rectification& apart) { return apart.map; });
+  if (from.plate_image) return plate_image_map(from, *plate, options.method, options.cache);
   return rectification::flat_panel_map(xray_image);
 }
 
 Expected<rectification::Rectification> rectify_view(const xray::XrayImage& xray_image, const CaseView& from,
                                                     const std::optional<phantom::Plate>& plate,
-                                                    rectification::Method method) {
+                                                    const RunOptions& options) {
   if (plate && !from.map && !from.plate_image)
-    return rectification::rectify(xray_image, *plate, {method, {}});
-  return map_of(xray_image, from, plate, method).and_then([&](const rectification::DistortionMap& map) {
+    return rectification::rectify(xray_image, *plate, {options.method, {}});
+  return map_of(xray_image, from, plate, options).and_then([&](const rectification::DistortionMap& map) {
     return rectification::with_map(xray_image, map, plate);
   });
 }
@@ -176,7 +172,7 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
 OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views, const Case& given,
                                                     const RunOptions& options, const Progress& progress) {
   auto rectified = of_each(views.size(), options, progress, [&](std::size_t i) {
-    return rectify_view(*views[i].xray_image, given.views[i], given.plate, options.method);
+    return rectify_view(*views[i].xray_image, given.views[i], given.plate, options);
   });
   return joined<RectifiedView>(std::move(views), std::move(rectified));
 }

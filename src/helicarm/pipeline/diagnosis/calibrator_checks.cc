@@ -159,6 +159,7 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
                calibration.ball_rms_mm, disagreement.message),
            {},
            disagreement.figures});
+    calibration.contradicts_calibrator = true;
     calibration.warnings.push_back(std::move(disagreement));
   }
   for (Warning& warning : displaced_balls(calibration, images, given.calibrator))

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "command_line.h"
+#include "findings.h"
+#include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/pipeline/c_arm.h"
+#include "helicarm/report/c_arm_report.h"
+
+namespace helicarm::cli {
+namespace {
+
+struct CArmAddArguments {
+  std::filesystem::path record;
+  std::vector<std::filesystem::path> cases;
+};
+
+struct CArmReportArguments {
+  std::filesystem::path record;
+  std::filesystem::path out = "c-arm-report";
+};
+
+struct CArmCheckArguments {
+  std::filesystem::path record;
+  std::filesystem::path folder;
+};
+
+std::vector<calibration::HistoryEntry> acquisitions_of(const std::filesystem::path& folder,
+                                                       Console& console) {
+  const pipeline::Case given = value_or_throw(pipeline::read_case(folder));
+  auto measured = value_or_throw(pipeline::c_arm_acquisitions(given, console.threads));
+  print_warnings(measured.warnings, console);
+  return std::move(measured.entries);
+}
+
+CommandResult c_arm_add_command(const CArmAddArguments& arguments, Console& console) {
+  return guarded([&] {
+    value_or_throw(calibration::check_history_file(arguments.record));
+    Json added = Json::array();
+    for (const std::filesystem::path& folder : arguments.cases) {
+      const auto growth =
+          value_or_throw(calibration::add_to_history(arguments.record, acquisitions_of(folder, console)));
+      added.push_back({{"case", folder.string()}, {"earlier", growth.earlier}, {"added", growth.added}});
+      if (!console.json)
+        console.out << fmt::format("{}: {} acquisitions added to {}\n", folder.string(), growth.added,
+                                   growth.earlier);
+    }
+    if (console.json) console.out << to_text(Json{{"added", std::move(added)}}) << '\n';
+  });
+}
+
+CommandResult c_arm_report_command(const CArmReportArguments& arguments, Console& console) {
+  return guarded([&] {
+    const calibration::CArmModel model = value_or_throw(pipeline::model_of_record(
+        value_or_throw(calibration::read_history(arguments.record)), arguments.record.string()));
+    value_or_throw(report::write_c_arm_report(model, arguments.out));
+    if (console.json)
+      console.out << to_text(
+                         Json{{"focal_mm", {{"smooth", model.focal.smooth}, {"repeat", model.focal.repeat}}},
+                              {"principal_mm",
+                               {{"smooth", model.principal.smooth}, {"repeat", model.principal.repeat}}},
+                              {"acquisitions", report::c_arm_json(calibration::leave_one_out(model))}})
+                  << '\n';
+    else
+      console.out << fmt::format(
+          "{} acquisitions; source distance varies by {:.2f} mm over the positions and {:.2f} mm in one, "
+          "principal point by {:.2f} and {:.2f} mm; written to {}\n",
+          model.entries.size(), model.focal.smooth, model.focal.repeat, model.principal.smooth,
+          model.principal.repeat, arguments.out.string());
+  });
+}
+
+CommandResult c_arm_check_command(const CArmCheckArguments& arguments, Console& console) {
+  return guarded([&] {
+    const calibration::CArmHistory record = value_or_throw(calibration::read_history(arguments.record));
+    const calibration::CArmCheck check = value_or_throw(pipeline::check_against_record(
+        acquisitions_of(arguments.folder, console), record, arguments.record.string()));
+    const std::optional<Failure> change = pipeline::c_arm_change(check);
+    if (console.json) {
+      console.out << to_text(Json{{"status", change ? "refused" : "ok"},
+                                  {"failure", change ? pipeline::to_json(*change) : Json()},
+                                  {"chi2", check.chi2},
+                                  {"limit", check.limit},
+                                  {"acquisitions", report::c_arm_json(check.acquisitions)}})
+                  << '\n';
+      console.answered = true;
+    } else {
+      console.out << report::text_of(report::c_arm_table(check.acquisitions));
+    }
+    if (change) throw BadInput(*change);
+    if (!console.json)
+      console.out << fmt::format("\n  unchanged: chi-square {:.1f}, limit {:.1f}\n", check.chi2, check.limit);
+  });
+}
+
+}  // namespace
+
+void add_c_arm(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, group::images, "c-arm", "Record a C-arm over cases, report it, and see a change of it",
+                  "helicarm c-arm add arm-2.json monday tuesday\n"
+                  "  helicarm c-arm report arm-2.json --out arm-2\n"
+                  "  helicarm c-arm check arm-2.json wednesday\n\n"
+                  "The record is the file of `run --machine`: source distance and principal point of each "
+                  "acquisition with their\n"
+                  "covariance, positioner angles and date. A check ends with exit code 3 and c_arm_changed "
+                  "where a case lies beyond\n"
+                  "what the record predicts for its positions (99.9 %) and beyond the record's "
+                  "\"tolerances\".");
+  command->require_subcommand(1);
+  auto* add = command->add_subcommand("add", "Measure cases and add their acquisitions, each once");
+  auto& added = arguments_of(add, action, c_arm_add_command);
+  add->add_option("RECORD", added.record, "The record (JSON); made where there is none")->required();
+  add->add_option("CASE", added.cases, "Folders that hold case.json")->required();
+
+  auto* report =
+      command->add_subcommand("report", "Sag, repeatability and every acquisition, as a page and a table");
+  auto& reported = arguments_of(report, action, c_arm_report_command);
+  report->add_option("RECORD", reported.record, "The record (JSON)")->required();
+  report->add_option("--out", reported.out, "Folder for report.html, c_arm.csv and c_arm.svg")
+      ->capture_default_str();
+
+  auto* check = command->add_subcommand("check", "Compare a new case with what the record predicts");
+  auto& checked = arguments_of(check, action, c_arm_check_command);
+  check->add_option("RECORD", checked.record, "The record (JSON), read only")->required();
+  check->add_option("CASE", checked.folder, "Folder that holds case.json")->required();
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/c_arm.h"
+
+#include "helicarm/report/c_arm_report.h"
+#include "module.h"
+#include "options.h"
+
+namespace helicarm::python {
+namespace {
+
+py::object check_c_arm(const std::filesystem::path& record, const std::filesystem::path& folder,
+                       unsigned threads) {
+  const auto check = value_or_raise(without_gil([&] {
+    return guarded([&] {
+      const auto given = value_or_throw(pipeline::read_case(folder));
+      auto acquired = value_or_throw(pipeline::c_arm_acquisitions(given, threads)).entries;
+      return value_or_throw(pipeline::check_against_record(
+          std::move(acquired), value_or_throw(calibration::read_history(record)), record.string()));
+    });
+  }));
+  const py::object answer = python_from({{"chi2", check.chi2},
+                                         {"limit", check.limit},
+                                         {"acquisitions", report::c_arm_json(check.acquisitions)}});
+  if (const auto change = pipeline::c_arm_change(check)) raise(*change, answer);
+  return answer;
+}
+
+py::object c_arm_report(const std::filesystem::path& record,
+                        const std::optional<std::filesystem::path>& out) {
+  const calibration::CArmModel model =
+      value_or_raise(calibration::read_history(record).and_then([&](const calibration::CArmHistory& history) {
+        return pipeline::model_of_record(history, record.string());
+      }));
+  if (out) value_or_raise(report::write_c_arm_report(model, *out));
+  return python_from(
+      {{"focal_mm", {{"smooth", model.focal.smooth}, {"repeat", model.focal.repeat}}},
+       {"principal_mm", {{"smooth", model.principal.smooth}, {"repeat", model.principal.repeat}}},
+       {"acquisitions", report::c_arm_json(calibration::leave_one_out(model))}});
+}
+
+}  // namespace
+
+void add_c_arm(py::module_& module) {
+  module.def(
+      "check_c_arm", &check_c_arm, py::arg("record"), py::arg("folder"), py::kw_only(),
+      py::arg("threads") = 0u,
+      R"(Compares a case with what a C-arm's record predicts for its positions, as `helicarm c-arm check` does.
+
+record: the file of run_case's history. folder: holds case.json. Returns chi2 of all acquisitions, its 99.9 % limit, and for
+each acquisition estimate_mm, predicted_mm, sigma_mm (source distance, principal point) and chi2. Raises InputError;
+RefusedError, with c_arm_changed and the same figures in .result where the C-arm has changed.)");
+  module.def(
+      "c_arm_report", &c_arm_report, py::arg("record"), py::kw_only(), py::arg("out") = py::none(),
+      R"(Sag and repeatability of a C-arm by its record, and each acquisition beside the prediction by all others.
+
+out: a folder for report.html, c_arm.csv and c_arm.svg. Returns focal_mm and principal_mm with the standard deviations
+smooth (over the positions) and repeat (in one position), and acquisitions. Raises InputError, RefusedError.)");
+}
+
+}  // namespace helicarm::python

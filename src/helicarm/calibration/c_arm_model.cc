@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/calibration/c_arm_model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <Eigen/Cholesky>
+
+#include "helicarm/core/statistics.h"
+#include "helicarm/geometry/dense_matrix.h"
+
+namespace helicarm::calibration {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr std::size_t most_used = 150;
+constexpr double correlated_deg = 40;
+constexpr double largest_sigma_mm = 100;  // of an entry along a direction that it does not determine
+constexpr double usual_repeat = 0.1;      // of the sag
+
+std::optional<Vector3d> direction_of(const HistoryEntry& entry) {
+  if (!entry.primary_deg) return {};
+  constexpr double radian = std::numbers::pi / 180;
+  const double primary = *entry.primary_deg * radian, secondary = entry.secondary_deg.value_or(0) * radian;
+  return Vector3d(std::sin(primary) * std::cos(secondary), std::sin(secondary),
+                  std::cos(primary) * std::cos(secondary));
+}
+
+double correlation(const std::optional<Vector3d>& a, const std::optional<Vector3d>& b) {
+  if (!a || !b) return 0;
+  const double apart_deg = std::acos(std::clamp(a->dot(*b), -1.0, 1.0)) * 180 / std::numbers::pi;
+  return std::exp(-0.5 * std::pow(apart_deg / correlated_deg, 2));
+}
+
+Matrix3d noise_of(const HistoryEntry& entry) {
+  const auto [values, vectors] = geometry::symmetric_eigen(entry.information);
+  const Vector3d variances = values.cwiseMax(1 / (largest_sigma_mm * largest_sigma_mm)).cwiseInverse();
+  return vectors * variances.asDiagonal() * vectors.transpose();
+}
+
+const CArmVariation& of(const CArmModel& model, int axis) {
+  return axis == 0 ? model.focal : model.principal;
+}
+
+double common_sigma(const CArmModel& model, int axis) {
+  return (axis == 0 ? model.unknown.focal : model.unknown.principal)->common;
+}
+
+/// Covariance between the values of two lists of acquisitions, without their own errors. `same`: the lists
+/// are one list.
+MatrixXd covariance_between(const CArmModel& model, std::span<const HistoryEntry> a,
+                            std::span<const HistoryEntry> b, bool same) {
+  MatrixXd between = MatrixXd::Zero(3 * Index(a.size()), 3 * Index(b.size()));
+  std::vector<std::optional<Vector3d>> in_a, in_b;
+  for (const HistoryEntry& entry : a) in_a.push_back(direction_of(entry));
+  for (const HistoryEntry& entry : b) in_b.push_back(direction_of(entry));
+  for (std::size_t i = 0; i < a.size(); ++i)
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const bool itself = same && i == j;
+      const double alike = itself ? 1 : correlation(in_a[i], in_b[j]);
+      for (int axis = 0; axis < 3; ++axis) {
+        const CArmVariation& variation = of(model, axis);
+        between(3 * Index(i) + axis, 3 * Index(j) + axis) =
+            std::pow(common_sigma(model, axis), 2) + alike * variation.smooth * variation.smooth +
+            (itself ? variation.repeat * variation.repeat : 0);
+      }
+    }
+  return between;
+}
+
+void add_noise(MatrixXd& covariance, std::span<const HistoryEntry> entries) {
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    covariance.block<3, 3>(3 * Index(i), 3 * Index(i)) += noise_of(entries[i]);
+}
+
+VectorXd deviations(const CArmModel& model, std::span<const HistoryEntry> entries) {
+  VectorXd from_nominal(3 * Index(entries.size()));
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    from_nominal.segment<3>(3 * Index(i)) = entries[i].estimate_mm - model.nominal_mm;
+  return from_nominal;
+}
+
+/// Log-normal about the sag of an unknown C-arm, a factor of 4 per standard deviation.
+double log_prior(const CArmVariation& variation, double of_view) {
+  const double width = std::log(4.0);
+  const double smooth = std::log(variation.smooth / of_view) / width;
+  const double repeat = std::log(variation.repeat / (usual_repeat * of_view)) / width;
+  return -0.5 * (smooth * smooth + repeat * repeat);
+}
+
+double log_posterior(const CArmModel& model) {
+  MatrixXd covariance = covariance_between(model, model.entries, model.entries, true);
+  add_noise(covariance, model.entries);
+  const VectorXd residual = deviations(model, model.entries);
+  const Eigen::LLT<MatrixXd> factor(covariance);
+  if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
+  const VectorXd whitened = factor.matrixL().solve(residual);
+  return -0.5 * whitened.squaredNorm() - factor.matrixLLT().diagonal().array().log().sum() +
+         log_prior(model.focal, model.unknown.focal->of_view) +
+         log_prior(model.principal, model.unknown.principal->of_view);
+}
+
+/// One kind's variation of greatest posterior density, on a grid.
+void fit_variation(CArmModel& model, CArmVariation CArmModel::*kind, double of_view) {
+  constexpr std::array smooth{0.06, 0.12, 0.25, 0.5, 1., 2., 4.},
+      repeat{0.012, 0.025, 0.05, 0.1, 0.2, 0.4, 0.8};
+  CArmVariation best = model.*kind;
+  double highest = -std::numeric_limits<double>::infinity();
+  for (const double s : smooth)
+    for (const double r : repeat) {
+      model.*kind = {s * of_view, r * of_view};
+      if (const double density = log_posterior(model); density > highest)
+        highest = density, best = model.*kind;
+    }
+  model.*kind = best;
+}
+
+AcquisitionCheck compared(const HistoryEntry& entry, const Vector3d& predicted, const Matrix3d& covariance) {
+  const Vector3d difference = entry.estimate_mm - predicted;
+  return {entry, predicted, covariance.diagonal().cwiseSqrt(),
+          difference.dot(covariance.llt().solve(difference)), false};
+}
+
+bool is_beyond(const AcquisitionCheck& check, const CArmTolerances& tolerances) {
+  const Vector3d difference = check.entry.estimate_mm - check.predicted_mm;
+  return std::abs(difference.x()) > tolerances.focal_mm ||
+         difference.tail<2>().norm() > tolerances.principal_mm;
+}
+
+}  // namespace
+
+CArmModel c_arm_model(std::span<const HistoryEntry> entries, const Vector3d& nominal_mm,
+                      const CArmPrior& unknown) {
+  CArmModel model{nominal_mm, unknown, {}, {}, {}};
+  const std::span<const HistoryEntry> latest = entries.last(std::min(most_used, entries.size()));
+  model.entries.assign(latest.begin(), latest.end());
+  model.focal = {unknown.focal->of_view, usual_repeat * unknown.focal->of_view};
+  model.principal = {unknown.principal->of_view, usual_repeat * unknown.principal->of_view};
+  if (model.entries.empty()) return model;
+  for (int round = 0; round < 2; ++round) {
+    fit_variation(model, &CArmModel::focal, unknown.focal->of_view);
+    fit_variation(model, &CArmModel::principal, unknown.principal->of_view);
+  }
+  return model;
+}
+
+IntrinsicsPrediction predict_intrinsics(const CArmModel& model, std::span<const HistoryEntry> at) {
+  IntrinsicsPrediction predicted;
+  predicted.mean_mm = model.nominal_mm.replicate(Index(at.size()), 1);
+  predicted.covariance_mm2 = covariance_between(model, at, at, true);
+  if (model.entries.empty()) return predicted;
+  MatrixXd known = covariance_between(model, model.entries, model.entries, true);
+  add_noise(known, model.entries);
+  const Eigen::LLT<MatrixXd> factor(known);
+  const MatrixXd between = covariance_between(model, at, model.entries, false);
+  const MatrixXd gain = factor.solve(between.transpose()).transpose();
+  predicted.mean_mm += gain * deviations(model, model.entries);
+  predicted.covariance_mm2 -= gain * between.transpose();
+  return predicted;
+}
+
+CArmCheck check_c_arm(const CArmModel& model, std::span<const HistoryEntry> acquired,
+                      const CArmTolerances& tolerances) {
+  CArmCheck check;
+  if (acquired.empty()) return check;
+  const IntrinsicsPrediction predicted = predict_intrinsics(model, acquired);
+  MatrixXd covariance = predicted.covariance_mm2;
+  add_noise(covariance, acquired);
+  const VectorXd difference =
+      deviations(model, acquired) + model.nominal_mm.replicate(Index(acquired.size()), 1) - predicted.mean_mm;
+  check.chi2 = difference.dot(Eigen::LLT<MatrixXd>(covariance).solve(difference));
+  check.limit = chi2_quantile(3 * double(acquired.size()), normal_at_999);
+  for (std::size_t i = 0; i < acquired.size(); ++i) {
+    const Index first = 3 * Index(i);
+    check.acquisitions.push_back(
+        compared(acquired[i], predicted.mean_mm.segment<3>(first), covariance.block<3, 3>(first, first)));
+    AcquisitionCheck& one = check.acquisitions.back();
+    one.is_changed = check.chi2 > check.limit && is_beyond(one, tolerances);
+    check.changed |= one.is_changed;
+  }
+  return check;
+}
+
+std::vector<AcquisitionCheck> leave_one_out(const CArmModel& model) {
+  std::vector<AcquisitionCheck> checks;
+  for (std::size_t i = 0; i < model.entries.size(); ++i) {
+    CArmModel others = model;
+    others.entries.erase(others.entries.begin() + std::ptrdiff_t(i));
+    const HistoryEntry& left_out = model.entries[i];
+    const IntrinsicsPrediction predicted = predict_intrinsics(others, {&left_out, 1});
+    checks.push_back(compared(left_out, predicted.mean_mm, predicted.covariance_mm2 + noise_of(left_out)));
+  }
+  return checks;
+}
+
+}  // namespace helicarm::calibration

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "helicarm/calibration/c_arm_history.h"
+
+namespace helicarm::calibration {
+
+/// Variation of one kind of intrinsics over the acquisitions of a C-arm, mm.
+struct CArmVariation {
+  double smooth = 0;  ///< sag: a function of the position, correlated over 40 degrees
+  double repeat = 0;  ///< from one acquisition to the next in one position
+};
+
+/// Intrinsics of a C-arm as a Gaussian process over its position (Rasmussen and Williams 2006, 2.2, 5.4.1).
+struct CArmModel {
+  Eigen::Vector3d nominal_mm;         ///< focal length and principal point, as HistoryEntry::estimate_mm
+  CArmPrior unknown;                  ///< before any acquisition
+  std::vector<HistoryEntry> entries;  ///< the latest 150 of the history
+  CArmVariation focal, principal;     ///< of greatest posterior density
+};
+
+/// Fits both variations to the history's latest entries. With few entries they stay near those of an unknown
+/// C-arm.
+CArmModel c_arm_model(std::span<const HistoryEntry> entries, const Eigen::Vector3d& nominal_mm,
+                      const CArmPrior& unknown);
+
+/// Joint prediction of acquisitions: three values each, in the entries' order, without their own errors.
+struct IntrinsicsPrediction {
+  Eigen::VectorXd mean_mm;         ///< 3n
+  Eigen::MatrixXd covariance_mm2;  ///< 3n x 3n
+};
+
+/// Of acquisitions at the positions of `at`, of which only the angles are used. An acquisition whose image
+/// does not state its angles is like one in a position of its own.
+IntrinsicsPrediction predict_intrinsics(const CArmModel& model, std::span<const HistoryEntry> at);
+
+/// A new acquisition beside the history's prediction.
+struct AcquisitionCheck {
+  HistoryEntry entry;
+  Eigen::Vector3d predicted_mm;
+  Eigen::Vector3d sigma_mm;  ///< of the difference entry - prediction
+  double chi2 = 0;           ///< of the difference, 3 degrees of freedom
+  bool is_changed = false;   ///< beyond the tolerances, where all together are significant
+};
+
+/// New acquisitions of one case beside a history that does not hold them.
+struct CArmCheck {
+  std::vector<AcquisitionCheck> acquisitions;
+  double chi2 = 0;       ///< of all together
+  double limit = 0;      ///< its 99.9 % quantile
+  bool changed = false;  ///< significant, and beyond the history's tolerances in one acquisition
+};
+
+CArmCheck check_c_arm(const CArmModel& model, std::span<const HistoryEntry> acquired,
+                      const CArmTolerances& tolerances);
+
+/// Each entry of the model beside the prediction by all others.
+std::vector<AcquisitionCheck> leave_one_out(const CArmModel& model);
+
+}  // namespace helicarm::calibration

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/calibration/c_arm_model.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/core/random.h"
+#include "helicarm/core/statistics.h"
+
+namespace helicarm::calibration {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+const Vector3d nominal(1000, 0, 0);
+const CArmPrior unknown{IntrinsicsVariation{10, 1.4}, IntrinsicsVariation{7, 4.2}};
+
+/// A C-arm whose sag is a sine of its primary angle: 1 mm in the source distance, 2 mm in the principal
+/// point.
+class SaggingArm {
+ public:
+  explicit SaggingArm(std::uint64_t seed) : random_(seed, 0) {}
+
+  HistoryEntry acquisition(double primary_deg, const Vector3d& change_mm = Vector3d::Zero()) {
+    const double turn = primary_deg * std::numbers::pi / 180;
+    const Vector3d truth = Vector3d(1004, 3, -2) + std::sin(turn) * Vector3d(1, 2, 0) +
+                           std::cos(turn) * Vector3d(0.3, 0, 1.5) + change_mm;
+    const Vector3d sigma(1.2, 0.4, 0.4);
+    Vector3d noise;
+    for (double& value : noise) value = random_.normal();
+    const Vector3d repeat = 0.1 * Vector3d(random_.normal(), random_.normal(), random_.normal());
+    HistoryEntry entry{std::to_string(++count_), "AP", truth + repeat + sigma.cwiseProduct(noise),
+                       sigma.cwiseAbs2().cwiseInverse().asDiagonal().toDenseMatrix()};
+    entry.primary_deg = primary_deg;
+    entry.secondary_deg = 0;
+    return entry;
+  }
+  std::vector<HistoryEntry> history(int count) {
+    std::vector<HistoryEntry> entries;
+    for (int i = 0; i < count; ++i) entries.push_back(acquisition(-90 + 180. * i / (count - 1)));
+    return entries;
+  }
+
+ private:
+  RandomStream random_;
+  int count_ = 0;
+};
+
+TEST(CArmModel, WithoutAcquisitionsPredictsTheNominalValuesWithTheirDoubt) {
+  const CArmModel model = c_arm_model({}, nominal, unknown);
+  const HistoryEntry at{"", "AP", {}, Matrix3d::Identity(), 0, 0};
+  const IntrinsicsPrediction predicted = predict_intrinsics(model, {&at, 1});
+  EXPECT_EQ(predicted.mean_mm, nominal);
+  EXPECT_GT(predicted.covariance_mm2(0, 0), 100);
+}
+
+TEST(CArmModel, SagIsPredictedAtPositionsThatWereNotAcquired) {
+  SaggingArm arm(1);
+  const CArmModel model = c_arm_model(arm.history(24), nominal, unknown);
+  for (const double angle : {-70., -20., 35., 80.}) {
+    const HistoryEntry at{"", "AP", {}, Matrix3d::Identity(), angle, 0};
+    const IntrinsicsPrediction predicted = predict_intrinsics(model, {&at, 1});
+    const double turn = angle * std::numbers::pi / 180;
+    EXPECT_NEAR(predicted.mean_mm[1], 3 + 2 * std::sin(turn), 4 * std::sqrt(predicted.covariance_mm2(1, 1)));
+    EXPECT_LT(std::sqrt(predicted.covariance_mm2(1, 1)), 0.6);
+  }
+}
+
+TEST(CArmModel, NextAcquisitionsLieInTheirRegions) {
+  int inside = 0, all = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    SaggingArm arm(seed);
+    const CArmModel model = c_arm_model(arm.history(16), nominal, unknown);
+    for (const double angle : {-60., -15., 40., 75.}) {
+      const HistoryEntry next = arm.acquisition(angle);
+      const CArmCheck check = check_c_arm(model, {&next, 1}, {});
+      constexpr double chi2_at_95 = 7.815;  // three degrees of freedom
+      inside += check.acquisitions.front().chi2 < chi2_at_95;
+      ++all;
+    }
+  }
+  EXPECT_GE(inside, 0.90 * all);
+  EXPECT_LE(inside, 0.99 * all);
+}
+
+TEST(CArmModel, UnchangedArmRaisesNoAlarm) {
+  int alarms = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    SaggingArm arm(seed);
+    const CArmModel model = c_arm_model(arm.history(12), nominal, unknown);
+    const std::vector next{arm.acquisition(0), arm.acquisition(88)};
+    alarms += check_c_arm(model, next, {}).changed;
+  }
+  EXPECT_LE(alarms, 1);
+}
+
+TEST(CArmModel, ReceiverMovedByTwoMillimetresIsAChange) {
+  int alarms = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SaggingArm arm(seed);
+    const CArmModel model = c_arm_model(arm.history(24), nominal, unknown);
+    const std::vector next{arm.acquisition(0, {0, 2, 2}), arm.acquisition(88, {0, 2, 2})};
+    alarms += check_c_arm(model, next, {}).changed;
+  }
+  EXPECT_GE(alarms, 18);
+}
+
+TEST(CArmModel, ChangeWithinTheToleranceIsNone) {
+  SaggingArm arm(3);
+  const CArmModel model = c_arm_model(arm.history(24), nominal, unknown);
+  const std::vector next{arm.acquisition(0, {0, 4, 4}), arm.acquisition(88, {0, 4, 4})};
+  EXPECT_TRUE(check_c_arm(model, next, {0, 0}).changed);
+  EXPECT_FALSE(check_c_arm(model, next, {20, 20}).changed);
+}
+
+TEST(CArmModel, ImagesWithoutAnglesAreNotTakenForOnePosition) {
+  SaggingArm arm(4);
+  std::vector<HistoryEntry> entries = arm.history(10);
+  for (HistoryEntry& entry : entries) entry.primary_deg.reset();
+  const CArmModel model = c_arm_model(entries, nominal, unknown);
+  HistoryEntry next = arm.acquisition(0);
+  next.primary_deg.reset();
+  EXPECT_FALSE(check_c_arm(model, {&next, 1}, {}).changed);
+}
+
+}  // namespace
+}  // namespace helicarm::calibration

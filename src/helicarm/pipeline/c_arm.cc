@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/c_arm.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/statistics.h"
+#include "helicarm/pipeline/measure.h"
+#include "helicarm/pipeline/prior.h"
+
+namespace helicarm::pipeline {
+
+Expected<CArmAcquisitions> c_arm_acquisitions(const Case& given, unsigned threads) {
+  RunOptions options;
+  options.threads = threads;
+  options.history = calibration::CArmHistory();
+  return measure(given, options).and_then([](const Measurement& measured) -> Expected<CArmAcquisitions> {
+    const Result& result = measured.result;
+    if (result.failure) return tl::unexpected<Failure>(*result.failure);
+    if (result.entries.empty())
+      return fail(
+          Reason::residual_too_large,
+          "the residuals contradict the noise model, or no view alone determines its camera: the case "
+          "says nothing of the C-arm");
+    return CArmAcquisitions{result.entries, result.warnings};
+  });
+}
+
+Expected<calibration::CArmModel> model_of_record(const calibration::CArmHistory& record,
+                                                 const std::string& origin) {
+  if (record.entries.empty())
+    return fail(
+        Reason::too_few_views,
+        fmt::format("{}: holds no acquisition beside these; add cases with `helicarm c-arm add`", origin));
+  std::vector<double> focal_mm;
+  for (const calibration::HistoryEntry& entry : record.entries) focal_mm.push_back(entry.estimate_mm.x());
+  return calibration::c_arm_model(record.entries, {median(std::move(focal_mm)), 0, 0}, unknown_c_arm());
+}
+
+Expected<calibration::CArmCheck> check_against_record(std::vector<calibration::HistoryEntry> acquired,
+                                                      calibration::CArmHistory record,
+                                                      const std::string& origin) {
+  std::erase_if(record.entries, [&](const calibration::HistoryEntry& entry) {
+    return std::ranges::find(acquired, entry.image, &calibration::HistoryEntry::image) != acquired.end();
+  });
+  return model_of_record(record, origin).map([&](const calibration::CArmModel& model) {
+    return calibration::check_c_arm(model, acquired, record.tolerances);
+  });
+}
+
+std::optional<Failure> c_arm_change(const calibration::CArmCheck& check) {
+  if (!check.changed) return {};
+  const auto& worst = *std::ranges::max_element(
+      check.acquisitions, {}, [](const auto& one) { return one.is_changed ? one.chi2 : -1; });
+  const Eigen::Vector3d off = worst.entry.estimate_mm - worst.predicted_mm;
+  return Failure{
+      Reason::c_arm_changed,
+      fmt::format(
+          "the source distance is {:+.2f} mm (sigma {:.2f}) and the principal point {:+.2f}, {:+.2f} mm "
+          "(sigma {:.2f}, {:.2f}) from what the record predicts; chi-square of all {:.0f}, limit {:.0f}: "
+          "the C-arm has changed, or the case's pixel size, plate or calibrator is wrong",
+          off.x(), worst.sigma_mm.x(), off.y(), off.z(), worst.sigma_mm.y(), worst.sigma_mm.z(), check.chi2,
+          check.limit),
+      worst.entry.view,
+      {{"focal_mm", off.x()},
+       {"u0_mm", off.y()},
+       {"v0_mm", off.z()},
+       {"chi2", check.chi2},
+       {"limit", check.limit}}};
+}
+
+}  // namespace helicarm::pipeline

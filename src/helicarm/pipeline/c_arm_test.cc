@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/c_arm.h"
+
+#include <gtest/gtest.h>
+
+namespace helicarm::pipeline {
+namespace {
+
+calibration::CArmHistory record_of(int count) {
+  calibration::CArmHistory record;
+  for (int i = 0; i < count; ++i) {
+    calibration::HistoryEntry entry{std::to_string(i), "AP", {1000, 0.1 * i, 0}, Eigen::Matrix3d::Identity()};
+    entry.primary_deg = 10. * i;
+    record.entries.push_back(entry);
+  }
+  return record;
+}
+
+TEST(CArm, RecordWithoutOtherAcquisitionsIsRefused) {
+  EXPECT_EQ(model_of_record({}, "arm.json").error().reason, Reason::too_few_views);
+  const calibration::CArmHistory record = record_of(2);
+  const auto checked = check_against_record(record.entries, record, "arm.json");
+  ASSERT_FALSE(checked);
+  EXPECT_EQ(checked.error().reason, Reason::too_few_views);
+}
+
+TEST(CArm, ChangeNamesTheWorstAcquisition) {
+  const calibration::CArmHistory record = record_of(10);
+  std::vector<calibration::HistoryEntry> acquired{record.entries[2], record.entries[5]};
+  acquired[0].image = "new a";
+  acquired[1].image = "new b";
+  acquired[1].view = "LAT";
+  acquired[1].estimate_mm.y() += 40;
+  const auto check = check_against_record(acquired, record, "arm.json");
+  ASSERT_TRUE(check);
+  const auto change = c_arm_change(*check);
+  ASSERT_TRUE(change);
+  EXPECT_EQ(change->reason, Reason::c_arm_changed);
+  EXPECT_EQ(change->view, "LAT");
+  EXPECT_NEAR(change->figures.at("u0_mm"), 40, 3);
+}
+
+TEST(CArm, UnchangedArmIsNoFailure) {
+  const calibration::CArmHistory record = record_of(10);
+  std::vector<calibration::HistoryEntry> acquired{record.entries[4]};
+  acquired[0].image = "new";
+  EXPECT_FALSE(c_arm_change(*check_against_record(acquired, record, "arm.json")));
+}
+
+}  // namespace
+}  // namespace helicarm::pipeline

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/report/c_arm_report.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/csv.h"
+#include "helicarm/core/earlier_files.h"
+#include "helicarm/core/files.h"
+#include "helicarm/report/chart.h"
+#include "helicarm/report/markup.h"
+
+namespace helicarm::report {
+namespace {
+
+using calibration::AcquisitionCheck;
+using calibration::CArmModel;
+
+constexpr std::array<const char*, 3> intrinsic_names{"focal", "u0", "v0"};
+constexpr std::array<const char*, 3> intrinsic_titles{"source distance", "principal point, column",
+                                                      "principal point, row"};
+
+Cell angle_cell(const std::optional<double>& angle) { return {fixed(angle, 1)}; }
+
+std::vector<ColumnOf<AcquisitionCheck>> columns() {
+  std::vector<ColumnOf<AcquisitionCheck>> all{
+      {{"view", "name in its case"}, [](const AcquisitionCheck& a) { return Cell{a.entry.view}; }},
+      {{"date", "on which it was added, UTC"},
+       [](const AcquisitionCheck& a) { return Cell{a.entry.date.empty() ? "–" : a.entry.date}; }},
+      {{"primary deg", "positioner's primary angle", true},
+       [](const AcquisitionCheck& a) { return angle_cell(a.entry.primary_deg); }},
+      {{"secondary deg", "positioner's secondary angle", true},
+       [](const AcquisitionCheck& a) { return angle_cell(a.entry.secondary_deg); }}};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string name = intrinsic_names[std::size_t(axis)];
+    all.push_back({{name + " mm", "estimated from this image alone", true},
+                   [axis](const AcquisitionCheck& a) { return Cell{fixed(a.entry.estimate_mm[axis], 2)}; }});
+    all.push_back({{name + " off mm", "from the prediction by the other acquisitions, with its sigma", true},
+                   [axis](const AcquisitionCheck& a) {
+                     return Cell{fmt::format("{:+.2f} ±{:.2f}",
+                                             a.entry.estimate_mm[axis] - a.predicted_mm[axis],
+                                             a.sigma_mm[axis])};
+                   }});
+  }
+  all.push_back(
+      {{"chi2", "of the three differences, 3 degrees of freedom", true}, [](const AcquisitionCheck& a) {
+         return Cell{fixed(a.chi2, 1), a.is_changed};
+       }});
+  return all;
+}
+
+/// Prediction with its 95 % band over the primary angle, and the acquisitions.
+std::vector<Chart> charts_of(const CArmModel& model) {
+  std::vector<calibration::HistoryEntry> at;
+  double low = 360, high = -360;
+  for (const calibration::HistoryEntry& entry : model.entries)
+    if (entry.primary_deg) {
+      low = std::min(low, *entry.primary_deg);
+      high = std::max(high, *entry.primary_deg);
+    }
+  std::vector<Chart> charts;
+  if (!(high >= low)) return charts;
+  constexpr int steps = 60;
+  constexpr double margin_deg = 5, normal_at_95 = 1.96;
+  for (int i = 0; i <= steps; ++i) {
+    calibration::HistoryEntry entry;
+    entry.primary_deg = low - margin_deg + (high - low + 2 * margin_deg) * i / steps;
+    at.push_back(std::move(entry));
+  }
+  const calibration::IntrinsicsPrediction predicted = calibration::predict_intrinsics(model, at);
+  for (int axis = 0; axis < 3; ++axis) {
+    ChartSeries middle{"predicted"}, above{"95 %"}, below{""}, seen{"acquisitions"};
+    above.dashed = below.dashed = true;
+    seen.scattered = true;
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      const Eigen::Index k = 3 * Eigen::Index(i) + axis;
+      const double width = normal_at_95 * std::sqrt(predicted.covariance_mm2(k, k));
+      middle.points.push_back({*at[i].primary_deg, predicted.mean_mm[k]});
+      above.points.push_back({*at[i].primary_deg, predicted.mean_mm[k] + width});
+      below.points.push_back({*at[i].primary_deg, predicted.mean_mm[k] - width});
+    }
+    for (const calibration::HistoryEntry& entry : model.entries)
+      if (entry.primary_deg) seen.points.push_back({*entry.primary_deg, entry.estimate_mm[axis]});
+    Chart chart{intrinsic_titles[std::size_t(axis)], "primary angle, degrees", "mm"};
+    chart.series = {std::move(middle), std::move(above), std::move(below), std::move(seen)};
+    chart.note = "at a secondary angle of 0 degrees";
+    charts.push_back(std::move(chart));
+  }
+  return charts;
+}
+
+std::string summary(const CArmModel& model, std::span<const AcquisitionCheck> left_out) {
+  constexpr double chi2_at_95 = 7.815;  // three degrees of freedom
+  const auto inside =
+      std::ranges::count_if(left_out, [](const AcquisitionCheck& a) { return a.chi2 < chi2_at_95; });
+  std::string html = "<div class=\"cards\">\n";
+  const auto card = [&](const std::string& value, const std::string& what) {
+    html += fmt::format("<div class=\"card\"><b>{}</b><span>{}</span></div>\n", value, what);
+  };
+  card(fmt::format("{}", model.entries.size()), "acquisitions, the latest");
+  card(fmt::format("{:.2f} mm", model.focal.smooth), "variation of the source distance over the positions");
+  card(fmt::format("{:.2f} mm", model.focal.repeat), "from one acquisition to the next in one position");
+  card(fmt::format("{:.2f} mm", model.principal.smooth),
+       "variation of the principal point over the positions");
+  card(fmt::format("{:.2f} mm", model.principal.repeat), "from one acquisition to the next in one position");
+  card(fmt::format("{} of {}", inside, left_out.size()), "inside the 95 % region predicted by all others");
+  return html + "</div>\n";
+}
+
+}  // namespace
+
+Table c_arm_table(std::span<const AcquisitionCheck> acquisitions) {
+  return without_empty_columns(
+      table_of<AcquisitionCheck>("Acquisitions", columns(), {acquisitions.begin(), acquisitions.end()}));
+}
+
+std::string c_arm_csv(std::span<const AcquisitionCheck> acquisitions) {
+  std::string csv = "view,date,primary_deg,secondary_deg";
+  for (const char* name : intrinsic_names) csv += fmt::format(",{0}_mm,{0}_predicted_mm,{0}_sigma_mm", name);
+  csv += ",chi2\n";
+  const auto angle = [](const std::optional<double>& deg) { return deg ? fmt::format("{:.6g}", *deg) : ""; };
+  for (const AcquisitionCheck& a : acquisitions) {
+    csv += fmt::format("{},{},{},{}", csv_field(a.entry.view), a.entry.date, angle(a.entry.primary_deg),
+                       angle(a.entry.secondary_deg));
+    for (int axis = 0; axis < 3; ++axis)
+      csv += fmt::format(",{:.6f},{:.6f},{:.6f}", a.entry.estimate_mm[axis], a.predicted_mm[axis],
+                         a.sigma_mm[axis]);
+    csv += fmt::format(",{:.6g}\n", a.chi2);
+  }
+  return csv;
+}
+
+Json c_arm_json(std::span<const AcquisitionCheck> acquisitions) {
+  Json list = Json::array();
+  const auto angle = [](const std::optional<double>& deg) { return deg ? Json(*deg) : Json(); };
+  const auto row = [](const Eigen::Vector3d& v) { return Json{v.x(), v.y(), v.z()}; };
+  for (const AcquisitionCheck& a : acquisitions)
+    list.push_back({{"view", a.entry.view},
+                    {"date", a.entry.date.empty() ? Json() : Json(a.entry.date)},
+                    {"primary_deg", angle(a.entry.primary_deg)},
+                    {"secondary_deg", angle(a.entry.secondary_deg)},
+                    {"estimate_mm", row(a.entry.estimate_mm)},
+                    {"predicted_mm", row(a.predicted_mm)},
+                    {"sigma_mm", row(a.sigma_mm)},
+                    {"chi2", a.chi2},
+                    {"changed", a.is_changed}});
+  return list;
+}
+
+std::string c_arm_report_html(const CArmModel& model, std::span<const AcquisitionCheck> left_out) {
+  const std::vector<Chart> charts = charts_of(model);
+  return page_html(
+      "helicarm C-arm", "C-arm",
+      summary(model, left_out) + (charts.empty() ? std::string() : chart_svg(charts)) +
+          html_of(c_arm_table(left_out)),
+      ". Millimetres on the detector; focal is the source distance, u0 and v0 the principal point "
+      "from the image's centre.");
+}
+
+Expected<void> write_c_arm_report(const CArmModel& model, const std::filesystem::path& folder) {
+  const std::vector<AcquisitionCheck> left_out = calibration::leave_one_out(model);
+  const std::vector<Chart> charts = charts_of(model);
+  forget_files(folder, {"report.html", "c_arm.csv", "c_arm.svg"});
+  return write_file(folder / "c_arm.csv", c_arm_csv(left_out))
+      .and_then([&] {
+        return charts.empty() ? Expected<void>() : write_file(folder / "c_arm.svg", chart_svg(charts));
+      })
+      .and_then([&] { return write_file(folder / "report.html", c_arm_report_html(model, left_out)); });
+}
+
+}  // namespace helicarm::report

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <span>
+
+#include "helicarm/calibration/c_arm_model.h"
+#include "helicarm/core/json.h"
+#include "helicarm/report/table.h"
+
+namespace helicarm::report {
+
+/// A row per acquisition: position, date, focal length and principal point, difference from the prediction.
+Table c_arm_table(std::span<const calibration::AcquisitionCheck> acquisitions);
+
+/// The same numbers: view, date, primary_deg, secondary_deg, then of focal_mm, u0_mm and v0_mm the value, the
+/// prediction and the sigma of their difference, and chi2.
+std::string c_arm_csv(std::span<const calibration::AcquisitionCheck> acquisitions);
+
+/// The same as JSON, a list.
+Json c_arm_json(std::span<const calibration::AcquisitionCheck> acquisitions);
+
+/// A page with the C-arm's variation, its curves over the primary angle, and each acquisition beside the
+/// prediction by all others. It names no image and no person.
+std::string c_arm_report_html(const calibration::CArmModel& model,
+                              std::span<const calibration::AcquisitionCheck> left_out);
+
+/// Writes report.html, c_arm.csv and c_arm.svg of a history into `folder`, without files of an earlier
+/// report.
+Expected<void> write_c_arm_report(const calibration::CArmModel& model, const std::filesystem::path& folder);
+
+}  // namespace helicarm::report

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/report/c_arm_report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/temporary_folder.h"
+
+namespace helicarm::report {
+namespace {
+
+using testing::HasSubstr;
+
+calibration::CArmModel model() {
+  std::vector<calibration::HistoryEntry> entries;
+  for (const double angle : {-40., 0., 40., 90.}) {
+    calibration::HistoryEntry entry{
+        std::to_string(angle), "A<B", {1000 + angle / 100, 1, -1}, Eigen::Matrix3d::Identity()};
+    entry.primary_deg = angle;
+    entry.date = "2026-01-02";
+    entries.push_back(entry);
+  }
+  return calibration::c_arm_model(
+      entries, {1000, 0, 0},
+      {calibration::IntrinsicsVariation{10, 1.4}, calibration::IntrinsicsVariation{7, 4.2}});
+}
+
+TEST(CArmReport, FilesHoldEveryAcquisition) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_c_arm_report(model(), folder.path()));
+  const std::string page = *read_file(folder.path() / "report.html", 1 << 24);
+  EXPECT_THAT(page, HasSubstr("A&lt;B"));
+  EXPECT_THAT(page, HasSubstr("<svg"));
+  const std::string csv = *read_file(folder.path() / "c_arm.csv", 1 << 24);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 5);
+  EXPECT_THAT(csv, HasSubstr("A<B,2026-01-02,90,,1000.9"));
+}
+
+TEST(CArmReport, WithoutAnglesThereIsNoCurve) {
+  calibration::CArmModel without = model();
+  for (calibration::HistoryEntry& entry : without.entries) entry.primary_deg.reset();
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_c_arm_report(model(), folder.path()));
+  ASSERT_TRUE(write_c_arm_report(without, folder.path()));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "c_arm.svg"));
+}
+
+}  // namespace
+}  // namespace helicarm::report
