@@ -119,6 +119,10 @@ CaseView view_from(JsonReader reader, const Case& known) {
   view.name = name_from(reader, "name");
   view.image = file_named(reader.text("image", 1000), reader, "image", folder);
   if (!reader.raw("frame").is_null()) view.frame = reader.integer("frame", 1, 100000);
+  if (!reader.raw("frames").is_null())
+    reader.refuse(Reason::bad_value, "frames",
+                  "makes the view a run of images: calibrate it with `helicarm sweep`, or name one image by "
+                  "\"frame\"");
   view.plate_image = file_from(reader, "plate_image", folder);
   view.map = file_from(reader, "map", folder);
   if (view.plate_image && view.map)
@@ -244,10 +248,11 @@ void read_calibrator_of(Case& read, JsonReader& reader, Purpose purpose) {
   read.calibrator = value_or_throw(phantom::calibrator_named(read.calibrator_name, read.folder));
 }
 
-std::vector<CaseView> views_from(JsonReader& reader, const Case& known) {
+std::vector<CaseView> views_from(JsonReader& reader, const Case& known, Purpose purpose) {
   std::vector<CaseView> views;
   std::set<std::string> names;
-  for (JsonReader& entry : reader.objects("views", true, most_views)) {
+  const std::size_t most = purpose == Purpose::sweep ? most_frames : most_views;
+  for (JsonReader& entry : reader.objects("views", true, most)) {
     views.push_back(view_from(entry, known));
     take_name(entry, names, views.back().name);
     if (views.back().plate_image && !known.plate)
@@ -283,7 +288,7 @@ Case case_of(const Json& json, const std::string& origin, const fs::path& folder
   read_calibrator_of(read, reader, purpose);
   read.plate_name = reader.optional_text("plate", 1000);
   if (read.plate_name) read.plate = value_or_throw(phantom::plate_named(*read.plate_name, folder));
-  read.views = views_from(reader, read);
+  read.views = views_from(reader, read, purpose);
   if (!reader.raw("poses_now").is_null())
     read.poses_now = poses_from(reader.object("poses_now"), read.bones, OtherMarker::tool);
   if (!reader.raw("tracker").is_null()) read.tracker = tracker_from(reader.object("tracker"));

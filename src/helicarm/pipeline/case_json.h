@@ -9,7 +9,10 @@
 namespace helicarm::pipeline {
 
 /// Use of a case: what may be left out follows from it.
-enum class Purpose { run, phantom, registration, cameras };
+enum class Purpose { run, phantom, registration, cameras, sweep };
+
+/// Images of a case of the purpose `sweep`.
+inline constexpr std::size_t most_frames = 1000;
 
 /// The case with this content of case.json. Throws BadInput as `read_case` fails; `origin` begins each
 /// message.

@@ -8,6 +8,7 @@
 
 #include "helicarm/fiducials/status_words.h"
 #include "helicarm/pipeline/diagnosis/advice.h"
+#include "helicarm/pipeline/view_parameters.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -114,7 +115,9 @@ constexpr std::array parameter_names{"fx_px",
                                      "skew_px"};
 static_assert(parameter_names.size() == calibration::view_parameters);
 
-Json parameters_of(const calibration::CalibratedView& view) {
+}  // namespace
+
+Json parameters_json(const calibration::CalibratedView& view) {
   if (view.covariance.isZero(0)) return nullptr;
   const auto sigmas = [](const auto& covariance) {
     return vector(covariance.diagonal().cwiseMax(0).cwiseSqrt().eval());
@@ -131,6 +134,8 @@ Json parameters_of(const calibration::CalibratedView& view) {
             {"source_mm", sigmas(calibration::source_covariance(view))},
             {"rotation_deg", sigmas(turn)}}}};
 }
+
+namespace {
 
 Json json_of(const ViewResult& view) {
   Json json = {{"name", view.name}};
@@ -162,7 +167,7 @@ Json json_of(const ViewResult& view) {
     json["dof"] = calibrated->dof;
     json["condition"] = number(calibrated->condition);
     json["method"] = calibrated->by_paper ? "paper" : "best";
-    json["parameters"] = parameters_of(*calibrated);
+    json["parameters"] = parameters_json(*calibrated);
   }
   return json;
 }

@@ -5,7 +5,7 @@
 
 #include "helicarm/exchange/import_matrix.h"
 #include "helicarm/exchange/itk_transform.h"
-#include "helicarm/exchange/rtk_projection.h"
+#include "helicarm/exchange/run_geometry.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::report {
@@ -68,28 +68,8 @@ std::string opencv_yaml(const pipeline::ViewResult& view) {
 }
 
 std::string rtk_geometry(const pipeline::ViewResult& view) {
-  const exchange::RtkView rtk =
-      value_or_throw(exchange::rtk_view(view.calibrated->view, image_size(view), detector_pixel_mm(view)));
-  const exchange::RtkProjection& p = rtk.projection;
-  std::string text = fmt::format(
-      "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<!-- Projection image: spacing {} {} mm, origin {} "
-      "{} mm; "
-      "rows {} -->\n<RTKThreeDCircularGeometry version=\"3\">\n  <Projection>\n",
-      rtk.pixels.spacing_mm.x(), rtk.pixels.spacing_mm.y(), rtk.pixels.origin_mm.x(),
-      rtk.pixels.origin_mm.y(),
-      rtk.rows_upwards ? "run upwards: flip the rectified image upside down" : "as in the rectified image");
-  for (const auto& [name, value] : {std::pair{"SourceToIsocenterDistance", p.source_to_isocenter},
-                                    {"SourceToDetectorDistance", p.source_to_detector},
-                                    {"GantryAngle", p.gantry_angle},
-                                    {"OutOfPlaneAngle", p.out_of_plane_angle},
-                                    {"InPlaneAngle", p.in_plane_angle},
-                                    {"SourceOffsetX", p.source_offset.x()},
-                                    {"SourceOffsetY", p.source_offset.y()},
-                                    {"ProjectionOffsetX", p.projection_offset.x()},
-                                    {"ProjectionOffsetY", p.projection_offset.y()}})
-    text += fmt::format("    <{0}>{1}</{0}>\n", name, value);
-  return text + "    <Matrix>\n" + rows_of(p.matrix(), " ") +
-         "    </Matrix>\n  </Projection>\n</RTKThreeDCircularGeometry>\n";
+  return value_or_throw(exchange::rtk_geometry(
+      {{{view.name, view.calibrated->view}}, image_size(view), detector_pixel_mm(view)}));
 }
 
 std::string itk_pose(const pipeline::ViewResult& view) {

@@ -51,9 +51,15 @@ std::string image_key(const image::Image<float>& pixels) {
 }
 
 Expected<XrayImage> read_dicom(std::string_view bytes, const std::string& origin, std::optional<int> frame) {
+  return check_dicom(bytes, origin).and_then([&](const DicomOutline& file) {
+    return read_dicom_frame(file, frame);
+  });
+}
+
+Expected<XrayImage> read_dicom_frame(const DicomOutline& file, std::optional<int> frame) {
   return guarded([&] {
-    DicomOutline outline = value_or_throw(check_dicom(bytes, origin));
-    const int index = value_or_throw(choose_frame(origin, outline.frames, frame));
+    const int index = value_or_throw(choose_frame(file.elements.origin, file.frames, frame));
+    DicomOutline outline = file;
     outline.elements = frame_elements(outline.elements, index);
     auto [acquisition, warnings] = value_or_throw(read_acquisition(outline.elements, index, outline.frames));
     const Polarity polarity = value_or_throw(read_polarity(outline));
@@ -68,7 +74,7 @@ Expected<XrayImage> read_dicom(std::string_view bytes, const std::string& origin
     xray_image.warnings = outline.warnings;
     std::ranges::move(warnings, std::back_inserter(xray_image.warnings));
     if (polarity.invert) invert(xray_image);
-    if (!polarity.certain) make_metal_dark(xray_image, origin);
+    if (!polarity.certain) make_metal_dark(xray_image, outline.elements.origin);
     xray_image.acquisition.instance_key = image_key(xray_image.pixels);
     xray_image.acquisition.uid_key =
         text_key(fmt::format("{} {}", outline.elements.text(tags::sop_instance), index));

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "helicarm/xray/dicom_check.h"
 #include "helicarm/xray/xray_image.h"
 
 namespace helicarm::xray {
@@ -12,6 +13,9 @@ namespace helicarm::xray {
 /// One frame (1-based; optional if the file has one) of a DICOM X-ray in memory. The whole file is checked
 /// before decoding; refusals: see `check_dicom`, `read_acquisition` and `read_polarity`.
 Expected<XrayImage> read_dicom(std::string_view bytes, const std::string& origin, std::optional<int> frame);
+
+/// As `read_dicom`, of a file that `check_dicom` has checked.
+Expected<XrayImage> read_dicom_frame(const DicomOutline& file, std::optional<int> frame);
 
 /// 0-based index of the requested frame; bad_value if it does not exist, or if the file has several and none
 /// is requested.

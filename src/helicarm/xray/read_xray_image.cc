@@ -10,16 +10,21 @@
 #include "helicarm/image/png.h"
 #include "helicarm/image/tiff.h"
 #include "helicarm/xray/dicom_check.h"
+#include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/foreign_file.h"
+#include "helicarm/xray/image_file.h"
 #include "helicarm/xray/jpeg.h"
 #include "helicarm/xray/read_dicom.h"
 
 namespace helicarm::xray {
 namespace fs = std::filesystem;
 
+enum class FileKind { dicom, png, tiff, jpeg, bmp };
+
 namespace {
 
 constexpr double square_tolerance = 0.01;
+constexpr std::uintmax_t run_factor = 16;  // 4 GiB: a thousand frames of 1440 x 1440
 
 /// Of a file that states no pixel size of its own.
 std::string why_no_spacing(const fs::path& path) {
@@ -51,8 +56,6 @@ XrayImage xray_image_of(const image::GreyImage& grey_image, const fs::path& path
   xray_image.acquisition.instance_key = image_key(xray_image.pixels);
   return xray_image;
 }
-
-enum class FileKind { dicom, png, tiff, jpeg, bmp };
 
 FileKind file_kind(std::string_view bytes, const std::string& origin) {
   const bool has_preamble = bytes.size() >= 132 && bytes.compare(128, 4, "DICM") == 0;
@@ -88,13 +91,12 @@ image::GreyImage grey_image_of(std::string_view bytes, FileKind kind, int page, 
   }
 }
 
-XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
-  const std::string bytes = value_or_throw(read_file(path, max_image_file_bytes));
+XrayImage read_by_content(const fs::path& path, std::string_view bytes, FileKind kind,
+                          const DicomOutline* outline, std::optional<int> frame) {
   const std::string origin = path.filename().string();
-  const FileKind kind = file_kind(bytes, origin);
   XrayImage xray_image;
-  if (kind == FileKind::dicom) {
-    xray_image = value_or_throw(read_dicom(bytes, origin, frame));
+  if (outline) {
+    xray_image = value_or_throw(read_dicom_frame(*outline, frame));
   } else {
     const int page = value_or_throw(choose_frame(origin, frames_of(bytes, kind, origin), frame));
     xray_image = xray_image_of(grey_image_of(bytes, kind, page, origin), path);
@@ -109,7 +111,82 @@ XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
   return xray_image;
 }
 
+XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
+  const std::string bytes = value_or_throw(read_file(path, max_image_file_bytes));
+  const std::string origin = path.filename().string();
+  const FileKind kind = file_kind(bytes, origin);
+  if (kind != FileKind::dicom) return read_by_content(path, bytes, kind, nullptr, frame);
+  const DicomOutline outline = value_or_throw(check_dicom(bytes, origin));
+  return read_by_content(path, bytes, kind, &outline, frame);
+}
+
+/// With the view's name, or the failure of that view.
+Expected<XrayImage> named(Expected<XrayImage> xray_image, const std::string& view_name) {
+  if (!xray_image) {
+    Failure failure = std::move(xray_image).error();
+    failure.view = view_name;
+    return tl::unexpected<Failure>(std::move(failure));
+  }
+  xray_image->name = view_name;
+  for (Warning& warning : xray_image->warnings) warning.view = view_name;
+  return xray_image;
+}
+
 }  // namespace
+
+struct ImageFile::Content {
+  fs::path path;
+  std::string bytes;
+  FileKind kind = FileKind::dicom;
+  std::optional<DicomOutline> outline = {};
+  int frames = 1;
+};
+
+ImageFile::ImageFile(std::unique_ptr<Content> content) : content_(std::move(content)) {}
+ImageFile::~ImageFile() = default;
+
+Expected<std::shared_ptr<const ImageFile>> ImageFile::open(const fs::path& path) {
+  return guarded([&] {
+    auto content = std::make_unique<Content>(
+        Content{path, value_or_throw(read_file(path, max_image_file_bytes * run_factor))});
+    const std::string origin = path.filename().string();
+    content->kind = file_kind(content->bytes, origin);
+    if (content->kind == FileKind::dicom) {
+      content->outline = value_or_throw(check_dicom(content->bytes, origin));
+      content->frames = content->outline->frames;
+    } else {
+      content->frames = frames_of(content->bytes, content->kind, origin);
+    }
+    return std::shared_ptr<const ImageFile>(new ImageFile(std::move(content)));
+  });
+}
+
+int ImageFile::frames() const { return content_->frames; }
+
+Expected<void> ImageFile::check_angles() const {
+  if (!content_->outline) return {};
+  const DicomElements& elements = content_->outline->elements;
+  for (const DicomTag tag : {tags::primary_increment, tags::secondary_increment}) {
+    const std::size_t count = elements.count(tag);
+    if (count > 1 && count != std::size_t(frames()))
+      return fail(
+          Reason::bad_value,
+          fmt::format("{}: {} ({:04X},{:04X}) has {} values for {} frames: one value or one a frame "
+                      "is required",
+                      elements.origin, tag.name, tag.number >> 16, tag.number & 0xFFFF, count, frames()),
+          {{"values", double(count)}, {"frames", double(frames())}});
+  }
+  return {};
+}
+
+Expected<XrayImage> ImageFile::read(const std::string& view_name, std::optional<int> frame) const {
+  const Content& of = *content_;
+  return named(guarded([&] {
+                 return read_by_content(of.path, of.bytes, of.kind, of.outline ? &*of.outline : nullptr,
+                                        frame);
+               }),
+               view_name);
+}
 
 Expected<int> count_frames(const fs::path& path) {
   return guarded([&] {
@@ -121,15 +198,7 @@ Expected<int> count_frames(const fs::path& path) {
 
 Expected<XrayImage> read_xray_image(const fs::path& path, const std::string& view_name,
                                     std::optional<int> frame) {
-  auto xray_image = guarded([&] { return read_by_content(path, frame); });
-  if (!xray_image) {
-    Failure failure = std::move(xray_image).error();
-    failure.view = view_name;
-    return tl::unexpected<Failure>(std::move(failure));
-  }
-  xray_image->name = view_name;
-  for (Warning& warning : xray_image->warnings) warning.view = view_name;
-  return xray_image;
+  return named(guarded([&] { return read_by_content(path, frame); }), view_name);
 }
 
 }  // namespace helicarm::xray

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "command_line.h"
+#include "findings.h"
+#include "helicarm/core/json.h"
+#include "helicarm/sweep/sweep.h"
+#include "progress_line.h"
+
+namespace helicarm::cli {
+
+struct SweepArguments {
+  std::filesystem::path folder;  ///< holds case.json
+  std::filesystem::path out = "helicarm-sweep";
+  std::string path;  ///< free, smooth; empty: by the images
+};
+namespace {
+
+std::optional<sweep::PathKind> path_named(const std::string& word) {
+  if (word.empty()) return std::nullopt;
+  if (word == "free") return sweep::PathKind::free;
+  if (word == "smooth") return sweep::PathKind::smooth;
+  throw BadInput(Reason::usage, fmt::format("--path: \"{}\" is none of: free, smooth", word));
+}
+
+std::string summary_of(const sweep::Sweep& sweep) {
+  const auto accepted =
+      std::ranges::count_if(sweep.frames, [](const auto& frame) { return frame.best.has_value(); });
+  std::string text = fmt::format("  {} of {} images accepted\n", accepted, sweep.frames.size());
+  if (!sweep.path) return text;
+  const sweep::SweepPath& path = *sweep.path;
+  text += fmt::format("  arc {:.1f} degrees, source to axis {:.1f} mm", path.arc_deg, path.source_to_axis_mm);
+  if (path.source_to_detector_mm) text += fmt::format(", to detector {:.1f} mm", *path.source_to_detector_mm);
+  text += fmt::format("\n  isocentre {:.2f} {:.2f} {:.2f} mm, central rays within {:.2f} mm\n",
+                      path.isocentre.x(), path.isocentre.y(), path.isocentre.z(), path.isocentre_radius_mm);
+  if (path.stiffness)
+    text += fmt::format("  jitter of an image: source {:.3f} mm, detector {:.3f} mm\n",
+                        path.stiffness->jitter[0], path.stiffness->jitter[1]);
+  return text;
+}
+
+}  // namespace
+
+/// Calibrates every image of a run and writes sweep.json, geometry/ and report.html. A refusal of the run is
+/// also written and then fails with its reason; unusable input leaves no sweep.json.
+CommandResult sweep_command(const SweepArguments& arguments, Console& console) {
+  return guarded([&] {
+    sweep::forget_sweep(arguments.out);
+    sweep::SweepOptions options;
+    options.path = path_named(arguments.path);
+    options.threads = console.threads;
+    const auto given = value_or_throw(sweep::read_sweep_case(arguments.folder));
+    ProgressLine progress(console);
+    const sweep::Sweep result =
+        value_or_throw(sweep::run_sweep(given, options, [&](double share) { progress.notify(share); }));
+    value_or_throw(sweep::write_sweep(result, arguments.out));
+    print_warnings(result.warnings, console);
+    if (console.json) {
+      console.out << to_text(sweep::to_json(result)) << '\n';
+      console.answered = true;
+    } else if (!console.quiet) {
+      console.out << summary_of(result)
+                  << fmt::format("  {:.1f} s\n\n  written to {}\n", result.seconds, arguments.out.string());
+    }
+    if (result.failure) throw BadInput(*result.failure);
+  });
+}
+
+void add_sweep(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, group::images, "sweep",
+      "Calibrate every image of a rotation or tomosynthesis: cameras, path, flex, files for reconstruction",
+      "helicarm sweep my-run --out my-geometry\n\n"
+      "case.json names the calibrator and one view of many images:\n"
+      "  {\"name\": \"RUN\", \"image\": \"RUN.dcm\", \"frames\": \"all\"}            a file with several "
+      "frames\n"
+      "  {\"name\": \"RUN\", \"image\": \"run_{frame:04d}.png\", \"frames\": \"1-133\"}  numbered files\n\n"
+      "Each image is labelled by what it shows and calibrated alone; then all lie on one path of source and\n"
+      "detector, smooth in the angle, with jitter. Writes sweep.json (per image: decision, projection, "
+      "covariance),\n"
+      "geometry/ (RTK, TIGRE, ASTRA, LEAP, plastimatch, OMPL, CSV, NPY) and report.html. An image that shows "
+      "too "
+      "little,\nor a phantom that moved, is refused with a code; exit code 3: the run as a whole is refused. "
+      "See "
+      "docs/sweep.md.");
+  auto& a = arguments_of(command, action, sweep_command);
+  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
+  command->add_option("--out", a.out, "Folder for sweep.json, geometry/ and report.html")
+      ->capture_default_str();
+  command
+      ->add_option("--path", a.path,
+                   "smooth: all images lie on one curve, or free: each alone (default: smooth for 16 or more "
+                   "images of one run)")
+      ->type_name("WORD");
+}
+
+}  // namespace helicarm::cli

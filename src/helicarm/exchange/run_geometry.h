@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/geometry/view.h"
+
+namespace helicarm::exchange {
+
+/// Calibrated images of one detector; the world is the calibrator's, in mm.
+struct RunGeometry {
+  struct Image {
+    std::string name;
+    geometry::View view;
+  };
+  std::vector<Image> images;
+  Eigen::Vector2i size{0, 0};  ///< columns and rows
+  double pixel_mm = 1;         ///< height of a pixel on the detector
+};
+
+/// Where a view's source and pixels are in the world. A mirrored image has its columns the other way.
+struct PlacedDetector {
+  Eigen::Vector3d source, centre;    ///< mm; of the image's middle
+  Eigen::Vector3d along_u, along_v;  ///< from a pixel to the next column and row, mm
+};
+PlacedDetector placed_detector(const geometry::View& view, const Eigen::Vector2i& size, double pixel_mm);
+
+/// RTK's ThreeDCircularProjectionGeometry with one Projection an image. Fails as `rtk_view`.
+Expected<std::string> rtk_geometry(const RunGeometry& run);
+
+/// ASTRA's cone_vec: a row of source, detector's middle, u and v (12 numbers) an image.
+std::string astra_vectors(const RunGeometry& run);
+
+/// A 3 x 4 matrix a line, "[a b c d; e f g h; i j k l]": the world (mm) to pixels.
+std::string ompl_matrices(const RunGeometry& run);
+
+/// name,p11,...,p34 a line.
+std::string matrices_csv(const RunGeometry& run);
+
+/// NumPy's .npy of an array (n, 3, 4) of doubles.
+std::string matrices_npy(const RunGeometry& run);
+
+}  // namespace helicarm::exchange

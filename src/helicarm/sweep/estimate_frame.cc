@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/sweep/estimate_frame.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/pipeline/prior.h"
+#include "helicarm/pipeline/stages.h"
+#include "helicarm/pipeline/view_image.h"
+#include "helicarm/rectification/usable.h"
+#include "helicarm/xray/sidecar.h"
+
+namespace helicarm::sweep {
+namespace {
+
+/// The image with what the view states of it.
+xray::XrayImage image_of(const Frame& frame, const xray::ImageFile* file) {
+  if (!file) return value_or_throw(pipeline::image_of(frame.view));
+  xray::XrayImage image = value_or_throw(file->read(frame.view.name, frame.view.frame));
+  value_or_throw(xray::state_geometry(image, {frame.view.pixel_mm, frame.view.source_detector_mm},
+                                      fmt::format("case.json: view {}", frame.run)));
+  return image;
+}
+
+/// A stage's only view, or its refusal thrown.
+template <class View>
+std::vector<View> passed(pipeline::OrRefusal<std::vector<View>> views) {
+  if (!views) throw BadInput(std::move(views.error().failure));
+  return *std::move(views);
+}
+
+/// The map's covariance without the fiducials that were rejected.
+void keep_used_rows(calibration::ViewFiducials& view, const std::vector<fiducials::Fiducial>& after) {
+  if (view.map_covariance_px2.size() == 0) return;
+  std::vector<Eigen::Index> kept;
+  Eigen::Index row = 0;
+  for (std::size_t k = 0; k < after.size(); ++k) {
+    if (view.fiducials[k].status != fiducials::FiducialStatus::used) continue;
+    if (after[k].status == fiducials::FiducialStatus::used) kept.push_back(row);
+    ++row;
+  }
+  view.map_covariance_px2 = view.map_covariance_px2(kept, kept).eval();
+}
+
+void estimate_from(FrameEstimate& estimate, const Frame& frame, xray::XrayImage image,
+                   const pipeline::Case& base, const pipeline::RunOptions& options) {
+  value_or_throw(rectification::check_usable(image));
+  pipeline::Case one = base;
+  one.views = {frame.view};
+  pipeline::ReadView read{{frame.view.name}, std::make_shared<const xray::XrayImage>(std::move(image))};
+  auto rectified = passed(pipeline::rectify_views({std::move(read)}, one, options));
+  const auto& map = rectified.front().rectification.map;
+  if (map.rectified_plane == rectification::RectifiedPlane::detector || map.is_identity())
+    estimate.pixel_mm = map.rectified_pixel_mm;
+  const auto labelled = passed(pipeline::label_views(
+      passed(pipeline::detect_in_views(std::move(rectified), one, options)), one, options));
+  estimate.fiducials = pipeline::fiducials_of(labelled.front());
+  for (const Warning& warning : labelled.front().fiducials.warnings) estimate.warnings.push_back(warning);
+  value_or_throw(calibrate_alone(estimate, base));
+}
+
+}  // namespace
+
+Expected<void> calibrate_alone(FrameEstimate& estimate, const pipeline::Case& base) {
+  calibration::CalibrationOptions options;
+  options.common = pipeline::common_prior(base.calibrator);
+  return calibration::calibrate({estimate.fiducials}, options)
+      .map([&](calibration::CalibrationResult result) {
+        keep_used_rows(estimate.fiducials, result.fiducials.front());
+        estimate.fiducials.fiducials = std::move(result.fiducials.front());
+        estimate.alone = std::move(result.views.front());
+        estimate.variance_scale = result.variance_scale;
+      });
+}
+
+Expected<FrameEstimate> estimate_frame(const Frame& frame, const xray::ImageFile* file,
+                                       const pipeline::Case& base, const pipeline::RunOptions& options) {
+  FrameEstimate estimate;
+  const auto done = guarded([&] {
+    xray::XrayImage image = image_of(frame, file);
+    estimate.image_size = {image.pixels.width(), image.pixels.height()};
+    estimate.primary_angle_deg = image.acquisition.primary_angle_deg;
+    estimate.secondary_angle_deg = image.acquisition.secondary_angle_deg;
+    estimate.source_detector_mm = image.acquisition.source_detector_mm;
+    estimate.warnings = image.warnings;
+    pipeline::RunOptions alone = options;
+    alone.threads = 1;
+    estimate_from(estimate, frame, std::move(image), base, alone);
+  });
+  if (done) return estimate;
+  if (exit_code(done.error().reason) == 2) return tl::unexpected<Failure>(done.error());
+  estimate.failure = done.error();
+  estimate.failure->view = frame.view.name;
+  return estimate;
+}
+
+}  // namespace helicarm::sweep

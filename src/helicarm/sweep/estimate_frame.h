@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "helicarm/calibration/calibrate.h"
+#include "helicarm/pipeline/result.h"
+#include "helicarm/sweep/sweep_case.h"
+#include "helicarm/xray/image_file.h"
+
+namespace helicarm::sweep {
+
+/// What one image alone says of its camera; its pixels are not kept.
+struct FrameEstimate {
+  std::optional<Failure> failure;                                ///< why the frame is refused
+  Eigen::Vector2i image_size{0, 0};                              ///< 0: not read
+  std::optional<double> pixel_mm;                                ///< on the detector, of a rectified pixel
+  std::optional<double> primary_angle_deg, secondary_angle_deg;  ///< as the file states
+  std::optional<double> source_detector_mm;                      ///< likewise
+  calibration::ViewFiducials fiducials;  ///< labelled by the evidence of this image; outliers are `rejected`
+  std::optional<calibration::CalibratedView> alone;
+  double variance_scale = 1;  ///< of the residuals over the noise model, where inconsistent
+  std::vector<Warning> warnings;
+};
+
+/// Reads, rectifies, detects, labels and calibrates one image. `file`: the opened file of a run, null for a
+/// file of its own. Unreadable input (exit code 2) fails, a refusal is in the estimate.
+Expected<FrameEstimate> estimate_frame(const Frame& frame, const xray::ImageFile* file,
+                                       const pipeline::Case& base, const pipeline::RunOptions& options);
+
+/// Sets `alone`, residuals and rejections of labelled fiducials, by their image alone. Fails as
+/// `calibration::calibrate`.
+Expected<void> calibrate_alone(FrameEstimate& estimate, const pipeline::Case& base);
+
+}  // namespace helicarm::sweep

@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/sweep/joint_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <Eigen/Eigenvalues>
+#include <fmt/format.h>
+
+#include "helicarm/calibration/view_problem.h"
+#include "helicarm/geometry/dense_matrix.h"
+#include "helicarm/geometry/dlt.h"
+#include "helicarm/pipeline/prior.h"
+
+namespace helicarm::sweep {
+namespace {
+
+// Both limits leave room for what the model lacks: of 6 and 8 degrees of freedom, by chance one run in 1e6.
+constexpr double step_chi2 = 60;
+constexpr double off_path_limit = 5.5;  // standard deviations
+constexpr std::size_t least_path = 8;   // frames
+constexpr int relinearisations = 4;
+
+/// Chi-square as a standard normal deviate (Wilson and Hilferty 1931).
+double deviate(double chi2, int dof) {
+  const double spread = 2.0 / (9 * dof);
+  return (std::cbrt(chi2 / dof) - (1 - spread)) / std::sqrt(spread);
+}
+
+Eigen::Vector3d centre_of_balls(const phantom::Calibrator& calibrator) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const phantom::CalibratorBall& ball : calibrator.balls) sum += ball.centre_in_calibrator;
+  return sum / double(calibrator.balls.size());
+}
+
+/// How each ball's position follows from independent unit errors of the phantom, its scale among them.
+std::vector<Eigen::Matrix3Xd> phantom_errors(const phantom::Calibrator& calibrator) {
+  const calibration::CommonPrior common = pipeline::common_prior(calibrator);
+  const calibration::OffsetRoots roots = calibration::offset_roots(common);
+  const Eigen::Vector3d centre = centre_of_balls(calibrator);
+  const auto n = Eigen::Index(calibrator.balls.size());
+  const Eigen::Index own = roots.of_ball.empty() ? 0 : roots.joint ? roots.of_ball.front().cols() : 3 * n;
+  std::vector<Eigen::Matrix3Xd> errors;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    Eigen::Matrix3Xd& of_ball = errors.emplace_back(Eigen::Matrix3Xd::Zero(3, own + 1));
+    if (own > 0 && roots.joint) of_ball.leftCols(own) = roots.of_ball[std::size_t(k)];
+    if (own > 0 && !roots.joint)
+      of_ball.middleCols(3 * k, roots.of_ball[std::size_t(k)].cols()) = roots.of_ball[std::size_t(k)];
+    of_ball.col(own) = common.scale_sigma * (calibrator.balls[std::size_t(k)].centre_in_calibrator - centre);
+  }
+  return errors;
+}
+
+FramePoints points_of(const FrameEstimate& estimate, const std::vector<Eigen::Matrix3Xd>& errors) {
+  FramePoints points;
+  const auto& balls = estimate.fiducials.fiducials;
+  for (std::size_t k = 0; k < balls.size(); ++k) {
+    if (balls[k].status != fiducials::FiducialStatus::used) continue;
+    points.points.push_back(balls[k].centre_in_calibrator);
+    points.pixels.push_back(balls[k].uv);
+    // Weighted as if the ball's own error were independent; what it shares is added to the covariance.
+    const double px_per_mm = std::abs(estimate.alone->view.intrinsics.fy) /
+                             estimate.alone->view.depth(balls[k].centre_in_calibrator);
+    const Eigen::Index own = errors[k].cols() - 1;
+    const double of_ball = std::sqrt(errors[k].leftCols(own).squaredNorm() / 3) * px_per_mm;
+    points.sigma_px.push_back(std::hypot(balls[k].sigma_px, of_ball) * std::sqrt(estimate.variance_scale));
+    points.balls.push_back(k);
+  }
+  return points;
+}
+
+/// Nominal distance and principal point, of the path as a whole.
+PathPrior prior_of(const Orbit& orbit, std::optional<double> source_detector_mm) {
+  const calibration::CArmPrior c_arm = pipeline::unknown_c_arm();
+  const Eigen::Vector3d towards = orbit.first.rotation * (orbit.first.detector - orbit.first.source);
+  PathPrior prior;
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    if (k == 2 && !source_detector_mm) continue;
+    const calibration::IntrinsicsVariation& variation = k == 2 ? *c_arm.focal : *c_arm.principal;
+    const double weight = 1 / (variation.common * variation.common + variation.of_view * variation.of_view);
+    CameraVector row = CameraVector::Zero();
+    row[k] = -1;
+    row[3 + k] = 1;
+    prior.information += weight * row * row.transpose();
+    prior.gradient += weight * ((k == 2 ? *source_detector_mm : 0) - towards[k]) * row;
+  }
+  return prior;
+}
+
+/// The joint estimate of the accepted frames.
+struct Joint {
+  OrbitFit fit;
+  std::vector<std::size_t> frames;  ///< index in the run, by the angle along the path
+  std::vector<FramePoints> points;
+  std::vector<PlacedCamera> at;
+  std::vector<PathObservation> observations;
+  PathPrior prior;
+  SmoothPath smooth;
+  std::vector<double> angles_deg;
+};
+
+Joint joint_of(const std::vector<FrameEstimate>& estimates, const std::vector<std::size_t>& accepted,
+               const Detector& detector, const Eigen::Vector3d& centre,
+               const std::vector<Eigen::Matrix3Xd>& errors, std::optional<double> source_detector_mm) {
+  std::vector<PlacedCamera> alone;
+  for (const std::size_t i : accepted) alone.push_back(placed(estimates[i].alone->view, detector));
+  Joint joint;
+  joint.fit = fit_orbit(alone, centre);
+  std::vector<std::size_t> by_angle(accepted.size());
+  std::iota(by_angle.begin(), by_angle.end(), std::size_t(0));
+  std::ranges::stable_sort(by_angle, {}, [&](std::size_t i) { return joint.fit.angles_deg[i]; });
+  for (const std::size_t i : by_angle) {
+    joint.frames.push_back(accepted[i]);
+    joint.angles_deg.push_back(joint.fit.angles_deg[i]);
+    joint.points.push_back(points_of(estimates[accepted[i]], errors));
+    joint.at.push_back(alone[i]);
+  }
+  joint.prior = prior_of(joint.fit.orbit, source_detector_mm);
+  constexpr int choices = 2;  // of the stiffness; it does not change once the frames are near the path
+  for (int round = 0; round < relinearisations; ++round) {
+    joint.observations.clear();
+    for (std::size_t i = 0; i < joint.at.size(); ++i)
+      joint.observations.push_back(
+          observation_of(joint.points[i], joint.at[i], joint.angles_deg[i], joint.fit.orbit, detector));
+    const Stiffness stiffness =
+        round < choices ? choose_stiffness(joint.observations, joint.prior) : joint.smooth.stiffness;
+    joint.smooth = smooth_path(joint.observations, joint.prior, stiffness);
+    for (std::size_t i = 0; i < joint.at.size(); ++i)
+      joint.at[i] = deviated(joint.fit.orbit.at(joint.angles_deg[i]), joint.smooth.points[i].camera);
+  }
+  return joint;
+}
+
+int path_dof(const Joint& joint) { return joint.fit.orbit.axis ? camera_size - 1 : camera_size; }
+
+void refuse_frame(SweepFrame& frame, Reason reason, std::string message,
+                  std::map<std::string, double> figures) {
+  frame.failure = Failure{reason, std::move(message), frame.view, std::move(figures)};
+  frame.decision = Decision::refuse;
+  frame.best.reset();
+}
+
+/// Refuses the frames from a motion of the phantom on; false if there is none.
+bool refuse_moved(Sweep& sweep, const Joint& joint) {
+  std::vector<std::size_t> order(joint.frames.size());
+  std::iota(order.begin(), order.end(), std::size_t(0));
+  std::ranges::sort(order, {}, [&](std::size_t i) { return joint.frames[i]; });
+  const auto step = find_step(joint.observations, joint.prior, joint.smooth.stiffness, order);
+  if (!step || step->chi2 < step_chi2) return false;
+  const SweepFrame& first = sweep.frames[joint.frames[order[step->first]]];
+  const int number = first.number;
+  const double moved_mm = step->motion.tail<3>().norm(),
+               turned_deg = step->motion.head<3>().norm() * 180 / EIGEN_PI;
+  for (std::size_t k = step->first; k < order.size(); ++k)
+    refuse_frame(
+        sweep.frames[joint.frames[order[k]]], Reason::phantom_changed,
+        fmt::format("from image {} on, source and detector are displaced together by {:.2f} mm and {:.2f} "
+                    "degrees: the phantom moved against the C-arm's path; take the run again",
+                    number, moved_mm, turned_deg),
+        {{"moved_mm", moved_mm}, {"turned_deg", turned_deg}, {"chi2", step->chi2}, {"limit", step_chi2}});
+  return true;
+}
+
+/// Refuses the frames farthest from the path of the others; false if none is beyond the limit.
+bool refuse_off_path(Sweep& sweep, const Joint& joint) {
+  std::vector<double> off;
+  for (const PathPoint& point : joint.smooth.points)
+    off.push_back(deviate(point.off_path_chi2, path_dof(joint)));
+  const double worst = *std::ranges::max_element(off);
+  if (!(worst > off_path_limit)) return false;
+  constexpr double share = 0.7;  // a frame beside the worst may be off because of it
+  for (std::size_t i = 0; i < off.size(); ++i)
+    if (off[i] > std::max(off_path_limit, share * worst))
+      refuse_frame(
+          sweep.frames[joint.frames[i]], Reason::residual_too_large,
+          fmt::format("the camera is {:.1f} standard deviations off the path of the other images, limit "
+                      "{:g}: the phantom or the C-arm moved, or labels are wrong",
+                      off[i], off_path_limit),
+          {{"off_path_sigma", off[i]}, {"limit", off_path_limit}});
+  return true;
+}
+
+std::vector<std::size_t> accepted_in(const Sweep& sweep) {
+  std::vector<std::size_t> accepted;
+  for (std::size_t i = 0; i < sweep.frames.size(); ++i)
+    if (!sweep.frames[i].failure) accepted.push_back(i);
+  return accepted;
+}
+
+/// The covariance of each camera, with what all frames share: the phantom's errors.
+std::vector<CameraMatrix> covariances_of(const Joint& joint, const Detector& detector,
+                                         const std::vector<Eigen::Matrix3Xd>& errors) {
+  std::vector<CameraMatrix> covariances;
+  for (const PathPoint& point : joint.smooth.points) covariances.push_back(point.camera_covariance);
+  if (std::ranges::all_of(errors, [](const auto& error) { return error.isZero(0); })) return covariances;
+  std::vector<Eigen::MatrixXd> values;
+  for (std::size_t i = 0; i < joint.at.size(); ++i)
+    values.push_back(value_by_phantom(joint.points[i], joint.at[i], joint.observations[i],
+                                      joint.fit.orbit.at(joint.angles_deg[i]), detector, errors));
+  const auto shared = response(joint.observations, joint.prior, joint.smooth.stiffness, values);
+  for (std::size_t i = 0; i < covariances.size(); ++i) covariances[i] += shared[i] * shared[i].transpose();
+  return covariances;
+}
+
+void set_best(SweepFrame& frame, const Joint& joint, std::size_t i, const CameraMatrix& covariance,
+              const Detector& detector) {
+  const PlacedCamera reference = joint.fit.orbit.at(joint.angles_deg[i]);
+  const PathPoint& point = joint.smooth.points[i];
+  calibration::CalibratedView best = *frame.alone;
+  best.view = view_of(joint.at[i], detector);
+  best.dlt = geometry::factors_from_projection(best.view.projection());
+  const auto by = parameters_by_deviation(joint.at[i], reference, detector);
+  best.covariance = by * covariance * by.transpose();
+  const FramePoints& points = joint.points[i];
+  double squares = 0;
+  best.chi2 = 0;
+  for (std::size_t k = 0; k < points.points.size(); ++k) {
+    const double off2 = (points.pixels[k] - best.view.project(points.points[k])).squaredNorm();
+    squares += off2;
+    best.chi2 += off2 / (points.sigma_px[k] * points.sigma_px[k]);
+  }
+  best.reprojection_rms_px = std::sqrt(squares / double(points.points.size()));
+  const double fitted = (joint.observations[i].information * point.camera_covariance).trace();
+  best.dof = int(std::lround(2 * double(points.points.size()) - fitted));
+  frame.best = std::move(best);
+  frame.path_angle_deg = joint.angles_deg[i];
+  frame.off_path_sigma = deviate(point.off_path_chi2, path_dof(joint));
+  frame.flex = point.path;
+  frame.own = point.camera;
+  constexpr double noticeable = 4;
+  if (*frame.off_path_sigma > noticeable && frame.decision == Decision::accept)
+    frame.decision = Decision::warn;
+}
+
+/// Nearest point to the central rays, source to the middle of the detector.
+Eigen::Vector3d nearest_to_rays(const std::vector<PlacedCamera>& cameras, std::size_t skip_begin,
+                                std::size_t skip_end) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    if (skip_begin <= i && i < skip_end) continue;
+    const Eigen::Vector3d ray = (cameras[i].detector - cameras[i].source).normalized();
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ray * ray.transpose();
+    sum += across;
+    right += across * cameras[i].source;
+  }
+  return sum.ldlt().solve(right);
+}
+
+/// Isocentre with the standard deviation of a jackknife over blocks of neighbouring frames.
+void describe(SweepPath& path, const std::vector<PlacedCamera>& cameras,
+              const std::vector<double>& angles_deg) {
+  path.isocentre = nearest_to_rays(cameras, 0, 0);
+  const std::size_t blocks = std::min<std::size_t>(8, cameras.size() / 2);
+  std::vector<Eigen::Vector3d> without;
+  for (std::size_t b = 0; b < blocks; ++b)
+    without.push_back(
+        nearest_to_rays(cameras, b * cameras.size() / blocks, (b + 1) * cameras.size() / blocks));
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero(), squares = Eigen::Vector3d::Zero();
+  for (const auto& at : without) mean += at / double(blocks);
+  for (const auto& at : without) squares += (at - mean).cwiseAbs2();
+  if (blocks > 1) path.isocentre_sigma = (squares * double(blocks - 1) / double(blocks)).cwiseSqrt();
+  double to_axis = 0, to_detector = 0;
+  for (const PlacedCamera& camera : cameras) {
+    const Eigen::Vector3d ray = (camera.detector - camera.source).normalized();
+    path.isocentre_radius_mm =
+        std::max(path.isocentre_radius_mm, ray.cross(path.isocentre - camera.source).norm());
+    const Eigen::Vector3d from = camera.source - path.isocentre;
+    to_axis += (path.axis ? path.axis->cross(from).norm() : from.norm()) / double(cameras.size());
+    to_detector += (camera.rotation * (camera.detector - camera.source)).z() / double(cameras.size());
+  }
+  path.source_to_axis_mm = to_axis;
+  path.source_to_detector_mm = to_detector;
+  const auto [least, most] = std::ranges::minmax(angles_deg);
+  path.arc_deg = most - least;
+}
+
+std::optional<double> stated_distance(const std::vector<FrameEstimate>& estimates) {
+  for (const FrameEstimate& estimate : estimates)
+    if (estimate.source_detector_mm) return estimate.source_detector_mm;
+  return std::nullopt;
+}
+
+/// The path through the frames' own estimates, of which nothing is changed.
+void take_free_path(Sweep& sweep, const Eigen::Vector3d& centre) {
+  std::vector<PlacedCamera> cameras;
+  const std::vector<std::size_t> accepted = accepted_in(sweep);
+  for (const std::size_t i : accepted) cameras.push_back(placed(sweep.frames[i].alone->view, sweep.detector));
+  if (cameras.size() < 3) return;
+  const OrbitFit fit = fit_orbit(cameras, centre);
+  for (std::size_t k = 0; k < accepted.size(); ++k) {
+    SweepFrame& frame = sweep.frames[accepted[k]];
+    frame.path_angle_deg = fit.angles_deg[k];
+    frame.own = deviation_of(cameras[k], fit.orbit.at(fit.angles_deg[k]));
+  }
+  SweepPath path;
+  path.axis = fit.orbit.axis;
+  describe(path, cameras, fit.angles_deg);
+  sweep.path = path;
+}
+
+Failure contradiction(const Sweep& sweep, std::size_t accepted, std::size_t estimated) {
+  const auto example = std::ranges::find_if(sweep.frames, [](const SweepFrame& frame) {
+    return frame.failure && frame.alone && frame.failure->figures.contains("limit");
+  });
+  Failure failure = *example->failure;
+  failure.message = fmt::format("only {} of {} calibrated images agree on one path; {}: {}", accepted,
+                                estimated, example->view, failure.message);
+  failure.view.clear();
+  return failure;
+}
+
+}  // namespace
+
+std::optional<Failure> estimate_path(Sweep& sweep, const pipeline::Case& base,
+                                     const std::vector<FrameEstimate>& estimates, PathKind kind) {
+  const Eigen::Vector3d centre = centre_of_balls(base.calibrator);
+  const std::size_t estimated = accepted_in(sweep).size();
+  if (kind == PathKind::free || estimated < least_path) {
+    take_free_path(sweep, centre);
+    return std::nullopt;
+  }
+  const auto errors = phantom_errors(base.calibrator);
+  const auto distance = sweep.pixel_known ? stated_distance(estimates) : std::nullopt;
+  bool moved = false;
+  for (;;) {
+    const std::vector<std::size_t> accepted = accepted_in(sweep);
+    if (accepted.size() < least_path || (!moved && 2 * accepted.size() < estimated)) {
+      for (SweepFrame& frame : sweep.frames) frame.best.reset();
+      return contradiction(sweep, accepted.size(), estimated);
+    }
+    const Joint joint = joint_of(estimates, accepted, sweep.detector, centre, errors, distance);
+    const bool moved_here = refuse_moved(sweep, joint);
+    moved = moved || moved_here;
+    if (moved_here || refuse_off_path(sweep, joint)) continue;
+    const auto covariances = covariances_of(joint, sweep.detector, errors);
+    for (std::size_t i = 0; i < joint.frames.size(); ++i)
+      set_best(sweep.frames[joint.frames[i]], joint, i, covariances[i], sweep.detector);
+    SweepPath path;
+    path.kind = PathKind::smooth;
+    path.axis = joint.fit.orbit.axis;
+    path.stiffness = joint.smooth.stiffness;
+    describe(path, joint.at, joint.angles_deg);
+    if (!sweep.pixel_known) path.source_to_detector_mm.reset();
+    sweep.path = path;
+    return std::nullopt;
+  }
+}
+
+}  // namespace helicarm::sweep

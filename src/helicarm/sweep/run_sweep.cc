@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <mutex>
+#include <numeric>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/parallel.h"
+#include "helicarm/pipeline/prior.h"
+#include "helicarm/sweep/estimate_frame.h"
+#include "helicarm/sweep/joint_estimate.h"
+#include "helicarm/sweep/sweep.h"
+
+namespace helicarm::sweep {
+namespace {
+
+constexpr std::size_t least_smooth = 16;  // frames of a smooth path
+
+/// Each frame's estimate; unreadable input is thrown.
+std::vector<FrameEstimate> estimates_of(const SweepCase& given, const SweepOptions& options,
+                                        const std::function<void(double)>& progress) {
+  const std::size_t count = given.frames.size();
+  std::vector<Expected<FrameEstimate>> made(count, FrameEstimate{});
+  pipeline::RunOptions run;
+  std::mutex guard;
+  std::size_t done = 0;
+  parallel_for(count, options.threads, [&](std::size_t i) {
+    const auto file = given.files.find(given.frames[i].view.image);
+    made[i] = estimate_frame(given.frames[i], file == given.files.end() ? nullptr : file->second.get(),
+                             given.base, run);
+    const std::lock_guard lock(guard);
+    if (progress) progress(double(++done) / double(count));
+  });
+  std::vector<FrameEstimate> estimates;
+  for (auto& estimate : made) estimates.push_back(value_or_throw(std::move(estimate)));
+  return estimates;
+}
+
+void refuse(FrameEstimate& estimate, Failure failure, const std::string& view) {
+  failure.view = view;
+  estimate.failure = std::move(failure);
+}
+
+/// The detector of all frames. Throws bad_value where they state different ones.
+Detector detector_of(const SweepCase& given, const std::vector<FrameEstimate>& estimates, bool& pixel_known) {
+  constexpr double tolerance = 0.01;
+  const FrameEstimate* first = nullptr;
+  const std::string* name = nullptr;
+  std::vector<double> focals;
+  for (std::size_t i = 0; i < estimates.size(); ++i) {
+    const FrameEstimate& at = estimates[i];
+    if (at.image_size.isZero()) continue;
+    if (at.alone) focals.push_back(at.alone->view.intrinsics.fy);
+    if (!first) {
+      first = &at;
+      name = &given.frames[i].view.name;
+    }
+    const auto differ = [&](const char* what) {
+      throw BadInput(Reason::bad_value, fmt::format("{} and {} state different {}: one run has one detector",
+                                                    *name, given.frames[i].view.name, what));
+    };
+    if (at.image_size != first->image_size) differ("image sizes");
+    if (at.pixel_mm.has_value() != first->pixel_mm.has_value() && !at.failure && !first->failure)
+      differ("pixel sizes");
+    if (at.pixel_mm && first->pixel_mm && std::abs(*at.pixel_mm / *first->pixel_mm - 1) > tolerance)
+      differ("pixel sizes");
+  }
+  Detector detector;
+  if (!first) return detector;
+  detector.image_size = first->image_size;
+  for (const FrameEstimate& at : estimates)
+    if (at.pixel_mm && !pixel_known) {
+      detector.pixel_mm = *at.pixel_mm;
+      pixel_known = true;
+    }
+  constexpr double plausible_mm = 1000;  // of source and detector
+  if (!pixel_known && !focals.empty()) {
+    std::ranges::nth_element(focals, focals.begin() + std::ptrdiff_t(focals.size() / 2));
+    detector.pixel_mm = plausible_mm / focals[focals.size() / 2];
+  }
+  return detector;
+}
+
+/// Square pixels, or the stated aspect, and the handedness of most frames; the others are refused.
+void take_handedness(const SweepCase& given, std::vector<FrameEstimate>& estimates, Detector& detector) {
+  int mirrored = 0, plain = 0;
+  for (const FrameEstimate& at : estimates)
+    if (at.alone) {
+      ++(at.alone->view.intrinsics.fx < 0 ? mirrored : plain);
+      if (const auto& aspect = at.fiducials.prior.aspect) detector.aspect = aspect->value;
+    }
+  const bool is_mirrored = mirrored > plain;
+  if (is_mirrored) detector.aspect *= -1;
+  for (std::size_t i = 0; i < estimates.size(); ++i)
+    if (!estimates[i].failure && (estimates[i].alone->view.intrinsics.fx < 0) != is_mirrored)
+      refuse(estimates[i],
+             {Reason::ambiguous_handedness,
+              fmt::format("the image is {}, most of the run's are {}",
+                          is_mirrored ? "not mirrored" : "mirrored", is_mirrored ? "mirrored" : "not"),
+              {},
+              {}},
+             given.frames[i].view.name);
+}
+
+/// Ratio of the residuals to the fiducials' standard deviations, by all frames together.
+double noise_factor(const std::vector<FrameEstimate>& estimates) {
+  constexpr double least = 0.3, enough_dof = 100, most_of_median = 4;
+  std::vector<double> ratios;
+  for (const FrameEstimate& at : estimates)
+    if (!at.failure && at.alone->dof > 0) ratios.push_back(at.alone->chi2 / at.alone->dof);
+  if (ratios.empty()) return 1;
+  std::ranges::nth_element(ratios, ratios.begin() + std::ptrdiff_t(ratios.size() / 2));
+  const double median = ratios[ratios.size() / 2];
+  double chi2 = 0, dof = 0;
+  for (const FrameEstimate& at : estimates)
+    if (!at.failure && at.alone->dof > 0 && at.alone->chi2 / at.alone->dof <= most_of_median * median)
+      chi2 += at.alone->chi2, dof += at.alone->dof;
+  const double factor = std::sqrt(chi2 / dof);
+  return dof < enough_dof ? std::max(1.0, factor) : std::max(least, factor);
+}
+
+/// Calibrates each frame again with the run's noise, and refuses those whose residuals exceed it.
+void calibrate_with(double factor, const SweepCase& given, std::vector<FrameEstimate>& estimates,
+                    unsigned threads) {
+  constexpr double largest_ratio = 4;  // of a frame's residuals to the run's noise
+  parallel_for(estimates.size(), threads, [&](std::size_t i) {
+    FrameEstimate& at = estimates[i];
+    if (at.failure) return;
+    for (fiducials::Fiducial& ball : at.fiducials.fiducials) ball.sigma_px *= factor;
+    at.fiducials.map_covariance_px2 *= factor * factor;
+    at.fiducials.start = at.alone->view;
+    auto again = calibrate_alone(at, given.base);
+    if (again) {
+      const double ratio = std::sqrt(at.alone->chi2 / std::max(1, at.alone->dof));
+      if (ratio > largest_ratio)
+        again =
+            fail(Reason::residual_too_large,
+                 fmt::format("residuals are {:.1f} times those of the other images, limit {:g}: labels are "
+                             "wrong, or a fiducial moved",
+                             ratio, largest_ratio),
+                 {{"ratio", ratio}, {"limit", largest_ratio}});
+    }
+    if (!again) refuse(at, again.error(), given.frames[i].view.name);
+  });
+}
+
+bool is_one_run(const SweepCase& given) {
+  return std::ranges::all_of(given.frames,
+                             [&](const Frame& frame) { return frame.run == given.frames.front().run; });
+}
+
+/// Warns where the angles that the file states are not those of the images.
+void compare_angles(Sweep& sweep) {
+  constexpr double limit_deg = 2;
+  double widest = 0, stated_arc = 0, found_arc = 0;
+  const SweepFrame* first = nullptr;
+  for (const SweepFrame& frame : sweep.frames) {
+    if (!frame.path_angle_deg || !frame.primary_angle_deg || !frame.secondary_angle_deg) continue;
+    if (!first) first = &frame;
+    // Angle between two positions of the C-arm: primary about the patient's axis, secondary across it.
+    const auto direction = [](const SweepFrame& of) {
+      const double p = *of.primary_angle_deg * EIGEN_PI / 180, s = *of.secondary_angle_deg * EIGEN_PI / 180;
+      return Eigen::Vector3d(std::sin(p) * std::cos(s), std::cos(p) * std::cos(s), std::sin(s));
+    };
+    const double stated =
+        std::acos(std::clamp(direction(*first).dot(direction(frame)), -1.0, 1.0)) * 180 / EIGEN_PI;
+    const double turned = std::abs(*frame.path_angle_deg - *first->path_angle_deg);
+    const double found = std::abs(turned - 360 * std::round(turned / 360));
+    if (std::abs(stated - found) > widest)
+      widest = std::abs(stated - found), stated_arc = stated, found_arc = found;
+  }
+  if (widest > limit_deg)
+    sweep.warnings.push_back(
+        {Reason::tag_disagrees,
+         fmt::format(
+             "the positioner angles of the file and the images disagree by up to {:.1f} degrees (the file "
+             "states {:.1f} from the first frame, the images show {:.1f}); the images are used",
+             widest, stated_arc, found_arc),
+         {},
+         {{"apart_deg", widest}, {"limit_deg", limit_deg}}});
+}
+
+Failure nothing_accepted(const std::vector<FrameEstimate>& estimates) {
+  std::map<Reason, int> count;
+  for (const FrameEstimate& at : estimates)
+    if (at.failure) ++count[at.failure->reason];
+  const auto most = std::ranges::max_element(count, {}, [](const auto& entry) { return entry.second; });
+  const auto example = std::ranges::find_if(
+      estimates, [&](const FrameEstimate& at) { return at.failure && at.failure->reason == most->first; });
+  return {most->first,
+          fmt::format("none of {} images is accepted; {} with this reason, the first: {}", estimates.size(),
+                      most->second, example->failure->message),
+          {},
+          {{"images", double(estimates.size())}}};
+}
+
+SweepFrame reported(const Frame& frame, const FrameEstimate& estimate) {
+  SweepFrame made;
+  made.number = frame.number;
+  made.view = frame.view.name;
+  made.failure = estimate.failure;
+  made.primary_angle_deg = estimate.primary_angle_deg;
+  made.secondary_angle_deg = estimate.secondary_angle_deg;
+  made.fiducials_used = int(std::ranges::count(estimate.fiducials.fiducials, fiducials::FiducialStatus::used,
+                                               &fiducials::Fiducial::status));
+  made.alone = estimate.alone;
+  if (!estimate.failure) {
+    made.best = estimate.alone;
+    made.decision = estimate.variance_scale > 1 ? Decision::warn : Decision::accept;
+  }
+  return made;
+}
+
+void warn_of_refused(Sweep& sweep) {
+  std::map<Reason, std::vector<int>> refused;
+  for (const SweepFrame& frame : sweep.frames)
+    if (frame.failure) refused[frame.failure->reason].push_back(frame.number);
+  constexpr std::size_t most_named = 20;
+  for (const auto& [reason, numbers] : refused) {
+    const std::size_t named = std::min(most_named, numbers.size());
+    sweep.warnings.push_back(
+        {reason,
+         fmt::format("{} of {} images are refused: {}{}", numbers.size(), sweep.frames.size(),
+                     fmt::join(numbers.begin(), numbers.begin() + std::ptrdiff_t(named), ", "),
+                     named < numbers.size() ? ", ..." : ""),
+         {},
+         {{"refused", double(numbers.size())}, {"images", double(sweep.frames.size())}}});
+  }
+}
+
+Sweep swept(const SweepCase& given, const SweepOptions& options,
+            const std::function<void(double)>& progress) {
+  Sweep sweep;
+  sweep.warnings = given.base.warnings;
+  std::vector<FrameEstimate> estimates = estimates_of(given, options, progress);
+  sweep.detector = detector_of(given, estimates, sweep.pixel_known);
+  take_handedness(given, estimates, sweep.detector);
+  sweep.noise_factor = noise_factor(estimates);
+  calibrate_with(sweep.noise_factor, given, estimates, options.threads);
+  const auto accepted =
+      std::size_t(std::ranges::count_if(estimates, [](const auto& at) { return !at.failure; }));
+  for (std::size_t i = 0; i < estimates.size(); ++i)
+    sweep.frames.push_back(reported(given.frames[i], estimates[i]));
+  if (accepted == 0) {
+    sweep.failure = nothing_accepted(estimates);
+    return sweep;
+  }
+  const PathKind kind = options.path.value_or(accepted >= least_smooth && is_one_run(given) ? PathKind::smooth
+                                                                                            : PathKind::free);
+  sweep.failure = estimate_path(sweep, given.base, estimates, kind);
+  compare_angles(sweep);
+  warn_of_refused(sweep);
+  return sweep;
+}
+
+}  // namespace
+
+Expected<Sweep> run_sweep(const SweepCase& given, const SweepOptions& options,
+                          const std::function<void(double share)>& progress) {
+  return guarded([&] {
+    const auto begun = std::chrono::steady_clock::now();
+    if (!is_one_run(given) &&
+        std::ranges::any_of(given.frames, [](const Frame& frame) { return frame.run != frame.view.name; }))
+      throw BadInput(Reason::bad_value,
+                     "views: \"frames\" makes a view a run of its own: make a case of each run");
+    Sweep sweep = swept(given, options, progress);
+    sweep.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    return sweep;
+  });
+}
+
+}  // namespace helicarm::sweep

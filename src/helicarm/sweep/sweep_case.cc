@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/sweep/sweep_case.h"
+
+#include <algorithm>
+#include <regex>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "helicarm/case_registration/follow_case.h"
+#include "helicarm/pipeline/case_json.h"
+#include "helicarm/pipeline/registration_case.h"
+
+namespace helicarm::sweep {
+namespace {
+
+namespace fs = std::filesystem;
+using case_registration::FrameRange;
+
+/// Takes "frames" out of every view: the rest is a case like any other. Empty: one image.
+std::vector<std::string> take_frames(Json& json, const std::string& origin) {
+  std::vector<std::string> frames;
+  if (!json.is_object() || !json.contains("views") || !json["views"].is_array()) return frames;
+  for (Json& view : json["views"]) {
+    std::string& of_view = frames.emplace_back();
+    if (!view.is_object()) continue;
+    const std::string where = fmt::format("{}: views[{}]", origin, frames.size() - 1);
+    if (const auto found = view.find("frames"); found != view.end() && !found->is_null()) {
+      if (!found->is_string())
+        throw BadInput(Reason::bad_value,
+                       fmt::format("{}: \"frames\" is not a text: \"all\" or \"A-B[:STEP]\"", where));
+      of_view = found->get<std::string>();
+      if (const auto frame = view.find("frame"); frame != view.end() && !frame->is_null())
+        throw BadInput(Reason::bad_value,
+                       fmt::format("{}: \"frame\" cannot be combined with \"frames\"", where));
+    }
+    view.erase("frames");
+  }
+  return frames;
+}
+
+bool is_numbered(const fs::path& image) {
+  return image.filename().string().find("{frame") != std::string::npos;
+}
+
+/// The view at one frame: the numbered file, or that frame of its file.
+pipeline::CaseView at_number(const pipeline::CaseView& view, int number) {
+  pipeline::RegistrationCase one;
+  one.base.views = {view};
+  return value_or_throw(pipeline::at_frame(std::move(one), number)).base.views.front();
+}
+
+/// Numbers of the files that exist.
+std::vector<int> numbers_of_files(const pipeline::CaseView& view) {
+  std::vector<int> numbers;
+  const std::string pattern = view.image.filename().string();
+  const std::size_t prefix = pattern.find("{frame");
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(view.image.parent_path(), ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.size() <= prefix || name.compare(0, prefix, pattern, 0, prefix) != 0) continue;
+    const std::size_t last = std::min(name.find_first_not_of("0123456789", prefix), name.size());
+    if (last == prefix || last - prefix > 6) continue;
+    const int number = std::stoi(name.substr(prefix, last - prefix));
+    if (at_number(view, number).image.filename() == name) numbers.push_back(number);
+  }
+  if (numbers.empty())
+    throw BadInput(Reason::missing_file, fmt::format("{}: no file \"{}\" in {}", view.name, pattern,
+                                                     view.image.parent_path().string()));
+  std::ranges::sort(numbers);
+  return numbers;
+}
+
+std::vector<int> numbers_in(const FrameRange& range) {
+  std::vector<int> numbers;
+  for (int i = 0; i < range.count(); ++i) numbers.push_back(range.first + i * range.step);
+  return numbers;
+}
+
+std::vector<int> numbers_of(SweepCase& read, const pipeline::CaseView& view, const std::string& frames) {
+  const bool all = frames == "all";
+  if (is_numbered(view.image))
+    return all ? numbers_of_files(view)
+               : numbers_in(value_or_throw(case_registration::frame_range_from(frames)));
+  auto& file = read.files[view.image];
+  if (!file) file = value_or_throw(xray::ImageFile::open(view.image));
+  value_or_throw(file->check_angles());
+  const int count = file->frames();
+  const FrameRange range =
+      all ? FrameRange{1, count, 1} : value_or_throw(case_registration::frame_range_from(frames));
+  if (range.first < 1 || range.last > count)
+    throw BadInput(Reason::bad_value, fmt::format("{}: \"frames\" is \"{}\", but {} has the frames 1 to {}",
+                                                  view.name, frames, view.image.filename().string(), count));
+  return numbers_in(range);
+}
+
+void add_frames(SweepCase& read, const pipeline::CaseView& view, const std::string& frames) {
+  if (frames.empty()) {
+    read.frames.push_back({view, view.name, view.frame.value_or(1)});
+    return;
+  }
+  std::string first;
+  int missing = 0;
+  const std::vector<int> numbers = numbers_of(read, view, frames);
+  if (read.frames.size() + numbers.size() > pipeline::most_frames)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: more than {} images in the case", view.name, pipeline::most_frames));
+  for (const int number : numbers) {
+    Frame frame{at_number(view, number), view.name, number};
+    frame.view.name = fmt::format("{}/{}", view.name, number);
+    if (!fs::exists(frame.view.image) && missing++ == 0) first = frame.view.image.filename().string();
+    read.frames.push_back(std::move(frame));
+  }
+  if (missing > 0)
+    throw BadInput(Reason::missing_file, fmt::format("{}: {} of {} images do not exist, the first: {}",
+                                                     view.name, missing, numbers.size(), first));
+}
+
+}  // namespace
+
+Expected<SweepCase> read_sweep_case(const fs::path& path) {
+  return guarded([&] {
+    const fs::path file = fs::absolute(pipeline::case_file(path));
+    const std::string origin = file.filename().string();
+    Json json = value_or_throw(read_json(file));
+    const std::vector<std::string> frames = take_frames(json, origin);
+    SweepCase read;
+    read.base = pipeline::case_of(json, origin, file.parent_path(), pipeline::Purpose::sweep);
+    for (std::size_t i = 0; i < read.base.views.size(); ++i) add_frames(read, read.base.views[i], frames[i]);
+    return read;
+  });
+}
+
+}  // namespace helicarm::sweep
