@@ -19,31 +19,35 @@ double radius_px(double diameter_mm, const geometry::View& camera, const Eigen::
   return 0.5 * diameter_mm * std::abs(camera.intrinsics.fy) / camera.depth(place);
 }
 
-Expected<fiducials::ImagePoint> ball_at(const Pick& pick, const LabelledView& image,
+Expected<fiducials::ImagePoint> ball_at(const Pick& pick, const xray::XrayImage& image,
+                                        const rectification::Rectification& rectification,
                                         const calibration::CalibratedView& calibrated,
                                         const Eigen::Vector3d& centre) {
-  const rectification::DistortionMap& map = image.rectification.map;
+  const rectification::DistortionMap& map = rectification.map;
   const geometry::View& camera = calibrated.view;
   if (!calibrated.by_paper)
-    return fiducials::snap_to_ball(*image.xray_image, map, camera, camera.depth(centre), pick.uv_raw,
-                                   pick.diameter_mm, image.rectification.noise);
+    return fiducials::snap_to_ball(image, map, camera, camera.depth(centre), pick.uv_raw, pick.diameter_mm,
+                                   rectification.noise);
   return fiducials::point_of_click(map, pick.uv_raw, 0).and_then([&](const fiducials::ImagePoint& click) {
-    return fiducials::circle_near(*image.xray_image, map, click.uv,
-                                  radius_px(pick.diameter_mm, camera, centre));
+    return fiducials::circle_near(image, map, click.uv, radius_px(pick.diameter_mm, camera, centre));
   });
 }
 
-Expected<fiducials::ImagePoint> observe_pick(const Pick& pick, const LabelledView& image,
+}  // namespace
+
+Expected<fiducials::ImagePoint> observe_pick(const Pick& pick, const xray::XrayImage& image,
+                                             const rectification::Rectification& rectification,
                                              const calibration::CalibratedView& calibrated,
                                              const Eigen::Vector3d& centre) {
-  const rectification::DistortionMap& map = image.rectification.map;
   if (pick.snap == Snap::ball) {
-    auto seen = ball_at(pick, image, calibrated, centre);
+    auto seen = ball_at(pick, image, rectification, calibrated, centre);
     if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
     return seen;
   }
-  return fiducials::point_of_click(map, pick.uv_raw, pick.sigma_px);
+  return fiducials::point_of_click(rectification.map, pick.uv_raw, pick.sigma_px);
 }
+
+namespace {
 
 void check_inside(const Pick& pick, const rectification::DistortionMap& map) {
   if (!map.shows(pick.uv_raw))
@@ -186,9 +190,10 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
     const Task& task = tasks[i];
     const LabelledView& image = calibration.images[task.view];
     const calibration::CalibratedView& view = calibration.views[task.view];
-    const auto seen = task.pick ? observe_pick(*task.pick, image, view, centre)
-                                : observe_target(*task.target, image, view, calibration.fiducials[task.view],
-                                                 given.calibrator);
+    const auto seen =
+        task.pick
+            ? observe_pick(*task.pick, *image.xray_image, image.rectification, view, centre)
+            : observe_target(*task.target, image, view, calibration.fiducials[task.view], given.calibrator);
     if (seen)
       points[task.point].seen[task.view] = *seen;
     else

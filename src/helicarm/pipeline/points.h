@@ -10,6 +10,13 @@
 
 namespace helicarm::pipeline {
 
+/// The image of a pick in its calibrated view: of the ball that it snaps to, else of the click. `centre`: of
+/// the calibrator, at whose depth the ball is. Fails as `snap_to_ball` and `point_of_click`.
+Expected<fiducials::ImagePoint> observe_pick(const Pick& pick, const xray::XrayImage& image,
+                                             const rectification::Rectification& rectification,
+                                             const calibration::CalibratedView& calibrated,
+                                             const Eigen::Vector3d& centre);
+
 /// Observes picks, then check targets, in the calibrated images. `bad_value` for a pick outside its image.
 Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseCalibration& calibration,
                                                   unsigned threads);
