@@ -22,6 +22,13 @@ const pipeline::Pick* pick_of(const ApplicationState& state, const std::string& 
   return pick == state.picks.end() ? nullptr : &*pick;
 }
 
+const Failure* failure_of(const ApplicationState& state, const std::string& point, const std::string& view) {
+  const auto failed = std::ranges::find_if(state.failed_picks, [&](const FailedPick& one) {
+    return one.pick.name == point && one.pick.view == view;
+  });
+  return failed == state.failed_picks.end() ? nullptr : &failed->why;
+}
+
 bool is_picked(const std::vector<pipeline::Pick>& picks, const std::vector<std::string>& views,
                const std::string& point) {
   const auto picked = std::ranges::count_if(picks, [&](const pipeline::Pick& pick) {
@@ -34,16 +41,21 @@ namespace {
 
 std::optional<WantedPick> missing_pick(const ApplicationState& state, const std::string& point,
                                        std::optional<guidance::Bone> bone) {
-  if (is_picked(state.picks, state.views, point)) return std::nullopt;
-  for (const std::string& view : state.views)
-    if (pick_of(state, point, view) == nullptr) return WantedPick{point, view, bone};
+  std::vector<pipeline::Pick> good;
+  for (const pipeline::Pick& pick : state.picks)
+    if (failure_of(state, pick.name, pick.view) == nullptr) good.push_back(pick);
+  if (is_picked(good, state.views, point)) return std::nullopt;
+  for (const std::string& view : state.views) {
+    if (const Failure* failed = failure_of(state, point, view)) return WantedPick{point, view, bone, *failed};
+    if (pick_of(state, point, view) == nullptr) return WantedPick{point, view, bone, {}};
+  }
   return std::nullopt;
 }
 
 }  // namespace
 
 WantedPick wanted_end(const operation::PlannedTunnel& tunnel, const std::string& end) {
-  return {end, "", tunnel.bone.empty() ? std::nullopt : std::optional(tunnel.bone)};
+  return {end, "", tunnel.bone.empty() ? std::nullopt : std::optional(tunnel.bone), {}};
 }
 
 std::optional<WantedPick> next_pick(const ApplicationState& state) {

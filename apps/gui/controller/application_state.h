@@ -2,6 +2,7 @@
 #pragma once
 
 #include <QString>
+#include <QStringList>
 #include <array>
 #include <map>
 #include <memory>
@@ -41,13 +42,30 @@ struct NudgedModel {
   std::vector<std::vector<Eigen::Vector2d>> outlines;  ///< per view, rectified px
 };
 
+/// A pick of which its view shows no image, and why.
+struct FailedPick {
+  pipeline::Pick pick;
+  Failure why;
+};
+
+/// What was written into a folder.
+struct ExportRecord {
+  std::filesystem::path folder;
+  QString at;         ///< time of day
+  QStringList lacks;  ///< `lacks_of_export`
+  std::shared_ptr<const pipeline::Result> result;
+  std::shared_ptr<const case_registration::CaseRegistration> registration;
+  std::vector<pipeline::Pick> picks;
+};
+
 /// The state shown by the window, except live data. A value: the window receives complete states only.
 struct ApplicationState {
   Source source = Source::none;
-  std::filesystem::path folder;    ///< of the session or the case
-  std::vector<std::string> views;  ///< required views, in order
-  std::vector<ViewFile> files;     ///< of the views; empty in an operation
-  std::string next_view;           ///< view of the next image
+  std::filesystem::path folder;          ///< of the session or the case
+  std::filesystem::path asked_for = {};  ///< opened last, or refused
+  std::vector<std::string> views;        ///< required views, in order
+  std::vector<ViewFile> files;           ///< of the views; empty in an operation
+  std::string next_view;                 ///< view of the next image
   phantom::Calibrator calibrator;
   std::shared_ptr<const simulation::BoneMeshes> bones;  ///< at the acquisition; simulation only
 
@@ -63,6 +81,9 @@ struct ApplicationState {
   std::vector<std::string> landmarks;                   ///< other points to pick; of files only
   std::map<std::string, pipeline::BoneLabel> bones_of;  ///< of landmarks that are not picked yet
   std::vector<pipeline::Pick> picks;
+  std::vector<pipeline::Pick> measured_picks = {};        ///< those of `result`
+  std::vector<FailedPick> failed_picks = {};              ///< of `picks`
+  bool has_other_options = false;                         ///< than those of the measurement
   std::optional<std::filesystem::path> case_folder = {};  ///< where picks are kept; not of replays
   bool has_unsaved_picks = false;                         ///< not in the case.json of `case_folder`
   std::optional<Failure> picks_not_kept = {};             ///< why changed picks are not kept or saved
@@ -71,14 +92,21 @@ struct ApplicationState {
   bool has_models = false;  ///< the case names models to be registered
   std::shared_ptr<const case_registration::CaseRegistration> registration = {};
   std::optional<NudgedModel> nudged = {};
+  std::vector<pipeline::Pick> registered_picks = {};  ///< at the registration
+  std::vector<std::string> models = {};               ///< names of the case's
 
-  QString tour;  ///< description of the registration moves
+  QString tour;      ///< description of the registration moves
+  QString way = {};  ///< of the moves of `order`
   std::optional<double> hand_eye_rms_mm;
   std::optional<robot::RobotOrder> order;  ///< previewed, not yet carried out
   operation::PathPreview path;
   bool is_replayed = false;  ///< a moment of a recorded operation
   bool tool_is_out = false;  ///< moving to a tunnel or in it; can be withdrawn
+  bool has_arrived = false;  ///< the tool is in the tunnel `bound_for`
+  std::string bound_for = {};
   std::map<std::string, operation::TunnelOutcome> outcomes;
+
+  std::optional<ExportRecord> exported = {};
 
   std::optional<Phase> busy;  ///< step in progress
   std::string doing;          ///< description of the work in progress
@@ -95,6 +123,9 @@ std::string missing_view(const ApplicationState& state);
 const pipeline::Pick* pick_of(const ApplicationState& state, const std::string& point,
                               const std::string& view);
 
+/// Why this pick has failed; null if it has not, or is not made.
+const Failure* failure_of(const ApplicationState& state, const std::string& point, const std::string& view);
+
 /// Two views locate a point; it may be picked in more.
 bool is_picked(const std::vector<pipeline::Pick>& picks, const std::vector<std::string>& views,
                const std::string& point);
@@ -104,6 +135,7 @@ struct WantedPick {
   std::string point;
   std::string view;
   std::optional<guidance::Bone> bone;
+  std::optional<Failure> failed = {};  ///< why an earlier click in this view is no pick
 };
 /// An end of a tunnel, in any view.
 WantedPick wanted_end(const operation::PlannedTunnel& tunnel, const std::string& end);

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gui/controller/controller.h"
 
+#include <QTime>
 #include <algorithm>
 
 #include <fmt/format.h>
 
 #include "gui/controller/equipment.h"
+#include "gui/controller/pick_checks.h"
+#include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/replay/pdf_report.h"
 #include "helicarm/case_registration/measure_case.h"
@@ -27,6 +30,8 @@ void forget_measurement(ApplicationState& state) {
   state.path = {};
   state.outcomes.clear();
   state.refusals.clear();
+  state.measured_picks.clear();
+  state.has_arrived = false;
 }
 
 }  // namespace
@@ -67,7 +72,7 @@ void Controller::finish(Phase phase, const Expected<Change>& done) {
   state_.busy.reset();
   state_.doing.clear();
   if (const auto open_next = std::exchange(next_source_, nullptr)) {
-    picks_came_ = false;
+    measures_again_ = false;
     return open_next();
   }
   if (done)
@@ -76,7 +81,7 @@ void Controller::finish(Phase phase, const Expected<Change>& done) {
     state_.refusals.insert_or_assign(phase, done.error());
   emit changed();
   if (!done) emit refused(phase, sentence_of(done.error()));
-  if (std::exchange(picks_came_, false)) measure();
+  if (std::exchange(measures_again_, false)) measure();
 }
 
 void Controller::meanwhile(Change change) {
@@ -89,7 +94,14 @@ void Controller::meanwhile(Change change) {
       Qt::QueuedConnection);
 }
 
-void Controller::set_options(const case_registration::RegisterOptions& options) { options_ = options; }
+void Controller::set_options(const case_registration::RegisterOptions& options) {
+  const bool differ = !case_registration::give_the_same(options_, options);
+  options_ = options;
+  if (!differ || state_.source != Source::files || !state_.result) return;
+  state_.has_other_options = true;
+  emit changed();
+  measure();
+}
 
 void Controller::expect(const std::string& view) {
   state_.next_view = view;
@@ -118,6 +130,7 @@ Controller::Change Controller::came(Images images) {
     forget_measurement(state);
     live_tool_.reset();  // its lines belong to the previous images
     state.result = result_with(images);
+    state.failed_picks = failed_picks(state, {});
     state.next_view = missing_view(state);
     if (has_all_images()) QMetaObject::invokeMethod(this, &Controller::measure, Qt::QueuedConnection);
   };
@@ -135,13 +148,16 @@ Controller::Change Controller::measured(Equipment& equipment, const std::vector<
   std::optional<operation::LiveTool> live;
   if (equipment.operation && !result->failure)
     if (auto follows = equipment.operation->live_tool()) live = *std::move(follows);
-  return [this, result, live, other_models](ApplicationState& state) {
+  return [this, result, live, other_models, picks, options = equipment.options](ApplicationState& state) {
     forget_measurement(state);
+    state.measured_picks = picks;
+    state.has_other_options = !case_registration::give_the_same(options_, options);
     if (other_models || result->failure) {
       state.registration.reset();
       state.nudged.reset();
     }
     state.result = result;
+    state.failed_picks = failed_picks(state, state.failed_picks);
     ++state.measurements;
     // A refused tunnel leaves the calibration: its ends can be picked again.
     state.measured =
@@ -157,7 +173,7 @@ Controller::Change Controller::measured(Equipment& equipment, const std::vector<
 
 void Controller::measure() {
   if (!equipment_ || (!equipment_->given && !equipment_->operation)) return;
-  picks_came_ = state_.busy == Phase::calibrate;
+  measures_again_ = state_.busy.has_value();
   begin(Phase::calibrate, "measuring",
         [this, equipment = equipment_, picks = state_.picks, options = options_] {
           equipment->options = options;
@@ -184,22 +200,38 @@ void Controller::export_to(const fs::path& folder) {
     emit refused(Phase::verify, tr("Nothing to export: measure first."));
     return;
   }
+  if (state_.busy)
+    return emit refused(*state_.busy, tr("Nothing is exported during other work (%1): export again after it.")
+                                          .arg(QString::fromStdString(state_.doing)));
+  if (state_.has_other_options)
+    return emit refused(Phase::verify,
+                        tr("Nothing is exported: %1. Measure again (F5).").arg(stale(state_, Phase::verify)));
   pipeline::Result result = *state_.result;
   for (const auto& [tunnel, outcome] : state_.outcomes)
     if (outcome.verification) result.verifications.push_back(*outcome.verification);
+  ExportRecord record{folder,
+                      QTime::currentTime().toString("HH:mm"),
+                      lacks_of_export(state_),
+                      state_.result,
+                      state_.registration,
+                      state_.picks};
+  std::optional<case_registration::CaseRegistration> registration;
+  if (state_.registration) registration = with_moves(state_);
   begin(Phase::verify, "writing the report",
-        [this, result = std::move(result), registration = state_.registration, folder]() -> Change {
+        [this, result = std::move(result), registration = std::move(registration), folder,
+         record = std::move(record)]() -> Change {
           const pipeline::Result whole =
               registration ? case_registration::with_models(result, *registration) : result;
           report::forget_exports(folder);
           value_or_throw(report::write_report(whole, folder));
           value_or_throw(write_pdf_report(whole, folder / "report.pdf"));
           if (!whole.failure) value_or_throw(report::write_exports(whole, folder));
-          value_or_throw(case_registration::write_models(
-              registration ? std::optional(*registration) : std::nullopt, folder));
+          value_or_throw(case_registration::write_models(registration, folder));
           value_or_throw(write_file(folder / "result.json", to_text(pipeline::to_json(whole)) + "\n"));
-          return
-              [this, folder](ApplicationState&) { emit exported(QString::fromStdString(folder.string())); };
+          return [this, record](ApplicationState& state) {
+            state.exported = record;
+            emit exported(QString::fromStdString(record.folder.string()));
+          };
         });
 }
 

@@ -59,7 +59,7 @@ class Controller : public QObject {
   /// For virtual devices opened from now on, never for real ones: tests on a busy machine set longer limits.
   void set_virtual_freshness(const operation::FreshnessLimits& limits) { freshness_ = limits; }
 
-  /// For the next measurement.
+  /// A case is measured again if they differ; the next measurement takes them.
   void set_options(const case_registration::RegisterOptions& options);
   void expect(const std::string& view);        ///< view of the next image
   void shoot(const std::string& view);         ///< with the virtual C-arm
@@ -69,6 +69,8 @@ class Controller : public QObject {
   void pick(pipeline::Pick pick);
   bool takes_picks() const;
   void take_offered_picks();
+  /// Changes how a point's picks are taken, in one view or all, and measures again.
+  void set_snap(const std::string& point, pipeline::Snap snap, const std::string& view = {});
   /// Another point to pick, in a case of files. Refused if the name is empty or taken.
   void add_landmark(const std::string& name, std::optional<pipeline::BoneLabel> bone = {});
   /// Into case.json.
@@ -115,6 +117,8 @@ class Controller : public QObject {
   void changed();
   void refused(helicarm::gui::Phase phase, const QString& why);
   void exported(const QString& folder);
+  /// What was done, or will be, in one sentence.
+  void told(const QString& words);
 
  private:
   using Change = std::function<void(ApplicationState&)>;
@@ -147,7 +151,7 @@ class Controller : public QObject {
   std::string followed_;
   std::vector<Picks> earlier_picks_, later_picks_;  ///< for undo and redo, the last is the next
   bool outlining_ = false;                          ///< of the nudged model
-  bool picks_came_ = false;                         ///< during the measurement
+  bool measures_again_ = false;                     ///< after the work in progress
   std::function<void()> next_source_;               ///< opened as soon as the work in progress has ended
   case_registration::RegisterOptions options_;
   std::optional<operation::FreshnessLimits> freshness_;

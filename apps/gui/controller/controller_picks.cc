@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "gui/controller/controller.h"
+#include "gui/controller/pick_checks.h"
 #include "gui/controller/steps.h"
 #include "gui/controller/unsaved_picks.h"
 
@@ -25,6 +26,7 @@ void Controller::step_picks(std::vector<Picks>& from, std::vector<Picks>& to) {
 
 void Controller::keep_unsaved_picks() {
   complete_landmarks(state_);
+  state_.failed_picks = failed_picks(state_, state_.failed_picks);
   if (!state_.case_folder) return;
   state_.has_unsaved_picks = true;
   const auto kept = keep_unsaved(*state_.case_folder, state_.picks);
@@ -40,6 +42,9 @@ void Controller::save_picks() {
   state_.has_unsaved_picks = !saved;
   state_.picks_not_kept = saved ? std::nullopt : std::optional(saved.error());
   emit changed();
+  emit told(saved ? tr("The picks are saved in %1.")
+                        .arg(QString::fromStdString((*state_.case_folder / "case.json").string()))
+                  : sentence_of(saved.error()));
 }
 
 void Controller::add_landmark(const std::string& name, std::optional<pipeline::BoneLabel> bone) {
@@ -82,6 +87,20 @@ void Controller::pick(pipeline::Pick pick) {
   picks.push_back(std::move(pick));
   const bool completes = is_picked(picks, state_.views, point);
   change_picks(std::move(picks), completes);  // shows its position and ray gap immediately
+}
+
+void Controller::set_snap(const std::string& point, pipeline::Snap snap, const std::string& view) {
+  if (!takes_picks()) return;
+  Picks picks = state_.picks;
+  bool changes = false;
+  for (pipeline::Pick& pick : picks)
+    if (pick.name == point && (view.empty() || pick.view == view) && pick.snap != snap) {
+      pick.snap = snap;
+      changes = true;
+    }
+  if (!changes) return;
+  const bool completes = is_picked(picks, state_.views, point);
+  change_picks(std::move(picks), completes);
 }
 
 void Controller::take_offered_picks() {

@@ -47,8 +47,9 @@ void Controller::register_models() {
           };
           const auto done = std::make_shared<const CaseRegistration>(
               value_or_throw(gui::register_models(*equipment, picks, from, tell)));
-          return [done](ApplicationState& state) {
+          return [done, picks](ApplicationState& state) {
             state.registration = done;
+            state.registered_picks = picks;
             state.nudged.reset();
           };
         });

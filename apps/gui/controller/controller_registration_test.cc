@@ -102,12 +102,70 @@ TEST_F(ControllerRegistration, AsksForNoPicksWhereModelsBringTheTunnels) {
   EXPECT_TRUE(state().tunnels.empty());
 }
 
+TEST_F(ControllerRegistration, ExportsAModelMovedByHandAsRefusedWithoutItsPlan) {
+  register_models();
+  ASSERT_TRUE(state().registration) << card().why.toStdString();
+  registration::RigidStep step = registration::RigidStep::Zero();
+  step.tail<3>() << 5, 0, 0;
+  controller_->nudge(0, step);
+  EXPECT_EQ(card().status, StepStatus::stale);
+  wait(
+      [&] { return state().nudged && state().nudged->outlines != state().registration->models[0].outlines; });
+  const TemporaryFolder out;
+  controller_->export_to(out.path());
+  wait([&] { return !state().busy; });
+  const Json models = read_json(out.path() / "registration.json").value();
+  EXPECT_EQ(models["models"][0]["decision"], "refuse");
+  EXPECT_EQ(models["models"][0]["failure"]["code"], "plan_stale");
+  EXPECT_TRUE(models["models"][0]["tunnels"].empty());
+  EXPECT_TRUE(read_json(out.path() / "result.json").value()["tunnels"].empty());
+  ASSERT_TRUE(state().exported);
+  EXPECT_TRUE(state().exported->lacks.join("; ").contains("moved by hand"));
+}
+
+TEST_F(ControllerRegistration, OtherSettingsMeasureTheCaseAgain) {
+  register_models();
+  ASSERT_TRUE(state().registration) << card().why.toStdString();
+  case_registration::RegisterOptions options;
+  options.run.motion_sigma_mm = 0.5;
+  const int before = state().measurements;
+  controller_->set_options(options);
+  EXPECT_TRUE(state().has_other_options);
+  EXPECT_EQ(card().status, StepStatus::stale);
+  wait([&] { return !state().busy; });
+  EXPECT_FALSE(state().has_other_options);
+  EXPECT_EQ(state().measurements, before + 1);
+  EXPECT_FALSE(state().registration);
+}
+
+TEST_F(ControllerRegistration, AnOwnCalibratorIsNotAskedForTheKneesTunnels) {
+  const TemporaryFolder own;
+  simulation::SimulationOptions options;
+  options.kind = simulation::CaseKind::flat;
+  options.size = 512;
+  auto simulated = simulation::simulate_case(options).value();
+  simulated.calibrator.name = "own object";
+  ASSERT_TRUE(simulation::write_case(own.path(), simulated));
+  ASSERT_TRUE(write_file(own.path() / "own.json", to_text(phantom::to_json(simulated.calibrator))));
+  Json json = read_json(own.path() / "case.json").value();
+  json["calibrator"] = "own.json";
+  json.erase("picks");
+  json.erase("tunnels");
+  json.erase("tool_lines");
+  ASSERT_TRUE(write_file(own.path() / "case.json", to_text(json)));
+  controller_->open_case(own.path(), false);
+  wait([&] { return !state().busy; });
+  ASSERT_TRUE(state().result) << steps_of(state())[0].why.toStdString();
+  EXPECT_TRUE(state().tunnels.empty());
+}
+
 TEST_F(ControllerRegistration, CancelEndsIt) {
   controller_->register_models();
   controller_->cancel();
   wait([&] { return !state().busy; });
   EXPECT_FALSE(state().registration);
   EXPECT_EQ(state().refusals.at(Phase::registration).reason, Reason::interrupted);
+  EXPECT_EQ(card().status, StepStatus::waiting);
 }
 
 TEST_F(ControllerRegistration, CancelDuringTheSearchEndsIt) {

@@ -18,18 +18,42 @@ bool has_left(const robot::RobotLinkStatus& status, const robot::RobotState& res
          (status.state->base_from_tcp.translation - rest.base_from_tcp.translation).norm() > at_rest_mm;
 }
 
-QString words_of(const std::vector<robot::RobotOrder>& tour) {
+QString tour_words(const std::vector<robot::RobotOrder>& tour) {
   if (tour.empty()) return {};
   double farthest_mm = 0, speed_mm_s = 0;
   const Eigen::Vector3d from = tour.back().waypoints.back().base_from_tcp.translation;
-  for (const robot::RobotOrder& order : tour)
+  Eigen::Vector3d last = from;
+  QStringList each;
+  for (const robot::RobotOrder& order : tour) {
+    double way_mm = 0;
     for (const robot::Waypoint& waypoint : order.waypoints) {
-      farthest_mm = std::max(farthest_mm, (waypoint.base_from_tcp.translation - from).norm());
+      const Eigen::Vector3d& at = waypoint.base_from_tcp.translation;
+      farthest_mm = std::max(farthest_mm, (at - from).norm());
       speed_mm_s = std::max(speed_mm_s, waypoint.speed_mm_s);
+      way_mm += (at - last).norm();
+      last = at;
     }
-  return Controller::tr("%1 moves; the tip stays within %2 mm of its position, at most %3 mm/s")
+    each << Controller::tr("%1: %2").arg(each.size() + 1).arg(way_mm, 0, 'f', 0);
+  }
+  return Controller::tr(
+             "One hold starts %1 moves; the tip stays within %2 mm of its position, at most %3 mm/s. "
+             "Move and way of the tip in mm: %4.")
       .arg(tour.size())
       .arg(farthest_mm, 0, 'f', 0)
+      .arg(speed_mm_s, 0, 'f', 0)
+      .arg(each.join(", "));
+}
+
+/// Of a planned path.
+QString order_words(const robot::RobotOrder& order, const operation::PathPreview& path) {
+  double way_mm = 0, speed_mm_s = 0;
+  for (std::size_t i = 1; i < path.in_calibrator.size(); ++i)
+    way_mm += (path.in_calibrator[i] - path.in_calibrator[i - 1]).norm();
+  for (const robot::Waypoint& waypoint : order.waypoints)
+    speed_mm_s = std::max(speed_mm_s, waypoint.speed_mm_s);
+  return Controller::tr("One hold starts %1 moves, %2 mm of the tip in all, at most %3 mm/s.")
+      .arg(order.waypoints.size())
+      .arg(way_mm, 0, 'f', 0)
       .arg(speed_mm_s, 0, 'f', 0);
 }
 
@@ -51,7 +75,7 @@ void Controller::unlock(const std::string& who) {
     value_or_throw(equipment->devices->robot().wait_connected(robot_patience));
     value_or_throw(equipment->devices->robot().unlock(who));
     const auto tour = equipment->operation->preview_tour();
-    return [words = tour ? words_of(*tour) : QString()](ApplicationState& state) { state.tour = words; };
+    return [words = tour ? tour_words(*tour) : QString()](ApplicationState& state) { state.tour = words; };
   });
 }
 
@@ -83,6 +107,7 @@ void Controller::plan_tunnel(const std::string& tunnel) {
           return [this, order, path, watch](ApplicationState& state) {
             state.order = order;
             state.path = path;
+            state.way = order_words(order, path);
             plan_watch_ = watch;
           };
         });
@@ -101,6 +126,8 @@ void Controller::drop_plan(const Failure& why) {
 void Controller::go() {
   if (!equipment_ || !equipment_->operation || !state_.order) return;
   const robot::RobotOrder order = *state_.order;
+  state_.bound_for = order.name;
+  state_.has_arrived = false;
   begin(Phase::navigate, "moving to " + order.name, [this, equipment = equipment_, order]() -> Change {
     robot::RobotLink& robot = equipment->devices->robot();
     const std::string token = robot.confirm(order);
@@ -110,13 +137,15 @@ void Controller::go() {
     const Change gone = [out =
                              outcome || has_left(robot.status(), equipment->rest)](ApplicationState& state) {
       state.order.reset();
-      state.path = {};
-      state.tool_is_out = out;
+      state.tool_is_out = out;  // its path stays in sight until it is withdrawn
+      if (!out) state.path = {};
     };
     if (!outcome) meanwhile(gone);
     return [gone, outcome = value_or_throw(outcome)](ApplicationState& state) {
       state.outcomes.insert_or_assign(outcome.tunnel, outcome);
       gone(state);
+      state.path = {};
+      state.has_arrived = true;
     };
   });
 }
@@ -128,7 +157,10 @@ void Controller::withdraw() {
     value_or_throw(equipment->operation->withdraw(
         *equipment->last_order, equipment->rest,
         [&](const robot::RobotOrder& order) { return Expected<std::string>(robot.confirm(order)); }));
-    return [](ApplicationState& state) { state.tool_is_out = false; };
+    return [](ApplicationState& state) {
+      state.tool_is_out = state.has_arrived = false;
+      state.path = {};
+    };
   });
 }
 

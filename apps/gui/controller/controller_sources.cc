@@ -16,7 +16,8 @@ namespace {
 
 constexpr double bone_step_mm = 5;
 
-/// Names and bones of a case's tunnels; the two of an ACL reconstruction if it has none, and no models.
+/// Names and bones of a case's tunnels; the two of an ACL reconstruction if it has the knee's calibrator and
+/// neither tunnels nor models.
 std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given, bool has_models) {
   std::vector<operation::PlannedTunnel> tunnels;
   for (const pipeline::TunnelPlan& tunnel : given.tunnels) {
@@ -24,9 +25,30 @@ std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given, bo
     const auto bone = pick == given.picks.end() ? std::nullopt : pick->moves_with;
     tunnels.push_back({tunnel.name, bone.value_or(guidance::Bone()), tunnel.start, tunnel.end});
   }
-  if (given.picks.empty() && tunnels.empty() && !has_models && given.bones == guidance::knee_bones())
-    tunnels = {{"femur", "femur", "FS", "FE"}, {"tibia", "tibia", "TS", "TE"}};
+  const bool is_of_the_knee =
+      given.bones == guidance::knee_bones() && given.calibrator.name == phantom::udcsc().name;
+  if (given.picks.empty() && tunnels.empty() && !has_models && is_of_the_knee)
+    tunnels = {{"femur", "femur", "FS", "FE", operation::TunnelEnd::end}, {"tibia", "tibia", "TS", "TE"}};
   return tunnels;
+}
+
+/// What the operation reports of a step follows.
+std::string words_of(operation::Step step) {
+  switch (step) {
+    case operation::Step::acquire:
+      return "acquiring: ";
+    case operation::Step::measure:
+      return "measuring: ";
+    case operation::Step::register_robot:
+      return "registering the robot: ";
+    case operation::Step::plan:
+      return "planning the path to ";
+    case operation::Step::navigate:
+      return "the robot moves: ";
+    case operation::Step::verify:
+      return "verifying the tool at ";
+  }
+  return {};
 }
 
 }  // namespace
@@ -37,11 +59,15 @@ void Controller::open(Source source, const fs::path& folder, std::string doing,
     next_source_ = [=, this] { open(source, folder, doing, work); };
     return cancel();
   }
+  if (state_.has_unsaved_picks && state_.case_folder && !state_.picks_not_kept)
+    emit told(tr("The changed picks of %1 are kept in its unsaved_picks.json.")
+                  .arg(QString::fromStdString(state_.case_folder->string())));
   auto old = std::exchange(equipment_, nullptr);
   live_tool_.reset();
   earlier_picks_.clear();
   later_picks_.clear();
   state_ = ApplicationState{};
+  state_.asked_for = folder;
   begin(Phase::acquire, std::move(doing),
         [this, source, folder, work = std::move(work), old = std::move(old),
          options = options_]() mutable -> Change {
@@ -63,8 +89,8 @@ void Controller::start_operation(Equipment& equipment, operation::OperationPlan 
   equipment.tracker = plan.tracker;
   equipment.operation = value_or_throw(operation::Operation::begin(
       std::move(plan), folder, equipment.devices->board(), equipment.devices->robot(),
-      [this](operation::Step, const std::string& what) {
-        meanwhile([what](ApplicationState& state) { state.doing = what; });
+      [this](operation::Step step, const std::string& what) {
+        meanwhile([words = words_of(step) + what](ApplicationState& state) { state.doing = words; });
       }));
   equipment.operation->confirmed_by("the person at the screen");
 }
@@ -133,13 +159,17 @@ void Controller::open_case(const fs::path& folder, bool keeps_picks) {
          if (pipeline::has_models(folder)) equipment.with_models = pipeline::read_registration_case(folder);
          if (!keeps_picks) return with_case(std::move(given), equipment);
          const auto unsaved = unsaved_picks(folder, given);
-         return [change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)), folder,
-                 unsaved](ApplicationState& state) {
+         return [this, change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)),
+                 folder, unsaved](ApplicationState& state) {
            change(state);
            if (unsaved)
              state.case_folder = folder;
            else
              state.picks_not_kept = unsaved.error();
+           if (unsaved && *unsaved)
+             emit told(
+                 tr("Picks that are not in case.json are restored: Ctrl+S saves them, Ctrl+Z takes those "
+                    "of case.json."));
          };
        });
 }
@@ -175,20 +205,25 @@ Controller::Change Controller::with_case(pipeline::Case given, Equipment& equipm
   const std::optional<Failure> unreadable = equipment.with_models && !*equipment.with_models
                                                 ? std::optional(equipment.with_models->error())
                                                 : std::nullopt;
-  return [this, given = std::move(given), unsaved = std::move(unsaved), files, found, unreadable,
-          has_models = equipment.with_models.has_value()](ApplicationState& state) {
-    for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
-    state.files = files;
-    state.calibrator = given.calibrator;
-    state.tunnels = tunnels_of(given, has_models);
-    state.picks = unsaved.value_or(given.picks);
-    state.has_unsaved_picks = unsaved.has_value();
-    if (unsaved) earlier_picks_.push_back(given.picks);
-    complete_landmarks(state);
-    found(state);
-    state.has_models = has_models;
-    if (unreadable) state.refusals.insert_or_assign(Phase::registration, *unreadable);
-  };
+  std::vector<std::string> models;
+  if (equipment.with_models && *equipment.with_models)
+    for (const pipeline::CaseModel& model : (*equipment.with_models)->models) models.push_back(model.name);
+  return
+      [this, given = std::move(given), unsaved = std::move(unsaved), files, found, unreadable,
+       models = std::move(models), has_models = equipment.with_models.has_value()](ApplicationState& state) {
+        for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
+        state.files = files;
+        state.calibrator = given.calibrator;
+        state.tunnels = tunnels_of(given, has_models);
+        state.picks = unsaved.value_or(given.picks);
+        state.has_unsaved_picks = unsaved.has_value();
+        if (unsaved) earlier_picks_.push_back(given.picks);
+        complete_landmarks(state);
+        found(state);
+        state.has_models = has_models;
+        state.models = models;
+        if (unreadable) state.refusals.insert_or_assign(Phase::registration, *unreadable);
+      };
 }
 
 }  // namespace helicarm::gui

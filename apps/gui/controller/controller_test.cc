@@ -85,6 +85,7 @@ TEST(Steps, PlanIsGoodOnlyWithAllEndsLocatedAndShowsTheLargestError) {
     result->points.push_back(point);
   }
   state.result = result;
+  state.measured_picks = state.picks;
   const StepCard card = card_of(steps_of(state), Phase::plan);
   EXPECT_EQ(card.status, StepStatus::good);
   EXPECT_EQ(card.figure, "within 0.56 mm (95 %)");  // 0.2 sqrt(7.815)
@@ -104,6 +105,7 @@ TEST(Steps, PointThatCannotBeLocatedRefusesThePlan) {
                             0,
                             Failure{Reason::parallel_rays, "rays are parallel"}});
   state.result = result;
+  state.measured_picks = state.picks;
   EXPECT_EQ(card_of(steps_of(state), Phase::plan).status, StepStatus::refused);
   EXPECT_THAT(card_of(steps_of(state), Phase::plan).why.toStdString(), HasSubstr("parallel_rays"));
 }

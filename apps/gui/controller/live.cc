@@ -21,10 +21,13 @@ std::optional<double> least_age(const std::vector<tracker::ToolState>& tools,
 }
 
 StatusIndicator marker_indicator(const QString& name, const std::optional<double>& age_s) {
-  if (!age_s) return {name, Light::off, age_text(age_s), live_tr("no pose from the tracker yet")};
-  if (*age_s <= fresh_s) return {name, Light::green, age_text(age_s), {}};
-  return {name, *age_s <= late_s ? Light::amber : Light::red, age_text(age_s),
-          live_tr("not visible, or tracker disconnected: a pose of this age is not used for motion")};
+  if (!age_s) return {name, Light::off, age_text(age_s), live_tr("no pose from the tracker yet"), {}};
+  if (*age_s <= fresh_s) return {name, Light::green, age_text(age_s), {}, {}};
+  return {name,
+          *age_s <= late_s ? Light::amber : Light::red,
+          age_text(age_s),
+          live_tr("not visible, or tracker disconnected: a pose of this age is not used for motion"),
+          {}};
 }
 
 QString words(std::string_view text) { return QString::fromUtf8(text.data(), qsizetype(text.size())); }
@@ -48,8 +51,11 @@ std::vector<StatusIndicator> tracker_indicators(const operation::TrackerPlan& pl
 }
 
 StatusIndicator robot_indicator(const robot::RobotLinkStatus& status) {
-  StatusIndicator indicator{
-      live_tr("robot"), Light::off, {}, status.why ? sentence_of(*status.why) : QString()};
+  StatusIndicator indicator{live_tr("robot"),
+                            Light::off,
+                            {},
+                            status.why ? sentence_of(*status.why) : QString(),
+                            StatusIndicator::Kind::robot};
   const QString age = age_text(status.state ? std::optional(status.age_s) : std::nullopt);
   switch (status.phase) {
     case robot::LinkPhase::disconnected:
@@ -74,10 +80,14 @@ StatusIndicator robot_indicator(const robot::RobotLinkStatus& status) {
 
 StatusIndicator c_arm_indicator(const operation::CArmStatus& status, double now_s) {
   StatusIndicator indicator{live_tr("C-arm"), Light::off, live_tr("no image yet"),
-                            live_tr("the C-arm connects when it has an image to send")};
+                            live_tr("the C-arm connects when it has an image to send"),
+                            StatusIndicator::Kind::c_arm};
   if (status.last_image_s)
-    indicator = {
-        indicator.name, Light::green, live_tr("%1 ago").arg(age_text(now_s - *status.last_image_s)), {}};
+    indicator = {indicator.name,
+                 Light::green,
+                 live_tr("%1 ago").arg(age_text(now_s - *status.last_image_s)),
+                 {},
+                 indicator.kind};
   if (status.broke_off) {
     indicator.light = Light::red;
     indicator.text = live_tr("disconnected");

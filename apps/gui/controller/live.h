@@ -14,10 +14,12 @@ enum class Light { off, red, amber, green };
 
 /// State of a device or marker at one time.
 struct StatusIndicator {
+  enum class Kind { marker, robot, c_arm };
   QString name;
   Light light = Light::off;
   QString text;  ///< age or state, as text
   QString why;   ///< reason for red and amber
+  Kind kind = Kind::marker;
 };
 
 /// Greatest pose age for robot motion; up to the second limit the indicator is amber.

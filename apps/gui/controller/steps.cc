@@ -4,6 +4,8 @@
 #include <QCoreApplication>
 #include <algorithm>
 
+#include "gui/controller/controller.h"
+#include "gui/controller/stale.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/localization/error_bound.h"
 
@@ -93,12 +95,25 @@ void calibrate(StepCard& card, const ApplicationState& state) {
 void plan(StepCard& card, const ApplicationState& state) {
   auto wanted = next_pick(state);
   if (!wanted) wanted = next_landmark(state);
+  if (wanted && wanted->failed) {
+    card.status = StepStatus::warning;
+    card.figure = tr("failed pick %1").arg(text(wanted->point));
+    card.why = sentence_of(*wanted->failed);
+    return;
+  }
   if (wanted) {
     card.why = tr("click %1 in %2").arg(text(wanted->point), text(wanted->view));
     return;
   }
   double worst = 0;
   int located = 0;
+  if (state.registration)
+    for (const case_registration::RegisteredModel& model : state.registration->models)
+      if (!model.registration.failure)
+        for (const case_registration::RegisteredPoint& point : model.points) {
+          ++located;
+          worst = std::max(worst, localization::length_at_95(point.place.covariance_in_calibrator));
+        }
   for (const pipeline::PointResult& point : state.result->points) {
     if (point.source != localization::PointSource::pick) continue;
     if (point.reason) {
@@ -110,9 +125,18 @@ void plan(StepCard& card, const ApplicationState& state) {
     ++located;
     worst = std::max(worst, localization::length_at_95(point.place->covariance_in_calibrator));
   }
-  if (located == 0) return;
+  if (located == 0) {
+    card.why = !state.picks.empty()                      ? tr("not measured yet")
+               : state.has_models && !state.registration ? tr("register the models (Alt+7)")
+                                                         : tr("add a landmark to locate a point");
+    return;
+  }
   card.figure = tr("within %1 mm (95 %)").arg(worst, 0, 'f', 2);
   settle(card, doubts(warnings_of(state, Phase::plan)));
+  if (state.failed_picks.empty()) return;
+  card.status = StepStatus::warning;
+  card.why = tr("%1: %2").arg(text(state.failed_picks.front().pick.name),
+                              sentence_of(state.failed_picks.front().why));
 }
 
 void navigate(StepCard& card, const ApplicationState& state) {
@@ -156,7 +180,21 @@ void verify_images(StepCard& card, const pipeline::Result& result) {
 }
 
 void verify(StepCard& card, const ApplicationState& state) {
-  if (state.outcomes.empty()) return state.is_replayed ? void() : verify_images(card, *state.result);
+  if (state.outcomes.empty()) {
+    if (state.is_replayed) return;
+    verify_images(card, *state.result);
+    if (card.status != StepStatus::waiting) return;
+    if (!is_exported(state)) {
+      if (state.source != Source::files && !state.exported) return;
+      card.why = state.exported ? tr("changed since the export") : tr("export the results (Ctrl+E)");
+      return;
+    }
+    card.figure = tr("exported at %1").arg(state.exported->at);
+    settle(card, state.exported->lacks.isEmpty() ? QString()
+                                                 : tr("without: %1").arg(state.exported->lacks.join("; ")));
+    if (card.why.isEmpty()) card.why = text(state.exported->folder.string());
+    return;
+  }
   double worst = 0, expected = 0;
   for (const auto& [name, outcome] : state.outcomes)
     for (const operation::EndMiss& end : {outcome.start, outcome.end})
@@ -220,8 +258,12 @@ QString sentence_of(const Failure& failure) {
            QString::fromUtf8(code_of.data(), static_cast<qsizetype>(code_of.size())));
 }
 
-std::array<StepCard, phases.size()> steps_of(const ApplicationState& state) {
-  std::array<StepCard, phases.size()> cards;
+bool is_cancelled(Phase phase, const Failure& refusal) {
+  return refusal.reason == Reason::interrupted && phase != Phase::navigate;
+}
+
+StepCards steps_of(const ApplicationState& state) {
+  StepCards cards;
   const std::array names{tr("Acquire"),  tr("Rectify"), tr("Calibrate"), tr("Plan"),
                          tr("Navigate"), tr("Verify"),  tr("Register")};
   using Judge = void (*)(StepCard&, const ApplicationState&);
@@ -235,14 +277,43 @@ std::array<StepCard, phases.size()> steps_of(const ApplicationState& state) {
     const bool possible = i < 3 || state.measured;
     if (state.result && possible) judges[i](card, state);
     if (state.source == Source::images && i > 0) card.why = tr("needs a case");
+    const QString changed = state.result && possible ? stale(state, card.phase) : QString();
+    if (!changed.isEmpty() && card.status != StepStatus::waiting) {
+      card.status = StepStatus::stale;
+      card.figure.clear();
+      card.why = changed;
+    }
     if (const auto refusal = state.refusals.find(card.phase); refusal != state.refusals.end()) {
-      card.status = StepStatus::refused;
-      card.why = sentence_of(refusal->second);
+      if (is_cancelled(card.phase, refusal->second)) {
+        if (card.status == StepStatus::waiting) card.why = tr("cancelled");
+      } else if (changed.isEmpty()) {
+        card.status = StepStatus::refused;
+        card.why = sentence_of(refusal->second);
+      }
     }
     if (state.busy == card.phase) {
       card.status = StepStatus::running;
       card.why = text(state.doing);
     }
+  }
+  return cards;
+}
+
+StepCards with_devices(StepCards cards, const ApplicationState& state, const LiveState& live) {
+  const auto warn = [&](Phase phase, const StatusIndicator& of) {
+    StepCard& card = cards[std::size_t(phase)];
+    if (card.status == StepStatus::refused || card.status == StepStatus::running) return;
+    card.status = StepStatus::warning;
+    card.why = QString("%1: %2").arg(of.name, of.why);
+  };
+  for (const StatusIndicator& indicator : live.indicators) {
+    if (indicator.light != Light::red) continue;
+    if (indicator.kind == StatusIndicator::Kind::c_arm)
+      warn(Phase::acquire, indicator);
+    else if (indicator.kind == StatusIndicator::Kind::marker && !state.measured)
+      warn(Phase::acquire, indicator);
+    else if (state.measured)
+      warn(Phase::navigate, indicator);
   }
   return cards;
 }

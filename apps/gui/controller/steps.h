@@ -7,7 +7,8 @@
 
 namespace helicarm::gui {
 
-enum class StepStatus { waiting, running, good, warning, refused };
+/// `stale`: done, but something it depends on has changed since.
+enum class StepStatus { waiting, running, good, warning, refused, stale };
 
 /// A step as shown: its status, the decisive number, and the reason or the next action.
 struct StepCard {
@@ -19,10 +20,18 @@ struct StepCard {
   bool is_offered = true;  ///< the source has this step
 };
 
-std::array<StepCard, phases.size()> steps_of(const ApplicationState& state);
+using StepCards = std::array<StepCard, phases.size()>;
+StepCards steps_of(const ApplicationState& state);
+
+struct LiveState;
+/// With a warning where a step is good or waits, and a device that it needs is not seen or not connected.
+StepCards with_devices(StepCards cards, const ApplicationState& state, const LiveState& live);
 
 /// The step that a refused measurement concerns.
 Phase phase_of(const Failure& failure);
+
+/// Whether a person ended the work, which is no refusal of the data; a stopped robot is one.
+bool is_cancelled(Phase phase, const Failure& refusal);
 
 /// As text, with its code.
 QString sentence_of(const Failure& failure);

@@ -56,7 +56,9 @@ int main(int argc, char** argv) {
           ? words.value(sessions)
           : QStandardPaths::writableLocation(QStandardPaths::AppLocalDataLocation) + "/sessions";
   MainWindow window(place.toStdString());
-  window.resize(is_large ? 0.9 * QApplication::primaryScreen()->availableSize() : QSize(1280, 800));
+  const QSize available = QApplication::primaryScreen()->availableSize();
+  constexpr int frame_px = 40;  // of the window manager, above and below
+  window.resize(is_large ? 0.9 * available : QSize(1280, 800).boundedTo(available - QSize(0, frame_px)));
   window.restore_layout();
   window.show();
   std::vector<std::filesystem::path> paths;

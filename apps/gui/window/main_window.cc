@@ -33,6 +33,7 @@ constexpr double epipolar_reach_mm = 150;
 Phase open_phase(const std::array<StepCard, phases.size()>& cards, const ApplicationState& state) {
   if (state.source == Source::images) return Phase::acquire;
   const bool registered = state.hand_eye_rms_mm.has_value();
+  if (can_register(state) && !state.registration) return Phase::registration;
   for (const StepCard& card : cards) {
     if (card.phase == Phase::registration) continue;  // a step that may be left out
     if (card.phase == Phase::navigate && state.source == Source::files && !registered) return Phase::plan;
@@ -61,8 +62,8 @@ MainWindow::MainWindow(std::filesystem::path sessions, QWidget* parent)
     show_phase(phase);
     statusBar()->showMessage(why);
   });
-  connect(&controller_, &Controller::exported, this,
-          [this](const QString& folder) { statusBar()->showMessage(tr("Written to %1").arg(folder)); });
+  connect(&controller_, &Controller::exported, this, &MainWindow::tell_of_the_export);
+  connect(&controller_, &Controller::told, this, &MainWindow::tell);
   connect(&timer_, &QTimer::timeout, this, &MainWindow::show_live);
   timer_.start(live_ms);
   panels_->show_state(controller_.state());
@@ -86,6 +87,7 @@ void MainWindow::build() {
   sides->setStretchFactor(0, 6);
   connect(panels_, &XrayPanels::picked, this, &MainWindow::place_pick);
   connect(panels_, &XrayPanels::pick_moved, this, &MainWindow::move_pick);
+  connect(panels_, &XrayPanels::pick_menu_wanted, this, &MainWindow::ask_of_pick);
   connect(panels_, &XrayPanels::displayed, this, [this] {
     show_picks();
     show_measures();
@@ -176,6 +178,10 @@ void MainWindow::build_replay() {
 }
 
 void MainWindow::build_status() {
+  told_ = new QLabel;
+  told_->setObjectName("told");
+  told_->setMinimumWidth(1);  // the window may be narrower than the sentence
+  statusBar()->addWidget(told_, 1);
   recording_ = new QLabel(tr("● recording"));
   recording_->setProperty("class", "recording");
   statusBar()->addPermanentWidget(recording_);
@@ -207,10 +213,12 @@ ApplicationState MainWindow::displayed_state() const {
 
 void MainWindow::show_state() {
   const ApplicationState state = displayed_state();
-  const auto cards = steps_of(state);
-  strip_->show_steps(cards);
-  if (!state.busy && !moved_on_) show_phase(open_phase(cards, state));
-  if (state.busy) moved_on_ = state.busy == Phase::registration;  // its page stays
+  cards_ = steps_of(state);
+  show_steps();
+  if (!state.busy && !moved_on_) show_phase(open_phase(cards_, state));
+  if (state.busy)  // its page stays; so does the plan's, where a registration's landmarks are picked
+    moved_on_ = state.busy == Phase::registration ||
+                (state.has_models && state.busy == Phase::calibrate && phase_ == Phase::plan);
   for (Page* page : all_pages_) page->show_state(state);
   setWindowTitle(state.folder.empty() ? tr("helicarm") : tr("helicarm: %1").arg(text(state.folder.string())));
   rehearsal_menu_->setEnabled(state.source == Source::virtual_or);
@@ -219,9 +227,12 @@ void MainWindow::show_state() {
   recording_->setText(replays ? tr("▶ replay") : tr("● recording"));
   recording_->setVisible(replays || state.source == Source::virtual_or || state.source == Source::devices);
   recording_->setToolTip(tr("Every step is recorded in %1").arg(text(state.folder.string())));
+  const auto stands = [&](const auto& refusal) {
+    return sentence_of(refusal.second) == statusBar()->currentMessage();
+  };
   if (state.busy)
-    statusBar()->showMessage(doing_ = text(state.doing));
-  else if (state.refusals.empty() || statusBar()->currentMessage() == doing_)
+    statusBar()->showMessage(text(state.doing));
+  else if (std::ranges::none_of(state.refusals, stands))
     statusBar()->clearMessage();
   save_->setEnabled(state.has_unsaved_picks);
   undo_->setEnabled(controller_.can_undo_picks() && controller_.takes_picks());
@@ -292,11 +303,15 @@ void MainWindow::show_picks_in(std::size_t panel, std::size_t number,
   const bool takes = controller_.takes_picks() && panels_->panel(panel).shows_own_frame();
   std::vector<FreshPick> picks;
   for (const pipeline::Pick& pick : state.picks)
-    if (pick.view == view.name) picks.push_back({text(pick.name), pick.uv_raw});
+    if (pick.view == view.name) {
+      const Failure* failed = failure_of(state, pick.name, pick.view);
+      picks.push_back({text(pick.name), pick.uv_raw, failed ? text(failed->message) : QString()});
+    }
   xray.set_movable_picks(phase_ == Phase::plan && takes ? picks : std::vector<FreshPick>{});
   xray.set_picking(wanted.has_value() && takes);
   if (!panels_->panel(panel).shows_own_frame()) return;
-  if (!next_pick(state)) picks.clear();  // the result shows them
+  if (!next_pick(state))  // the result shows the others
+    std::erase_if(picks, [](const FreshPick& pick) { return pick.why_failed.isEmpty(); });
   xray.set_picks(std::move(picks));
   const auto path = state.path.by_view.find(view.name);
   xray.set_path(path == state.path.by_view.end() ? std::vector<Eigen::Vector2d>{} : path->second);
@@ -309,7 +324,9 @@ std::vector<MainWindow::EpipolarLine> MainWindow::epipolar_lines_of(const std::s
   std::vector<EpipolarLine> lines;
   for (const pipeline::ViewResult& other : shown_->views) {
     const pipeline::Pick* pick = pick_of(state, point, other.name);
-    if (&other == &view || pick == nullptr || !other.calibrated || !view.calibrated) continue;
+    if (&other == &view || pick == nullptr || !other.calibrated || !view.calibrated ||
+        failure_of(state, point, other.name) != nullptr)
+      continue;
     const auto uv = other.rectification->map.rectified_from_raw(pick->uv_raw);
     const double depth = other.calibrated->view.depth(phantom::middle_of(state.calibrator));
     if (uv)
@@ -344,12 +361,55 @@ void MainWindow::move_pick(std::size_t view, const QString& name, const QPointF&
   for (pipeline::Pick pick : controller_.state().picks) {
     if (pick.name != name.toStdString() || pick.view != view_name) continue;
     pick.uv_raw = {raw.x(), raw.y()};
+    if (!plan_->snaps_new_clicks()) pick.snap = pipeline::Snap::none;
     return controller_.pick(std::move(pick));
   }
 }
 
+void MainWindow::ask_of_pick(std::size_t view, const QString& name, const QPoint& at) {
+  if (!shown_ || view >= shown_->views.size()) return;
+  const std::string point = name.toStdString(), view_name = shown_->views[view].name;
+  const pipeline::Pick* pick = pick_of(controller_.state(), point, view_name);
+  if (pick == nullptr) return;
+  const bool snaps = pick->snap == pipeline::Snap::ball;
+  auto* menu = new QMenu(this);
+  menu->setObjectName("pickMenu");
+  menu->setAttribute(Qt::WA_DeleteOnClose);
+  menu->addAction(snaps ? tr("Take the click of %1 as it is").arg(name) : tr("Snap %1 to a ball").arg(name),
+                  this, [this, point, view_name, snaps] {
+                    controller_.set_snap(point, snaps ? pipeline::Snap::none : pipeline::Snap::ball,
+                                         view_name);
+                  });
+  menu->popup(at);
+}
+
+void MainWindow::show_steps() { strip_->show_steps(with_devices(cards_, displayed_state(), live_)); }
+
+void MainWindow::tell(const QString& words) {
+  statusBar()->clearMessage();
+  told_->setText(words);
+  told_->setToolTip(words);
+}
+
+void MainWindow::tell_of_the_export() {
+  const ExportRecord& done = *controller_.state().exported;
+  const QString folder = text(done.folder.string());
+  tell(done.lacks.isEmpty()
+           ? tr("Exported to %1 at %2.").arg(folder, done.at)
+           : tr("Exported to %1 at %2, without: %3.").arg(folder, done.at, done.lacks.join("; ")));
+  moved_on_ = true;  // the page says the same
+  show_phase(Phase::verify);
+}
+
 void MainWindow::show_live() {
+  const auto hidden = [](const LiveState& live) {
+    std::vector<std::pair<Light, QString>> all;
+    for (const StatusIndicator& indicator : live.indicators) all.emplace_back(indicator.light, indicator.why);
+    return all;
+  };
+  const auto before = hidden(live_);
   live_ = controller_.live();
+  if (hidden(live_) != before) show_steps();
   if (live_.stale) controller_.drop_plan(*live_.stale);
   live_bar_->show_live(live_);
   navigate_->show_live(live_);

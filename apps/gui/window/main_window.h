@@ -104,13 +104,20 @@ class MainWindow : public QMainWindow {
   void show_phase(Phase phase);
   void place_pick(std::size_t view, const QPointF& raw);
   void move_pick(std::size_t view, const QString& name, const QPointF& raw);
+  void ask_of_pick(std::size_t view, const QString& name, const QPoint& at);
+  void show_steps();
+  /// Stands in the status line until something else is to be told.
+  void tell(const QString& words);
+  void tell_of_the_export();
+  void ask_of_unsaved_picks();
   void show_tre();
   void show_moment(int index);
   void show_recorded();
   /// Acts at once, or after a question if something would be lost.
   void leave_then(std::function<void()> act);
   void leave_for(const std::vector<std::filesystem::path>& paths);
-  void open_images(const std::vector<std::filesystem::path>& files);
+  /// `offers_one`: as a new case also a single image.
+  void open_images(const std::vector<std::filesystem::path>& files, bool offers_one = false);
   void ask_rehearsal();
   void ask_folder();
   void ask_new_case();
@@ -157,7 +164,8 @@ class MainWindow : public QMainWindow {
   std::string wanted_view_;  ///< of the next pick
   QWidget* busy_ = nullptr;  ///< progress and Cancel
   QLabel* recording_ = nullptr;
-  QString doing_;  ///< the last work in progress that was shown
+  QLabel* told_ = nullptr;
+  StepCards cards_;  ///< without the devices
 
   LiveState live_;
   std::optional<TreCut> cut_;

@@ -53,6 +53,7 @@ void MainWindow::build_menus() {
   QMenu* edit = menuBar()->addMenu(tr("&Edit"));
   undo_ = edit->addAction(tr("&Undo pick"), QKeySequence::Undo, &controller_, &Controller::undo_picks);
   redo_ = edit->addAction(tr("&Redo pick"), QKeySequence::Redo, &controller_, &Controller::redo_picks);
+  edit->addAction(tr("&Measure again"), QKeySequence(Qt::Key_F5), &controller_, &Controller::measure);
   edit->addSeparator();
   edit->addAction(tr("&Copy image or table"), QKeySequence::Copy, this, &MainWindow::copy);
 
@@ -90,7 +91,8 @@ void MainWindow::build_menus() {
            "Enter: press; hold it on a yellow button\n"
            "Ctrl+N rehearsal, Ctrl+Shift+N case of X-ray images, Ctrl+O open, Ctrl+5 two or four images, "
            "Ctrl+E export, Ctrl+C copy, Ctrl+P screenshot, Ctrl+, settings\n"
-           "Ctrl+S saves the picks, Ctrl+Z undoes a pick, Ctrl+Shift+Z repeats it, Delete removes the end "
+           "F5 measures again, Ctrl+S saves the picks, Ctrl+Z undoes a pick, Ctrl+Shift+Z repeats it, Delete "
+           "removes the end "
            "chosen in the table\n\n"
            "On an X-ray image: + - 0 zoom, arrows pan, Shift+arrows and Enter place a tunnel's end, dragging "
            "moves a placed end, L layer, M magnifier, W contrast, H marks\n\n"
@@ -190,9 +192,11 @@ void MainWindow::ask_settings() {
     settings_ = dialog->settings();
     keep_settings(recent_, settings_);
     controller_.set_options({settings_.run, settings_.search});
-    statusBar()->showMessage(
-        tr("Measurement settings apply to the next measurement; the others to the next rehearsal or "
-           "connection."));
+    tell(controller_.state().source == Source::files
+             ? tr("The case is measured with these settings; those of devices apply to the next rehearsal or "
+                  "connection.")
+             : tr("Measurement settings apply to the next case; the others to the next rehearsal or "
+                  "connection."));
   });
   show_beside(dialog);
 }

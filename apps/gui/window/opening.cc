@@ -7,6 +7,9 @@
 #include <QMessageBox>
 #include <QMimeData>
 #include <algorithm>
+#include <array>
+#include <fstream>
+#include <string_view>
 
 #include "gui/controller/equipment.h"
 #include "gui/window/ask_files.h"
@@ -17,15 +20,23 @@ namespace fs = std::filesystem;
 
 namespace {
 
+/// By its name, or as DICOM, which often has no extension.
+bool may_be_image(const fs::path& file) {
+  const QString kind = QString::fromStdString(file.extension().string()).toLower();
+  if (QStringList{".dcm", ".dicom", ".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp"}.contains(kind))
+    return true;
+  constexpr std::size_t preamble = 128;
+  std::array<char, preamble + 4> head{};
+  std::ifstream(file, std::ios::binary).read(head.data(), head.size());
+  return std::string_view(head.data() + preamble, 4) == "DICM";
+}
+
 /// X-ray images in a folder without a case.json, by name.
 std::vector<fs::path> images_in(const fs::path& folder) {
   std::vector<fs::path> images;
   std::error_code unreadable;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, unreadable))
-    if (const fs::path kind = entry.path().extension(); kind == ".dcm" || kind == ".png" || kind == ".tif" ||
-                                                        kind == ".tiff" || kind == ".jpg" ||
-                                                        kind == ".jpeg" || kind == ".bmp")
-      images.push_back(entry.path());
+    if (entry.is_regular_file(unreadable) && may_be_image(entry.path())) images.push_back(entry.path());
   std::ranges::sort(images);
   return images;
 }
@@ -111,14 +122,14 @@ void MainWindow::open_paths(const std::vector<fs::path>& paths) {
   if (!is_folder) return open_images(paths);
   const std::vector<fs::path> loose =
       fs::exists(first / "case.json") ? std::vector<fs::path>{} : images_in(first);
-  if (!loose.empty()) return open_images(loose);
+  if (!loose.empty()) return open_images(loose, true);
   remember(Folder::cases, first);
   controller_.open_case(first);
 }
 
-void MainWindow::open_images(const std::vector<fs::path>& files) {
+void MainWindow::open_images(const std::vector<fs::path>& files, bool offers_one) {
   controller_.open_images(files);
-  if (files.size() < 2 || files.size() > most_loose_images) return;
+  if ((files.size() < 2 && !offers_one) || files.size() > most_loose_images) return;
   std::vector<pipeline::NewImage> images;
   for (const fs::path& file : files) images.push_back({file});
   offer_case(images);
@@ -142,7 +153,34 @@ void MainWindow::dropEvent(QDropEvent* event) {
   if (!paths.empty()) leave_for(paths);
 }
 
+void MainWindow::ask_of_unsaved_picks() {
+  if (findChild<QMessageBox*>("unsavedQuestion") != nullptr) return;
+  const QString folder = QString::fromStdString(controller_.state().case_folder->string());
+  auto* question = new QMessageBox(
+      QMessageBox::Question, tr("Picks that are not in case.json"),
+      tr("The changed picks of %1 are not in its case.json. Not saved, they are kept beside it in "
+         "unsaved_picks.json and restored when the case is opened again.")
+          .arg(folder),
+      QMessageBox::Save | QMessageBox::Close | QMessageBox::Cancel, this);
+  question->setObjectName("unsavedQuestion");
+  question->button(QMessageBox::Close)->setText(tr("&Keep beside the case"));
+  question->setDefaultButton(QMessageBox::Save);
+  connect(question, &QDialog::finished, this, [this](int answer) {
+    if (answer == QMessageBox::Save) controller_.save_picks();
+    const bool failed = answer == QMessageBox::Save && controller_.state().has_unsaved_picks;
+    if (answer == QMessageBox::Cancel || failed) return;
+    may_close_ = true;
+    close();
+  });
+  show_beside(question);
+}
+
 void MainWindow::closeEvent(QCloseEvent* event) {
+  const ApplicationState& state = controller_.state();
+  if (!may_close_ && state.has_unsaved_picks && state.case_folder && !state.picks_not_kept) {
+    event->ignore();
+    return ask_of_unsaved_picks();
+  }
   if (!may_close_ && !controller_.loss().isEmpty()) {
     event->ignore();
     return leave_then([this] {

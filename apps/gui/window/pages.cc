@@ -8,6 +8,7 @@
 #include <QRadioButton>
 #include <QVBoxLayout>
 
+#include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "helicarm/report/tables.h"
 
@@ -62,6 +63,11 @@ QTableWidget* Page::add_table(const report::Table& content, const char* name) {
 AcquirePage::AcquirePage(Controller& controller, QWidget* parent)
     : Page(tr("Acquire an AP and a lateral X-ray image of the knee with the calibrator."), controller,
            parent) {
+  refused_ = new QLabel;
+  refused_->setObjectName("notOpened");
+  refused_->setWordWrap(true);
+  refused_->setProperty("class", "attention");
+  layout()->addWidget(refused_);
   acquisitions_ = new QWidget;
   new QVBoxLayout(acquisitions_);
   acquisitions_->layout()->setContentsMargins(0, 0, 0, 0);
@@ -106,11 +112,24 @@ void AcquirePage::show_state(const ApplicationState& state) {
   for (QPushButton* button : acquisitions_->findChildren<QPushButton*>()) button->setEnabled(!state.busy);
   ways_in_->setVisible(state.source == Source::none && !state.busy);
   const bool loose = state.source == Source::images;
-  findChild<QLabel*>("lead")->setVisible(!loose);
+  findChild<QLabel*>("lead")->setVisible(state.source == Source::virtual_or ||
+                                         state.source == Source::devices);
+  const auto refusal = state.refusals.find(Phase::acquire);
+  const bool is_refused = refusal != state.refusals.end() && !state.busy;
+  refused_->setVisible(is_refused);
+  if (is_refused)
+    refused_->setText(
+        state.source == Source::none
+            ? tr("%1 is not opened: %2").arg(text(state.asked_for.string()), sentence_of(refusal->second))
+            : sentence_of(refusal->second));
   new_case_->setText(loose ? tr("New &case of these images...") : tr("New &case of X-ray images..."));
   new_case_->setVisible(loose || ways_in_->isVisibleTo(this));
   where_->setText(
-      state.source == Source::files ? tr("From %1.").arg(text(state.folder.string()))
+      state.source == Source::none
+          ? state.busy ? text(state.doing)
+                       : tr("Open a case or X-ray images, make a case of your own images, or rehearse an "
+                            "operation with virtual devices.")
+      : state.source == Source::files ? tr("From %1.").arg(text(state.folder.string()))
       : loose ? tr("%1: for looking and measuring in the image. Points in space need a case: two or "
                    "more images with the calibrator.")
                     .arg(text(state.folder.string()))

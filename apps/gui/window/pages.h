@@ -48,7 +48,7 @@ class AcquirePage : public Page {
   QPushButton* new_case_;
   std::vector<std::string> views_;
   QWidget* acquisitions_;
-  QLabel* where_;
+  QLabel *where_, *refused_;
 };
 
 /// Results of rectification by view, and the displayed layer of the image.
@@ -95,6 +95,8 @@ class PlanPage : public Page {
   /// The end that the next click places: the next missing one, or the one chosen in the table.
   std::optional<WantedPick> target() const;
   bool snaps() const { return snap_->isChecked(); }
+  /// How clicks are taken where no end is chosen in the table.
+  bool snaps_new_clicks() const { return snaps_new_; }
   /// Deselects an end chosen in the table once it is placed in every view.
   void placed(const std::string& point);
 
@@ -110,13 +112,18 @@ class PlanPage : public Page {
   void add_landmark_row();
   void add_map();
   void tell_next();
+  QString next_words() const;
+  void show_snap();
+  void take_as_clicked();
 
-  QLabel* next_;
+  QLabel *next_, *of_models_;
   QTableWidget *ends_, *tunnels_;
   std::size_t clickable_ = 0;  ///< rows of `ends_`, the first ones
   QCheckBox* snap_;
+  bool snaps_new_ = true;
+  QPushButton* take_;
   QPushButton* offered_;
-  QPushButton* delete_;
+  QPushButton *delete_, *clear_;
   QWidget* landmark_row_;
   QLabel* unsaved_;
   std::optional<std::string> chosen_;
@@ -133,14 +140,18 @@ class NavigatePage : public Page {
 
  private:
   void allow();
+  void tell();
   QString next_step() const;
+  QString where_the_tool_is() const;
+  bool is_held() const;
 
-  QLabel *says_, *tour_;
+  QLabel* says_;
   QComboBox* tunnel_;
   HoldButton *unlock_, *register_, *go_, *withdraw_;
   QPushButton* plan_;
   robot::LinkPhase phase_ = robot::LinkPhase::disconnected;
   std::optional<Failure> why_;
+  std::optional<operation::TunnelAim> aim_;  ///< of the tool, in tenths of a millimetre
 };
 
 class VerifyPage : public Page {
@@ -155,6 +166,7 @@ class VerifyPage : public Page {
 
  private:
   QTableWidget* table_;
+  QLabel *lacks_, *exported_;
 };
 
 }  // namespace helicarm::gui

@@ -6,6 +6,7 @@
 #include <QVBoxLayout>
 #include <algorithm>
 
+#include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "gui/window/pages.h"
@@ -22,9 +23,10 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
   next_->setObjectName("nextPick");
   next_->setWordWrap(true);
   next_->setProperty("class", "attention");
+  next_->setAlignment(Qt::AlignLeft | Qt::AlignTop);
   layout()->addWidget(next_);
   ends_ = add_table(ends_table({}, {}), "endTable");
-  for (const auto& [error, shown_at] : {std::pair(3, 1), {4, 2}})  // visible in a narrow window
+  for (const auto& [error, shown_at] : {std::pair(3, 1), {11, 2}})  // number and reason, in a narrow window
     ends_->horizontalHeader()->moveSection(error, shown_at);
   connect(ends_, &QTableWidget::itemSelectionChanged, this, [this] {
     const int row = ends_->currentRow();
@@ -33,24 +35,47 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
     if (ends_->selectionModel()->hasSelection() && row >= 0 && std::size_t(row) < clickable_)
       chosen_ = ends_->item(row, 0)->text().toStdString();
     tell_next();
+    show_snap();
     emit target_changed();
   });
   tunnels_ = add_table(plan_tunnels_table({}), "tunnelTable");
   tunnels_->setMinimumHeight(80);  // two rows and the header
-  snap_ = new QCheckBox(tr("Snap to a &ball of 3 mm"));
-  snap_->setChecked(true);
-  layout()->addWidget(snap_);
+  of_models_ =
+      new QLabel(tr("Tunnels of a model's plan are for looking and for the export: the robot moves to picked "
+                    "tunnels only."));
+  of_models_->setObjectName("tunnelsOfModels");
+  of_models_->setWordWrap(true);
+  layout()->addWidget(of_models_);
+  auto* clicks = new QHBoxLayout;
+  snap_ = new QCheckBox;
+  snap_->setObjectName("snap");
+  snap_->setToolTip(
+      tr("A click is refined to the centre of the ball near it; else it is taken as it is. A right "
+         "click on a pick in an X-ray image changes that pick alone."));
+  connect(snap_, &QCheckBox::clicked, this, [this](bool on) {
+    if (!chosen_)
+      snaps_new_ = on;
+    else
+      controller_.set_snap(*chosen_, on ? pipeline::Snap::ball : pipeline::Snap::none);
+  });
+  take_ = new QPushButton(tr("Ta&ke click as it is"));
+  take_->setObjectName("takeAsClicked");
+  take_->setToolTip(tr("For a click that found no ball: the click itself is the pick"));
+  connect(take_, &QPushButton::clicked, this, &PlanPage::take_as_clicked);
+  clicks->addWidget(snap_, 1);
+  clicks->addWidget(take_);
+  static_cast<QVBoxLayout*>(layout())->addLayout(clicks);
   auto* row = new QHBoxLayout;
   offered_ =
       add_button(tr("Use the &plan's picks"), "offeredPicks", [this] { controller_.take_offered_picks(); });
   delete_ = add_button(tr("Delete selecte&d end"), "deletePick", [this] { delete_chosen(); });
   delete_->setToolTip(tr("Removes the picks of the end selected in the table (Delete key)"));
   ends_->installEventFilter(this);  // Delete
-  auto* clear = add_button(tr("&Clear all picks"), "clearPicks", [this] {
+  clear_ = add_button(tr("&Clear all picks"), "clearPicks", [this] {
     ends_->clearSelection();
     controller_.clear_picks();
   });
-  for (QWidget* button : {offered_, delete_, clear}) row->addWidget(button);
+  for (QWidget* button : {delete_, clear_}) row->addWidget(button);
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
   add_landmark_row();
   unsaved_ = new QLabel;
@@ -61,6 +86,16 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
 }
 
 namespace {
+
+/// What an end is. Where the drill enters is known of an operation's plan only.
+QString kind_of(const ApplicationState& state, const operation::PlannedTunnel& tunnel,
+                const std::string& end) {
+  const QString kind = end == tunnel.start ? PlanPage::tr("start") : PlanPage::tr("end");
+  if (state.source == Source::files) return kind;
+  const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (end == tunnel.start);
+  return enters ? PlanPage::tr("%1, where the drill enters").arg(kind)
+                : PlanPage::tr("%1, where the drill ends").arg(kind);
+}
 
 std::optional<pipeline::BoneLabel> bone_in(const QString& name, int side) {
   if (name.trimmed().isEmpty()) return std::nullopt;
@@ -160,7 +195,7 @@ std::optional<WantedPick> PlanPage::target() const {
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
     if (tunnel.start == *chosen_ || tunnel.end == *chosen_) return wanted_end(tunnel, *chosen_);
   if (std::ranges::find(state.landmarks, *chosen_) != state.landmarks.end())
-    return WantedPick{*chosen_, "", {}};
+    return WantedPick{*chosen_, "", {}, {}};
   return std::nullopt;
 }
 
@@ -168,14 +203,13 @@ void PlanPage::show_state(const ApplicationState& state) {
   std::vector<PlannedPoint> points;
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end}) {
-      const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (end == tunnel.start);
-      points.push_back({end, enters ? tr("enters") : tr("ends")});
+      points.push_back({end, kind_of(state, tunnel, end)});
     }
   for (const std::string& landmark : state.landmarks) points.push_back({landmark, tr("landmark")});
   clickable_ = points.size();
-  for (const case_registration::RegisteredModel* model : usable_models(state))
+  for (const auto& [model, is_moved] : usable_models(state))
     for (const case_registration::RegisteredPoint& point : model->points)
-      points.push_back({point.name, tr("plan of %1").arg(text(model->registration.name)), &point});
+      points.push_back({point.name, tr("plan of %1").arg(text(model->registration.name)), &point, is_moved});
   if (state.result)
     for (const localization::TargetError& target : state.result->accuracy.targets)
       points.push_back({target.name, tr("target, error %1 mm").arg(number(target.error_mm, 3))});
@@ -183,6 +217,7 @@ void PlanPage::show_state(const ApplicationState& state) {
   const auto tunnels = plan_tunnels(state);
   fill(tunnels_, plan_tunnels_table(tunnels));
   tunnels_->setVisible(std::ranges::any_of(tunnels, &PlanTunnelRow::is_of_model));
+  of_models_->setVisible(tunnels_->isVisibleTo(this));
   offered_->setVisible(!state.offered_picks.empty());
   landmark_row_->setVisible(state.source == Source::files);
   unsaved_->setVisible(state.has_unsaved_picks || state.picks_not_kept);
@@ -190,7 +225,38 @@ void PlanPage::show_state(const ApplicationState& state) {
       state.picks_not_kept
           ? tr("The picks are not kept in the case: %1").arg(sentence_of(*state.picks_not_kept))
           : tr("These picks are not in case.json yet: Ctrl+S saves them. They are kept until then."));
+  clear_->setEnabled(!state.picks.empty() && controller_.takes_picks());
+  show_snap();
   tell_next();
+}
+
+void PlanPage::show_snap() {
+  const ApplicationState& state = controller_.state();
+  snap_->setText(chosen_ ? tr("Snap %1 to a &ball of 3 mm").arg(text(*chosen_))
+                         : tr("Snap to a &ball of 3 mm"));
+  const auto of_chosen = [&](const pipeline::Pick& pick) { return chosen_ && pick.name == *chosen_; };
+  const bool has_picks = std::ranges::any_of(state.picks, of_chosen);
+  snap_->setChecked(has_picks ? std::ranges::any_of(state.picks,
+                                                    [&](const pipeline::Pick& pick) {
+                                                      return of_chosen(pick) &&
+                                                             pick.snap == pipeline::Snap::ball;
+                                                    })
+                              : snaps_new_);
+  snap_->setEnabled(!chosen_ || (has_picks && controller_.takes_picks()));
+  take_->setEnabled(controller_.takes_picks() &&
+                    std::ranges::any_of(state.failed_picks, [](const FailedPick& failed) {
+                      return failed.pick.snap == pipeline::Snap::ball;
+                    }));
+}
+
+/// The failed pick that the instruction names, else the first one.
+void PlanPage::take_as_clicked() {
+  const auto failed = controller_.state().failed_picks;
+  const auto wanted = target();
+  for (const bool any : {false, true})
+    for (const FailedPick& one : failed)
+      if (one.pick.snap == pipeline::Snap::ball && (any || (wanted && one.pick.name == wanted->point)))
+        return controller_.set_snap(one.pick.name, pipeline::Snap::none, one.pick.view);
 }
 
 namespace {
@@ -212,33 +278,56 @@ QString contradicting_pick(const ApplicationState& state) {
 }  // namespace
 
 void PlanPage::tell_next() {
-  const ApplicationState& state = controller_.state();
   delete_->setEnabled(chosen_.has_value() && controller_.takes_picks());
+  next_->setMinimumHeight(3 * (next_->fontMetrics().lineSpacing() + 2));  // the controls below stay where they are
+  next_->setText(next_words());
+}
+
+QString PlanPage::next_words() const {
+  const ApplicationState& state = controller_.state();
   if (!state.measured)
-    return next_->setText(
-        state.refusals.empty()
-            ? tr("Acquire the X-ray images first.")
-            : tr("No points without a calibration: %1").arg(sentence_of(state.refusals.begin()->second)));
-  if (chosen_)
-    return next_->setText(
-        tr("%1 is selected: click its new position in each X-ray image.").arg(text(*chosen_)));
-  const auto wanted = next_pick(state);
-  if (const auto landmark = next_landmark(state); !wanted && landmark)
-    return next_->setText(tr("Click %1 in %2.").arg(text(landmark->point), text(landmark->view)));
-  if (const QString bad = contradicting_pick(state); !wanted && !bad.isEmpty())
-    return next_->setText(
-        tr("%1 Select it in the table and click it again, or undo the click (Ctrl+Z).").arg(bad));
-  if (!wanted)
-    return next_->setText(tr(
-        "All points are placed. To move one, drag it, or select it in the table and click its new position "
-        "in each X-ray image; further views make it more accurate."));
+    return state.refusals.empty()
+               ? tr("Acquire the X-ray images first.")
+               : tr("No points without a calibration: %1").arg(sentence_of(state.refusals.begin()->second));
+  const QString again = tr("Click it again, or take the click as it is.");
+  if (chosen_) {
+    for (const std::string& view : state.views)
+      if (const Failure* failed = failure_of(state, *chosen_, view))
+        return tr("%1 is not picked in %2: %3. %4")
+            .arg(text(*chosen_), text(view), text(failed->message), again);
+    return tr("%1 is selected: click its new position in each X-ray image.").arg(text(*chosen_));
+  }
+  auto wanted = next_pick(state);
+  if (!wanted) wanted = next_landmark(state);
+  if (wanted && wanted->failed)
+    return tr("%1 is not picked in %2: %3. %4")
+        .arg(text(wanted->point), text(wanted->view), text(wanted->failed->message), again);
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
-    if (tunnel.start == wanted->point || tunnel.end == wanted->point) {
-      const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (wanted->point == tunnel.start);
-      next_->setText((enters ? tr("Click %1 in %2: where the drill enters the %3.")
-                             : tr("Click %1 in %2: where the drill ends in the %3."))
-                         .arg(text(wanted->point), text(wanted->view), text(tunnel.name)));
-    }
+    if (wanted && (tunnel.start == wanted->point || tunnel.end == wanted->point))
+      return tr("Click %1 in %2: the %3 of the %4's tunnel.")
+          .arg(text(wanted->point), text(wanted->view), kind_of(state, tunnel, wanted->point),
+               text(tunnel.name));
+  if (wanted) return tr("Click %1 in %2.").arg(text(wanted->point), text(wanted->view));
+  if (const QString bad = contradicting_pick(state); !bad.isEmpty())
+    return tr("%1 Select it in the table and click it again, or undo the click (Ctrl+Z).").arg(bad);
+  if (!state.failed_picks.empty()) {
+    const FailedPick& failed = state.failed_picks.front();
+    return tr("%1 is not picked in %2: %3. %4")
+        .arg(text(failed.pick.name), text(failed.pick.view), text(failed.why.message), again);
+  }
+  if (!state.picks.empty())
+    return tr(
+        "All points are placed. To move one, drag it, or select it in the table and click its new position "
+        "in each X-ray image; further views make it more accurate.");
+  if (state.registration)
+    return tr(
+        "The points below come from the plans of the models and move with these (Alt+7). To locate another "
+        "point, name it below.");
+  if (state.has_models)
+    return tr(
+        "Register the models first (Alt+7): their plans hold the tunnels. To locate another point, name it "
+        "below.");
+  return tr("This case has no points: name one below, then click it in two X-ray images.");
 }
 
 void PlanPage::placed(const std::string& point) {

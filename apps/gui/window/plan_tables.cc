@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "gui/window/pages.h"
@@ -28,12 +29,15 @@ QString words_of(const pipeline::BoneLabel& bone) {
 std::string views_with(const ApplicationState& state, const std::string& point) {
   QStringList views;
   for (const std::string& view : state.views)
-    if (pick_of(state, point, view) != nullptr) views << text(view);
+    if (const pipeline::Pick* pick = pick_of(state, point, view); pick != nullptr)
+      views << (failure_of(state, point, view) != nullptr ? PlanPage::tr("%1 (failed)").arg(text(view))
+                : pick->snap == pipeline::Snap::ball      ? PlanPage::tr("%1 (ball)").arg(text(view))
+                                                          : text(view));
   return views.join(", ").toStdString();
 }
 
 pipeline::PointResult located(const ApplicationState& state, const PlannedPoint& planned) {
-  if (!planned.of_model && state.result) {
+  if (!planned.of_model && state.result && !state.has_other_options && !is_stale(state, planned.name)) {
     const auto& points = state.result->points;
     const auto found = std::ranges::find(points, planned.name, &pipeline::PointResult::name);
     if (found != points.end()) return *found;
@@ -41,7 +45,7 @@ pipeline::PointResult located(const ApplicationState& state, const PlannedPoint&
   pipeline::PointResult point;
   point.name = planned.name;
   point.source = localization::PointSource::pick;
-  if (planned.of_model) {
+  if (planned.of_model && !planned.is_moved) {
     point.place = planned.of_model->place;
     point.ray_gap_mm = std::numeric_limits<double>::quiet_NaN();  // no rays
   }
@@ -56,6 +60,17 @@ PlanTunnelRow row_of(const std::string& name, const std::string& planned_by, boo
           (end.in_calibrator - start.in_calibrator).norm(),
           localization::length_at_95(start.covariance_in_calibrator),
           localization::length_at_95(end.covariance_in_calibrator)};
+}
+
+/// Why a row has no numbers that is not a reason of the result; empty where it has, or needs none.
+QString remark_of(const ApplicationState& state, const PlannedPoint& planned) {
+  if (planned.of_model)
+    return planned.is_moved ? PlanPage::tr("model moved by hand: register it there") : QString();
+  for (const std::string& view : state.views)
+    if (const Failure* failed = failure_of(state, planned.name, view)) return sentence_of(*failed);
+  if (is_picked(state.picks, state.views, planned.name) && is_stale(state, planned.name))
+    return PlanPage::tr("not measured with these picks yet");
+  return {};
 }
 
 report::ColumnOf<PlanTunnelRow> number_column(const char* title, const char* definition,
@@ -76,25 +91,30 @@ report::Table ends_table(const ApplicationState& state, const std::vector<Planne
   const auto views = [&](const PlannedPoint& point) {
     return point.of_model ? Cell{""} : Cell{views_with(state, point.name)};
   };
-  return report::beside(
+  report::Table table = report::beside(
       report::table_of<PlannedPoint>(
           "",
           {{{"Point", "Name of the tunnel end, landmark, check target or planned point"},
             [](const PlannedPoint& point) { return Cell{point.name}; }},
            {{"Is",
-             "enters: where the drill enters; ends: where it stops; landmark; target; plan: of a registered "
+             "start or end of a tunnel, and where the drill enters; landmark; target; plan: of a registered "
              "model"},
             kind},
            {{"Clicked in", "Views in which it is picked"}, views}},
           planned),
       report::positions_table(points));
+  for (std::size_t i = 0; i < planned.size(); ++i)
+    if (const QString remark = remark_of(state, planned[i]); !remark.isEmpty())
+      table.rows[i].back() = Cell{remark.toStdString(), true};
+  return table;
 }
 
-std::vector<const RegisteredModel*> usable_models(const ApplicationState& state) {
-  std::vector<const RegisteredModel*> models;
+std::vector<UsableModel> usable_models(const ApplicationState& state) {
+  std::vector<UsableModel> models;
   if (!state.registration) return models;
-  for (const RegisteredModel& model : state.registration->models)
-    if (!model.registration.failure) models.push_back(&model);
+  for (std::size_t i = 0; i < state.registration->models.size(); ++i)
+    if (const RegisteredModel& model = state.registration->models[i]; !model.registration.failure)
+      models.push_back({&model, is_moved(state, i)});
   return models;
 }
 
@@ -103,19 +123,27 @@ std::vector<PlanTunnelRow> plan_tunnels(const ApplicationState& state) {
   if (state.result) {
     const pipeline::Result& result = *state.result;
     for (std::size_t i = 0; i < std::min(result.tunnels.size(), result.tunnel_ends.size()); ++i) {
-      const auto& start = result.points[result.tunnel_ends[i].start].place;
-      const auto& end = result.points[result.tunnel_ends[i].end].place;
-      if (start && end)
+      const pipeline::PointResult &from = result.points[result.tunnel_ends[i].start],
+                                  &to = result.points[result.tunnel_ends[i].end];
+      const auto &start = from.place, &end = to.place;
+      if (start && end && !is_stale(state, from.name) && !is_stale(state, to.name))
         rows.push_back(
             row_of(result.tunnels[i].name, PlanPage::tr("picks").toStdString(), false, *start, *end));
     }
   }
-  for (const RegisteredModel* model : usable_models(state))
-    for (std::size_t i = 0; i < model->tunnels.size(); ++i)
-      rows.push_back(row_of(model->tunnels[i].name,
-                            PlanPage::tr("plan of %1").arg(text(model->registration.name)).toStdString(),
-                            true, model->points[model->tunnel_ends[i].start].place,
-                            model->points[model->tunnel_ends[i].end].place));
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& [model, is_moved] : usable_models(state))
+    for (std::size_t i = 0; i < model->tunnels.size(); ++i) {
+      const QString plan = PlanPage::tr("plan of %1").arg(text(model->registration.name));
+      PlanTunnelRow row = row_of(model->tunnels[i].name, plan.toStdString(), true,
+                                 model->points[model->tunnel_ends[i].start].place,
+                                 model->points[model->tunnel_ends[i].end].place);
+      if (is_moved) {
+        row.planned_by = PlanPage::tr("%1, moved by hand").arg(plan).toStdString();
+        row.start_95_mm = row.end_95_mm = none;
+      }
+      rows.push_back(std::move(row));
+    }
   return rows;
 }
 

@@ -15,15 +15,20 @@ struct PlannedPoint {
   std::string name;
   QString kind;
   const case_registration::RegisteredPoint* of_model = nullptr;
+  bool is_moved = false;  ///< its model, by hand since the registration
 };
 
 /// The points as the report shows them, and where each is marked. One without a result has a name only.
 report::Table ends_table(const ApplicationState& state, const std::vector<PlannedPoint>& planned);
 
-/// The registered models that are not refused.
-std::vector<const case_registration::RegisteredModel*> usable_models(const ApplicationState& state);
+/// A registered model that is not refused.
+struct UsableModel {
+  const case_registration::RegisteredModel* model;
+  bool is_moved;  ///< by hand since the registration: no number of it holds
+};
+std::vector<UsableModel> usable_models(const ApplicationState& state);
 
-/// A tunnel between two located points.
+/// A tunnel between two located points; numbers that do not hold are not a number.
 struct PlanTunnelRow {
   std::string name, planned_by;
   bool is_of_model;

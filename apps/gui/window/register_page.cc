@@ -5,11 +5,15 @@
 #include <QSignalBlocker>
 #include <QVBoxLayout>
 #include <algorithm>
+#include <limits>
 
+#include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "gui/xray/mark_painter.h"
 #include "helicarm/case_registration/registration_tables.h"
+#include "helicarm/localization/error_bound.h"
+#include "helicarm/report/markup.h"
 
 namespace helicarm::gui {
 namespace {
@@ -17,16 +21,69 @@ namespace {
 using case_registration::CaseRegistration;
 using case_registration::RegisteredModel;
 
-/// Decision's reason, warnings and notes of every model, a line each.
+/// Decision and error at the plan's points of every model; its reasons, warnings and notes, a line each; what
+/// would help where it is not accepted.
 QString reasons_of(const CaseRegistration& done) {
   QStringList lines;
+  bool is_doubtful = false;
   for (const RegisteredModel& model : done.models) {
     const registration::Registration& found = model.registration;
+    double worst = 0;
+    for (const case_registration::RegisteredPoint& point : model.points)
+      worst = std::max(worst, localization::length_at_95(point.place.covariance_in_calibrator));
+    const auto decided = registration::word(found.decision);
+    QString line =
+        QString("%1: %2").arg(text(found.name), QString::fromUtf8(decided.data(), qsizetype(decided.size())));
+    if (!found.failure && !model.points.empty())
+      line += RegisterPage::tr(", its plan's points within %1 mm (95 %)").arg(number(worst, 2));
+    lines << line;
+    is_doubtful = is_doubtful || found.decision != registration::Decision::accept;
     if (found.failure) lines << sentence_of(*found.failure);
     for (const auto* list : {&found.warnings, &found.notes})
       for (const Warning& each : *list) lines << sentence_of(each);
   }
+  if (is_doubtful)
+    lines << RegisterPage::tr(
+        "What would help: move the model by hand until its outline follows the bone, then register from "
+        "here; "
+        "pick landmarks of it; add a view from another side.");
   return lines.join("\n");
+}
+
+/// Those registered, without numbers of a pose that is not the displayed one; before the registration their
+/// names.
+std::vector<RegisteredModel> listed_models(const ApplicationState& state) {
+  std::vector<RegisteredModel> models;
+  if (state.registration) {
+    models = with_moves(state).models;
+    for (std::size_t i = 0; i < models.size(); ++i)
+      if (is_moved(state, i)) {
+        models[i].registration.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
+        models[i].registration.views.clear();
+      }
+    return models;
+  }
+  for (const std::string& name : state.models) models.emplace_back().registration.name = name;
+  return models;
+}
+
+report::Table table_of_models(const ApplicationState& state, const std::vector<RegisteredModel>& models) {
+  report::Table table = case_registration::models_table(models);
+  const bool is_out_of_date = !stale(state, Phase::registration).isEmpty();
+  const auto say = [&](std::size_t model, const QString& words, bool is_bad) {
+    table.rows[model][1] = {words.toStdString(), is_bad};
+    if (!is_bad)
+      for (std::size_t i = 2; i < table.rows[model].size(); ++i) table.rows[model][i] = report::Cell{};
+  };
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    if (!state.registration)
+      say(i, RegisterPage::tr("not registered"), false);
+    else if (is_moved(state, i))
+      say(i, RegisterPage::tr("moved by hand"), true);
+    else if (is_out_of_date && !state.nudged)
+      say(i, RegisterPage::tr("out of date"), true);
+  }
+  return table;
 }
 
 }  // namespace
@@ -61,7 +118,7 @@ void RegisterPage::add_hand() {
   for (int i = 0; i < 6; ++i) {
     const bool turns = i >= 3;
     const QString axis = QStringList{"x", "y", "z"}[i % 3];
-    auto* by = by_[std::size_t(i)] = new QDoubleSpinBox;
+    auto* by = by_[std::size_t(i)] = new PoseBox;
     by->setObjectName((turns ? "turn" : "shift") + axis.toUpper());
     by->setAccessibleName((turns ? tr("Turn about %1, degrees") : tr("Shift along %1, mm")).arg(axis));
     by->setToolTip((turns ? tr("Turns the model about its centre, about the calibrator's %1")
@@ -74,7 +131,7 @@ void RegisterPage::add_hand() {
     by->setDecimals(1);
     by->setKeyboardTracking(false);
     grid->addWidget(by, 1 + i / 3, i % 3);
-    connect(by, &QDoubleSpinBox::valueChanged, this, &RegisterPage::nudge);
+    connect(by, &PoseBox::valueChanged, this, &RegisterPage::nudge);
   }
   connect(model_, &QComboBox::currentIndexChanged, this, [this] {
     reset_hand();
@@ -88,7 +145,7 @@ void RegisterPage::add_hand() {
 }
 
 void RegisterPage::reset_hand() {
-  for (QDoubleSpinBox* by : by_) {
+  for (PoseBox* by : by_) {
     const QSignalBlocker quiet(by);
     by->setValue(0);
   }
@@ -108,30 +165,40 @@ void RegisterPage::show_state(const ApplicationState& state) {
   register_->setEnabled(can);
   hand_->setEnabled(can && state.registration);
   from_here_->setEnabled(can && state.nudged);
-  if (const auto refusal = state.refusals.find(Phase::registration); refusal != state.refusals.end())
-    says_->setText(sentence_of(refusal->second));
-  else if (!state.has_models)
-    says_->setText(
-        tr("This case has no models: name a CT volume or a surface under \"models\" in case.json."));
-  else if (state.busy == Phase::registration)
-    says_->setText(text(state.doing));
-  else if (state.measured && state.result->failure)
-    says_->setText(tr("The measurement is refused (%1): no model is registered to it.")
-                       .arg(text(std::string(code(state.result->failure->reason)))));
-  else
-    says_->setText(state.registration ? reasons_of(*state.registration) : QString());
+  says_->setText(words_of(state));
+  const std::vector<RegisteredModel> models = listed_models(state);
+  fill(models_, table_of_models(state, models));
+  fill(points_, case_registration::points_table(models));
   if (shown_ == state.registration) return;
   shown_ = state.registration;
   const QSignalBlocker quiet(model_);
   const int chosen = model_->currentIndex();
   model_->clear();
   reset_hand();
-  const std::vector<RegisteredModel> none;
-  const std::vector<RegisteredModel>& models = shown_ ? shown_->models : none;
-  for (const RegisteredModel& model : models) model_->addItem(text(model.registration.name));
+  if (shown_)
+    for (const RegisteredModel& model : shown_->models) model_->addItem(text(model.registration.name));
   model_->setCurrentIndex(std::clamp(chosen, std::min(0, model_->count() - 1), model_->count() - 1));
-  fill(models_, case_registration::models_table(models));
-  fill(points_, case_registration::points_table(models));
+}
+
+QString RegisterPage::words_of(const ApplicationState& state) const {
+  if (state.busy == Phase::registration) return text(state.doing);
+  const auto refusal = state.refusals.find(Phase::registration);
+  const bool is_ended = refusal != state.refusals.end() && is_cancelled(refusal->first, refusal->second);
+  if (refusal != state.refusals.end() && !is_ended) return sentence_of(refusal->second);
+  if (!state.has_models)
+    return tr("This case has no models: name a CT volume or a surface under \"models\" in case.json.");
+  if (state.measured && state.result->failure)
+    return tr("The measurement is refused (%1): no model is registered to it.")
+        .arg(text(std::string(code(state.result->failure->reason))));
+  if (const QString changed = stale(state, Phase::registration); !changed.isEmpty())
+    return state.nudged
+               ? tr("%1. Press \"Register from here\" to register it at this pose, or set all fields "
+                    "to 0 for the registered one.")
+                     .arg(changed)
+               : changed + ".";
+  const QString ended = is_ended ? tr("The registration was cancelled. ") : QString();
+  if (state.registration) return ended + reasons_of(*state.registration);
+  return ended + tr("No model is registered yet.");
 }
 
 std::vector<ModelShape> models_of(const ApplicationState& state) {
@@ -158,6 +225,13 @@ std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t
     ModelOutline& outline = outlines.emplace_back();
     if (view < dots.size()) outline.dots = dots[view];
     if (is_nudged || model.registration.failure || view >= model.views.size()) continue;
+    const geometry::View& camera = model.views[view];
+    for (const auto& [start, end] : model.tunnel_ends) {
+      const Eigen::Vector3d &from = model.points[start].place.in_calibrator,
+                            &to = model.points[end].place.in_calibrator;
+      if (camera.depth(from) > 1 && camera.depth(to) > 1)
+        outline.tunnels.push_back({camera.project(from), camera.project(to)});
+    }
     for (const case_registration::RegisteredPoint& point : model.points)
       if (const Eigen::Vector3d& at = point.place.in_calibrator; model.views[view].depth(at) > 1)
         outline.points.emplace_back(text(point.name), model.views[view].project(at));

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <QDoubleSpinBox>
 #include <array>
 
 #include "gui/scene/scene_values.h"
 #include "gui/window/pages.h"
+#include "gui/window/pose_box.h"
 #include "gui/xray/live_marks.h"
 #include "helicarm/case_registration/register_case.h"
 
@@ -23,13 +23,14 @@ class RegisterPage : public Page {
   void add_hand();
   void nudge();
   void reset_hand();
+  QString words_of(const ApplicationState& state) const;
 
   QPushButton *register_, *from_here_;
   QLabel* says_;
   QTableWidget *models_, *points_;
   QWidget* hand_;
   QComboBox* model_;
-  std::array<QDoubleSpinBox*, 6> by_{};  ///< mm, then degrees
+  std::array<PoseBox*, 6> by_{};  ///< mm, then degrees
   std::shared_ptr<const case_registration::CaseRegistration> shown_;
 };
 

@@ -29,8 +29,23 @@ Appearance appearance_of(StepStatus status) {
       return {style::colours().amber, QStringLiteral("!"), StepStrip::tr("warning")};
     case StepStatus::refused:
       return {style::colours().red, QStringLiteral("✕"), StepStrip::tr("refused")};
+    case StepStatus::stale:
+      return {style::colours().amber, QStringLiteral("↻"), StepStrip::tr("out of date")};
   }
   return {};
+}
+
+/// As much of a text as two lines hold, elided at the end.
+QString two_lines(const QString& text, const QFontMetrics& metrics, int width) {
+  QString first;
+  for (const QString& word : text.split(' ')) {
+    const QString longer = first.isEmpty() ? word : first + ' ' + word;
+    if (metrics.horizontalAdvance(longer) > width) break;
+    first = longer;
+  }
+  if (first.isEmpty()) first = metrics.elidedText(text, Qt::ElideRight, width);
+  const QString rest = text.mid(first.size()).trimmed();
+  return rest.isEmpty() ? first : first + '\n' + metrics.elidedText(rest, Qt::ElideRight, width);
 }
 
 }  // namespace
@@ -85,9 +100,9 @@ void StepButton::show_card(const StepCard& card) {
   update();
 }
 
-QSize StepButton::sizeHint() const { return {style::scaled(180), style::scaled(72)}; }
+QSize StepButton::sizeHint() const { return {style::scaled(180), style::scaled(76)}; }
 
-QSize StepButton::minimumSizeHint() const { return {100, style::scaled(72)}; }
+QSize StepButton::minimumSizeHint() const { return {100, style::scaled(76)}; }
 
 void StepButton::paintEvent(QPaintEvent*) {
   const Appearance appearance = appearance_of(card_.status);
@@ -113,16 +128,25 @@ void StepButton::paintEvent(QPaintEvent*) {
   painter.drawText(inner, Qt::AlignRight | Qt::AlignTop, appearance.sign);
   painter.setPen(style::colours().text);
   painter.drawText(inner, Qt::AlignLeft | Qt::AlignTop, card_.name);
-  font.setPixelSize(style::scaled(13)), font.setBold(false);
-  painter.setFont(font);
+  font.setBold(false);
   const auto line = [&](const QString& text, int top, const QColor& colour) {
+    for (int px = 13; px >= 10; --px) {  // a number is not cut
+      font.setPixelSize(style::scaled(px));
+      painter.setFont(font);
+      if (painter.fontMetrics().horizontalAdvance(text) <= inner.width()) break;
+    }
     painter.setPen(colour);
     painter.drawText(QRectF(inner.left(), inner.top() + style::scaled(top), inner.width(), style::scaled(18)),
                      Qt::AlignLeft | Qt::AlignVCenter,
                      painter.fontMetrics().elidedText(text, Qt::ElideRight, int(inner.width())));
   };
-  line(card_.figure.isEmpty() ? appearance.word : card_.figure, 22, style::colours().text);
-  line(card_.why, 40, card_.status == StepStatus::good ? style::colours().quiet : appearance.colour);
+  line(card_.figure.isEmpty() ? appearance.word : card_.figure, 20, style::colours().text);
+  painter.setPen(card_.status == StepStatus::good ? style::colours().quiet : appearance.colour);
+  font.setPixelSize(style::scaled(12));
+  painter.setFont(font);
+  const QRectF reason = inner.adjusted(0, style::scaled(37), 0, 0);
+  painter.drawText(reason, Qt::AlignLeft | Qt::AlignTop | Qt::TextWordWrap,
+                   two_lines(card_.why, painter.fontMetrics(), int(reason.width())));
 }
 
 StepStrip::StepStrip(QWidget* parent) : QWidget(parent) {
@@ -141,7 +165,7 @@ StepStrip::StepStrip(QWidget* parent) : QWidget(parent) {
   choose(Phase::acquire);
 }
 
-void StepStrip::show_steps(const std::array<StepCard, phases.size()>& cards) {
+void StepStrip::show_steps(const StepCards& cards) {
   for (const StepCard& card : cards) {
     button(card.phase)->show_card(card);
     button(card.phase)->setVisible(card.is_offered);

@@ -35,7 +35,7 @@ class StepStrip : public QWidget {
 
  public:
   explicit StepStrip(QWidget* parent = nullptr);
-  void show_steps(const std::array<StepCard, phases.size()>& cards);
+  void show_steps(const StepCards& cards);
   void choose(Phase phase);
   StepButton* button(Phase phase) const { return buttons_[std::size_t(phase)]; }
 

@@ -90,6 +90,19 @@ int scaled(int px) { return px * current().text_px / usual_text_px; }
 void apply(const Appearance& appearance) {
   current() = appearance;
   current().text_px = std::clamp(appearance.text_px, smallest_text_px, largest_text_px);
+  const Colours& in = colours();
+  QPalette palette;  // of what no rule styles: arrows of the number fields, links
+  for (const auto& [role, colour] : {std::pair(QPalette::Window, in.ground),
+                                     {QPalette::WindowText, in.text},
+                                     {QPalette::Base, in.panel},
+                                     {QPalette::Text, in.text},
+                                     {QPalette::Button, in.raised},
+                                     {QPalette::ButtonText, in.text},
+                                     {QPalette::PlaceholderText, in.quiet},
+                                     {QPalette::Link, in.blue},
+                                     {QPalette::LinkVisited, in.blue}})
+    palette.setColor(role, colour);
+  QApplication::setPalette(palette);
   qApp->setStyleSheet(sheet(current()));
 }
 

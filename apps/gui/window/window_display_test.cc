@@ -100,7 +100,8 @@ TEST_F(WindowDisplay, CopiesTheTableOrImageThatHasTheFocus) {
   auto* table = find<QTableWidget>("endTable");
   table->setFocus();
   press(QKeySequence::Copy);
-  EXPECT_THAT(QApplication::clipboard()->text().toStdString(), HasSubstr("FS\tenters\tAP, LAT\t"));
+  EXPECT_THAT(QApplication::clipboard()->text().toStdString(),
+              HasSubstr("FS\tstart\tAP (ball), LAT (ball)\t"));
   window_->xray(0).setFocus();
   press(QKeySequence::Copy);
   EXPECT_EQ(QApplication::clipboard()->image().size(), window_->xray(0).size());

@@ -21,6 +21,17 @@ TEST_F(Window, SilentTrackerIsShownUntilItSendsAgain) {
   EXPECT_TRUE(wait("femur is green", [&] { return light("femur") == Light::green; }));
 }
 
+TEST_F(Window, AHiddenMarkerTurnsItsStepYellow) {
+  open_rehearsal();
+  ASSERT_TRUE(wait("femur is green", [&] { return indicator("femur").light == Light::green; }));
+  EXPECT_EQ(card(Phase::acquire).status, StepStatus::waiting);
+  window_->controller().set_fault("hide:femur", true);
+  EXPECT_TRUE(wait("Acquire warns", [&] { return card(Phase::acquire).status == StepStatus::warning; }));
+  EXPECT_THAT(card(Phase::acquire).why.toStdString(), HasSubstr("femur"));
+  window_->controller().set_fault("hide:femur", false);
+  EXPECT_TRUE(wait("Acquire waits", [&] { return card(Phase::acquire).status == StepStatus::waiting; }));
+}
+
 TEST_F(Window, DisconnectedRobotCableInMotionStopsTheRobotAndIsShown) {
   window_->controller().set_virtual_freshness({});
   ASSERT_NO_FATAL_FAILURE(
@@ -117,6 +128,15 @@ TEST_F(Window, InvalidDroppedFilesAreRefusedByName) {
     EXPECT_EQ(card(Phase::acquire).status, StepStatus::refused);
     EXPECT_FALSE(card(Phase::acquire).why.isEmpty());
   }
+}
+
+TEST_F(Window, AMissingCaseIsNamedOnThePageThatWouldAskForImages) {
+  drop(*window_, {folder_ / "gone"});
+  ASSERT_TRUE(wait_idle());
+  EXPECT_THAT(find<QLabel>("notOpened")->text().toStdString(), HasSubstr((folder_ / "gone").string()));
+  EXPECT_TRUE(find<QLabel>("notOpened")->isVisible());
+  EXPECT_FALSE(find<QLabel>("lead")->isVisible());
+  screenshot("not-opened");
 }
 
 TEST_F(Window, ThousandRandomClicksAndKeysDoNotFreezeTheWindow) {

@@ -65,14 +65,32 @@ TEST_F(WindowWithACase, RecentOnesNewRehearsalAndQuittingAskToo) {
   }
 }
 
-TEST_F(WindowWithACase, AnUntouchedRehearsalAndKeptPicksAreLeftWithoutAQuestion) {
+TEST_F(WindowWithACase, AnUntouchedRehearsalIsLeftWithoutAQuestion) {
   open_rehearsal();
   drop(*window_, {other()});
   ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
-  window_->controller().erase_picks("FS");
-  ASSERT_TRUE(wait_idle());
   EXPECT_TRUE(window_->close());
   EXPECT_EQ(question(), nullptr);
+}
+
+TEST_F(WindowWithACase, ClosingTellsThatUnsavedPicksAreKeptAndOffersToSaveThem) {
+  drop(*window_, {other()});
+  ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
+  pipeline::Pick moved = state().picks.front();
+  moved.uv_raw.x() += 1;
+  window_->controller().pick(moved);
+  ASSERT_TRUE(wait_idle());
+  const auto asked = [&] { return window_->findChild<QMessageBox*>("unsavedQuestion"); };
+  EXPECT_FALSE(window_->close());
+  ASSERT_NE(asked(), nullptr);
+  EXPECT_THAT(asked()->text().toStdString(), HasSubstr("unsaved_picks.json"));
+  QTest::mouseClick(asked()->button(QMessageBox::Cancel), Qt::LeftButton);
+  ASSERT_TRUE(wait("the question is answered", [&] { return asked() == nullptr; }));
+  EXPECT_TRUE(window_->isVisible());
+  EXPECT_FALSE(window_->close());
+  QTest::mouseClick(asked()->button(QMessageBox::Save), Qt::LeftButton);
+  ASSERT_TRUE(wait("the window is closed", [&] { return !window_->isVisible(); }));
+  EXPECT_FALSE(fs::exists(other() / "unsaved_picks.json"));
 }
 
 TEST_F(WindowWithACase, PicksThatCannotBeKeptAreAskedFor) {

@@ -180,7 +180,7 @@ TEST_F(WindowWithOwnImages, BecomeACaseWithSavedPicksAndAnExport) {
   window_->xrays().display(2);
   screenshot("10-third-view");
   ASSERT_NO_FATAL_FAILURE(pick("FS", 2));
-  EXPECT_EQ(ends->item(0, 2)->text().toStdString(), "AP, LAT, OBL");
+  EXPECT_EQ(ends->item(0, 2)->text().toStdString(), "AP (ball), LAT (ball), OBL (ball)");
   screenshot("12-three-views");
   expect_views_by_thumbnail_and_four_large();
   QTest::keyClick(window_.get(), Qt::Key_S, Qt::ControlModifier);
@@ -233,6 +233,13 @@ TEST_F(WindowWithOwnImages, ASingleImageIsForLookingAndDemandsNoSecond) {
   ASSERT_EQ(find<QTableWidget>("measuresTable")->rowCount(), 1);
   EXPECT_TRUE(find<QTableWidget>("measuresTable")->item(0, 4)->text().endsWith(" px"));
   screenshot("11-single-image");
+}
+
+TEST_F(WindowWithOwnImages, AFolderOfDicomFilesWithoutExtensionsIsOfferedAsACase) {
+  drop(*window_, {folder_ / "disk"});
+  ASSERT_TRUE(wait("the dialog is offered", [&] { return window_->new_case() != nullptr; }));
+  wait_checked();
+  EXPECT_EQ(part<QTableWidget>("caseImages")->rowCount(), 3);
 }
 
 TEST_F(WindowWithOwnImages, SelectedOnesAreRemovedAndWhatIsMissingIsSaidBesideIt) {

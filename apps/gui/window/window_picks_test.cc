@@ -52,6 +52,34 @@ class WindowWithTunnels : public Window {
       if (pick.name == point && pick.view == "AP") return pick.uv_raw;
     throw std::out_of_range(point);
   }
+  QString says() { return window_->findChild<QLabel*>("nextPick")->text(); }
+  /// With the mouse, in the view's panel.
+  void click_at(std::size_t panel, const Eigen::Vector2d& raw) {
+    XrayView& view = window_->xray(panel);
+    ASSERT_TRUE(wait("the image is shown", [&] {
+      return !view.is_computing() && view.place_of({raw.x(), raw.y()}).has_value();
+    }));
+    QTest::mouseClick(&view, Qt::LeftButton, {}, view.place_of({raw.x(), raw.y()})->toPoint());
+    ASSERT_TRUE(wait_idle());
+    QTest::qWait(QApplication::doubleClickInterval() + 50);
+  }
+  void drag(std::size_t panel, const Eigen::Vector2d& raw, const QPoint& by) {
+    XrayView& view = window_->xray(panel);
+    ASSERT_TRUE(wait("the image is shown", [&] { return view.place_of({raw.x(), raw.y()}).has_value(); }));
+    const QPoint from = view.place_of({raw.x(), raw.y()})->toPoint(), to = from + by;
+    QTest::mousePress(&view, Qt::LeftButton, {}, from);
+    QMouseEvent move(QEvent::MouseMove, to, view.mapToGlobal(QPointF(to)), Qt::NoButton, Qt::LeftButton, {});
+    QApplication::sendEvent(&view, &move);
+    QTest::mouseRelease(&view, Qt::LeftButton, {}, to);
+    ASSERT_TRUE(wait_idle());
+  }
+  pipeline::Snap snap_of(const std::string& point, const std::string& view) {
+    return pick_of(state(), point, view)->snap;
+  }
+  void choose_row_of(const QString& point) {
+    auto* table = window_->findChild<QTableWidget*>("endTable");
+    table->setCurrentItem(table->findItems(point, Qt::MatchExactly).front());
+  }
   StepStatus plan() { return card(Phase::plan).status; }
 
   std::vector<pipeline::Pick> picks_;
@@ -94,18 +122,80 @@ TEST_F(WindowWithTunnels, DraggedPickMovesItsPoint) {
   open_tunnels();
   window_->strip().chosen(Phase::plan);
   const Eigen::Vector2d before = pick_of(state(), "FS", state().views[0])->uv_raw;
-  XrayView& view = window_->xray(0);
-  ASSERT_TRUE(wait("the image is shown", [&] {
-    return view.place_of({before.x(), before.y()}).has_value();
-  }));
-  const QPoint from = view.place_of({before.x(), before.y()})->toPoint(), to = from + QPoint(25, 0);
-  QTest::mousePress(&view, Qt::LeftButton, {}, from);
-  QMouseEvent move(QEvent::MouseMove, to, view.mapToGlobal(QPointF(to)), Qt::NoButton, Qt::LeftButton, {});
-  QApplication::sendEvent(&view, &move);
-  QTest::mouseRelease(&view, Qt::LeftButton, {}, to);
-  ASSERT_TRUE(wait_idle());
+  ASSERT_NO_FATAL_FAILURE(drag(0, before, {25, 0}));
   EXPECT_GT((pick_of(state(), "FS", state().views[0])->uv_raw - before).norm(), 5);
   EXPECT_TRUE(window_->controller().can_undo_picks());
+}
+
+TEST_F(WindowWithTunnels, AClickThatFoundNoBallIsNoPickUntilItIsTakenAsItIs) {
+  open_tunnels();
+  window_->strip().chosen(Phase::plan);
+  window_->controller().erase_picks("FS");
+  ASSERT_TRUE(wait_idle());
+  EXPECT_FALSE(find("takeAsClicked")->isEnabled());
+  const Eigen::Vector2d nothing = picks_of_case("FS") + Eigen::Vector2d(60, -60);
+  const QImage before = window_->xray(0).image_with_marks();
+  const int height = window_->findChild<QLabel*>("nextPick")->height();
+  ASSERT_NO_FATAL_FAILURE(click_at(0, nothing));
+  ASSERT_NE(failure_of(state(), "FS", "AP"), nullptr);
+  EXPECT_EQ(next_pick(state())->view, "AP");  // the instruction stays
+  EXPECT_THAT(says().toStdString(), HasSubstr("FS is not picked in AP: no ball"));
+  EXPECT_EQ(window_->findChild<QLabel*>("nextPick")->height(), height);
+  EXPECT_EQ(plan(), StepStatus::warning);
+  EXPECT_EQ(cell("FS", 2), "AP (failed)");
+  EXPECT_NE(window_->xray(0).image_with_marks(), before);
+  screenshot("failed-pick");
+  click("takeAsClicked");
+  ASSERT_TRUE(wait_idle());
+  EXPECT_EQ(failure_of(state(), "FS", "AP"), nullptr);
+  EXPECT_EQ(snap_of("FS", "AP"), pipeline::Snap::none);
+  EXPECT_EQ(next_pick(state())->view, "LAT");
+}
+
+TEST_F(WindowWithTunnels, TheSnapOfAnEndIsChangedAfterwards) {
+  open_tunnels();
+  window_->strip().chosen(Phase::plan);
+  auto* snap = window_->findChild<QCheckBox*>("snap");
+  ASSERT_TRUE(snap->isChecked());
+  choose_row_of("FS");
+  const bool was = snap_of("FS", "AP") == pipeline::Snap::ball;
+  ASSERT_EQ(snap->isChecked(), was);
+  snap->click();
+  ASSERT_TRUE(wait_idle());
+  EXPECT_EQ(snap_of("FS", "AP") == pipeline::Snap::ball, !was);
+  EXPECT_EQ(snap_of("FS", "LAT") == pipeline::Snap::ball, !was);
+  EXPECT_EQ(snap_of("FE", "AP") == pipeline::Snap::ball, was);
+}
+
+TEST_F(WindowWithTunnels, APickDraggedWithoutSnapIsTakenAsItIs) {
+  open_tunnels();
+  window_->strip().chosen(Phase::plan);
+  window_->controller().set_snap("FS", pipeline::Snap::ball);
+  ASSERT_TRUE(wait_idle());
+  window_->findChild<QCheckBox*>("snap")->click();
+  ASSERT_NO_FATAL_FAILURE(drag(0, pick_of(state(), "FS", "AP")->uv_raw, {25, 0}));
+  EXPECT_EQ(snap_of("FS", "AP"), pipeline::Snap::none);
+  EXPECT_EQ(snap_of("FS", "LAT"), pipeline::Snap::ball);
+}
+
+TEST_F(WindowWithTunnels, AnExportIsConfirmedWithItsFolderAndWhatItLacks) {
+  open_tunnels();
+  window_->controller().erase_picks("FS");
+  ASSERT_TRUE(wait_idle());
+  EXPECT_THAT(find<QLabel>("exportLacks")->text().toStdString(), HasSubstr("FS is not picked"));
+  window_->controller().export_to(folder_ / "export");
+  ASSERT_TRUE(wait_idle());
+  QTest::qWait(300);
+  EXPECT_TRUE(window_->strip().button(Phase::verify)->isChecked());
+  for (const char* label : {"exportedTo", "told"}) {
+    const std::string words = find<QLabel>(label)->text().toStdString();
+    EXPECT_THAT(words, HasSubstr((folder_ / "export").string())) << label;
+    EXPECT_THAT(words, HasSubstr("FS is not picked")) << label;
+  }
+  screenshot("exported");
+  QTest::keyClick(window_.get(), Qt::Key_Z, Qt::ControlModifier);
+  ASSERT_TRUE(wait_idle());
+  EXPECT_THAT(find<QLabel>("exportedTo")->text().toStdString(), HasSubstr("Changed since"));
 }
 
 TEST_F(WindowWithTunnels, WrongPickRefusesThePlanUntilItIsPickedAgain) {
@@ -136,6 +226,7 @@ TEST_F(WindowWithTunnels, LandmarkIsLocatedAndSavedInTheCase) {
   QTest::keyClick(window_.get(), Qt::Key_S, Qt::ControlModifier);
   EXPECT_FALSE(fs::exists(unsaved));
   EXPECT_TRUE(window_->findChild<QLabel*>("unsavedPicks")->isHidden());
+  EXPECT_THAT(find<QLabel>("told")->text().toStdString(), HasSubstr("case.json"));
   const auto saved = pipeline::read_case(folder_ / "tunnels");
   ASSERT_TRUE(saved) << saved.error().message;
   EXPECT_EQ(std::ranges::count(saved->picks, std::string("notch"), &pipeline::Pick::name), 2);
@@ -205,6 +296,7 @@ TEST_F(WindowWithTunnels, PicksSurviveAKilledProgram) {
   open_case(folder);
   EXPECT_EQ(pick_of(state(), "FE", "AP")->uv_raw, Eigen::Vector2d(300, 310));
   EXPECT_TRUE(state().has_unsaved_picks);
+  EXPECT_THAT(find<QLabel>("told")->text().toStdString(), HasSubstr("restored"));
   QTest::keyClick(window_.get(), Qt::Key_Z, Qt::ControlModifier);
   ASSERT_TRUE(wait_idle());
   EXPECT_EQ(pick_of(state(), "FE", "AP")->uv_raw, picks_of_case("FE"));

@@ -15,7 +15,9 @@ TEST_F(Window, AModelIsRegisteredAndMovedByHand) {
   ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
   auto* scene = find<SceneView>("scene");
   const QImage without = scene->grab().toImage();
-  QTest::mouseClick(window_->strip().button(Phase::registration), Qt::LeftButton);
+  EXPECT_TRUE(window_->strip().button(Phase::registration)->isChecked());  // opens there
+  EXPECT_EQ(find<QTableWidget>("modelTable")->item(0, 1)->text(), "not registered");
+  screenshot("register-first");
   click("registerModels");
   ASSERT_TRUE(wait("the model is registered", [&] { return state().registration && !state().busy; }));
   EXPECT_TRUE(window_->strip().button(Phase::registration)->isChecked());
@@ -50,13 +52,30 @@ TEST_F(Window, AModelIsRegisteredAndMovedByHand) {
   EXPECT_NE(window_->xray(0).image_with_marks(), registered);
   screenshot("register-by-hand");
   EXPECT_TRUE(find("registerFromHere")->isEnabled());
+  EXPECT_EQ(card(Phase::registration).status, StepStatus::stale);
+  EXPECT_EQ(models->item(0, 1)->text(), "moved by hand");
+  auto* field = find<QDoubleSpinBox>("shiftX");
+  field->setFocus();
+  QTest::keyClick(field, Qt::Key_E, Qt::ControlModifier);
+  QTest::keyClick(field, Qt::Key_Z, Qt::ControlModifier);
+  QTest::keyClick(field, Qt::Key_U, Qt::ControlModifier);
+  EXPECT_EQ(field->value(), 4);
+  ASSERT_TRUE(wait("the export is asked for",
+                   [&] { return window_->findChild<QDialog*>("exportDialog") != nullptr; }));
+  window_->findChild<QDialog*>("exportDialog")->close();
 
   QTest::mouseClick(window_->strip().button(Phase::plan), Qt::LeftButton);
   auto* tunnels = find<QTableWidget>("tunnelTable");
   EXPECT_TRUE(tunnels->isVisible());
   ASSERT_EQ(tunnels->rowCount(), 1);
   EXPECT_EQ(tunnels->item(0, 0)->text(), "tunnel");
+  EXPECT_EQ(tunnels->item(0, 1)->text(), "plan of bone, moved by hand");
+  EXPECT_EQ(tunnels->item(0, 3)->text(), "–");
+  EXPECT_EQ(card(Phase::plan).status, StepStatus::stale);
+  for (const char* axis : {"shiftX", "shiftY"}) find<QDoubleSpinBox>(axis)->setValue(0);
   EXPECT_EQ(tunnels->item(0, 1)->text(), "plan of bone");
+  EXPECT_NE(card(Phase::plan).status, StepStatus::stale);
+  EXPECT_TRUE(find<QLabel>("tunnelsOfModels")->isVisible());
   EXPECT_EQ(tunnels->item(0, 2)->text(), "20.00");
   auto* ends = find<QTableWidget>("endTable");
   const auto found = ends->findItems("tunnel_end", Qt::MatchExactly);
@@ -99,6 +118,7 @@ TEST(RegisteredModels, RefusedOneHasNoTunnelsAndNoPointsInTheImages) {
   EXPECT_EQ(rows[0].start_95_mm, 0);
   EXPECT_NEAR(rows[0].end_95_mm, 2.79, 0.01);
   EXPECT_EQ(outlines_of(with_registration(model), 0)[0].points.size(), 2u);
+  EXPECT_EQ(outlines_of(with_registration(model), 0)[0].tunnels.size(), 1u);
   EXPECT_EQ(models_of(with_registration(model)).size(), 1u);
 
   model.registration.failure = Failure{Reason::wrong_model, "femur: another bone", {}, {}};

@@ -143,6 +143,40 @@ TEST_F(Window, DisplayedPathIsWithdrawnWhenTheBoneMovesAndCannotBeConfirmed) {
   EXPECT_NE(window_->controller().live().robot.phase, robot::LinkPhase::moving);
 }
 
+TEST_F(Window, AfterAStopOnTheWayThePageSaysHowFarOffTheToolIs) {
+  ASSERT_NO_FATAL_FAILURE(register_in_rehearsal());
+  window_->strip().chosen(Phase::navigate);
+  find<QComboBox>("tunnel")->setCurrentText("femur");
+  auto* go = find<HoldButton>("go");
+  const QPoint place = go->mapTo(window_.get(), QPoint());
+  const auto stopped_on_the_way = [&] {
+    return state().tool_is_out && !state().has_arrived && !state().busy;
+  };
+  for (int left = most_attempts; left > 0 && !stopped_on_the_way(); --left) {
+    ASSERT_TRUE(make_ready());
+    click("planWay");
+    ASSERT_TRUE(wait_idle());
+    if (!state().order) continue;
+    EXPECT_THAT(find<QLabel>("robotSays")->text().toStdString(), HasSubstr("One hold starts"));
+    hold("go");
+    const auto from = live().robot.state->base_from_tcp.translation;
+    ASSERT_TRUE(wait("the tool has moved or the robot refuses", [&] {
+      const auto& now = live().robot.state;
+      return !state().busy || (now && (now->base_from_tcp.translation - from).norm() > 10);
+    }));
+    QTest::keyClick(window_.get(), Qt::Key_Space);
+    ASSERT_TRUE(wait_idle());
+  }
+  ASSERT_TRUE(stopped_on_the_way()) << seen();
+  EXPECT_FALSE(state().path.by_view.empty());  // stays in sight
+  QTest::qWait(300);
+  const std::string says = find<QLabel>("robotSays")->text().toStdString();
+  EXPECT_THAT(says, HasSubstr("stopped on its way to the tunnel femur"));
+  EXPECT_THAT(says, HasSubstr("mm off the axis"));
+  EXPECT_EQ(go->mapTo(window_.get(), QPoint()), place);
+  screenshot("stopped");
+}
+
 TEST_F(Window, ShortPressOnAYellowButtonDoesNothing) {
   open_rehearsal();
   auto* unlock = find<HoldButton>("unlock");

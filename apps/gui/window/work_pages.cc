@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pages of the navigation and verification steps.
+#include <QDesktopServices>
+#include <QUrl>
 #include <QVBoxLayout>
+#include <algorithm>
+#include <cmath>
 
+#include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "gui/window/pages.h"
@@ -10,21 +15,19 @@
 namespace helicarm::gui {
 
 NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
-    : Page(tr("Nothing moves unless you hold a yellow button until it is full. The space bar stops the "
-              "robot."),
+    : Page(tr("Nothing moves unless you hold a yellow button until it is full; one hold starts all moves of "
+              "its "
+              "step. The space bar stops the robot."),
            controller, parent) {
   says_ = new QLabel;
   says_->setObjectName("robotSays");
   says_->setWordWrap(true);
+  says_->setAlignment(Qt::AlignLeft | Qt::AlignTop);
   layout()->addWidget(says_);
   unlock_ = add_hold(tr("1  &Unlock the robot (only when no person is near it)"), "unlock",
                      [this] { controller_.unlock("the person at the screen"); });
-  register_ = add_hold(tr("2  &Register the robot (about twelve small moves)"), "register",
+  register_ = add_hold(tr("2  &Register the robot (small moves, listed above)"), "register",
                        [this] { controller_.register_robot(); });
-  tour_ = new QLabel;
-  tour_->setWordWrap(true);
-  tour_->hide();
-  layout()->addWidget(tour_);
   tunnel_ = new QComboBox;
   tunnel_->setObjectName("tunnel");
   tunnel_->setAccessibleName(tr("Tunnel"));
@@ -35,6 +38,8 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
                      [this] { controller_.plan_tunnel(tunnel_->currentText().toStdString()); });
   go_ = add_hold(tr("4  &Move to the tunnel"), "go", [this] { controller_.go(); });
   withdraw_ = add_hold(tr("5  With&draw the tool"), "withdraw", [this] { controller_.withdraw(); });
+  for (HoldButton* button : {unlock_, register_, go_, withdraw_})
+    connect(button, &HoldButton::released, this, &NavigatePage::tell);
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
@@ -47,22 +52,41 @@ void NavigatePage::show_state(const ApplicationState& state) {
     tunnel_->clear();
     tunnel_->addItems(names);
   }
-  tour_->setText(state.tour);
-  tour_->setVisible(!state.tour.isEmpty() && !state.hand_eye_rms_mm);
   allow();
 }
 
 void NavigatePage::show_live(const LiveState& live) {
-  if (phase_ == live.robot.phase && !live.robot.why) return;
+  const auto coarse = [](const std::optional<operation::TunnelAim>& aim) {
+    return aim ? std::round(10 * aim->distance_mm) : -1;
+  };
+  std::optional<operation::TunnelAim> aim;
+  if (live.aim && *live.aim) aim = **live.aim;
+  const bool is_off = controller_.state().tool_is_out && !controller_.state().has_arrived;
+  if (phase_ == live.robot.phase && !live.robot.why && !(is_off && coarse(aim) != coarse(aim_))) return;
+  aim_ = aim;
   phase_ = live.robot.phase;
   why_ = live.robot.why;
   allow();
 }
 
+QString NavigatePage::where_the_tool_is() const {
+  const ApplicationState& state = controller_.state();
+  const QString tunnel = text(state.bound_for);
+  if (state.has_arrived)
+    return tr("The tool is at the tunnel %1: hold button 5 to withdraw it first.").arg(tunnel);
+  const QString off = aim_ ? tr(", %1 mm off the axis").arg(aim_->distance_mm, 0, 'f', 1) : QString();
+  return tr("The robot stopped on its way to the tunnel %1%2; the X-ray images show the path it was on. Hold "
+            "button 5 to withdraw the tool.")
+      .arg(tunnel, off);
+}
+
 QString NavigatePage::next_step() const {
   const ApplicationState& state = controller_.state();
   if (state.source != Source::virtual_or && state.source != Source::devices)
-    return tr("Images from files: no robot is connected.");
+    return state.registration ? tr("Images from files: no robot is connected. Tunnels of a model's plan "
+                                   "cannot be given to a robot "
+                                   "here; export them (Alt+6).")
+                              : tr("Images from files: no robot is connected.");
   if (state.busy) return text(state.doing);
   const QString why = why_ ? sentence_of(*why_) + ". " : QString();
   switch (phase_) {
@@ -71,17 +95,18 @@ QString NavigatePage::next_step() const {
     case robot::LinkPhase::idle:
       return tr("The robot is locked. Hold button 1 when no person is near it.");
     case robot::LinkPhase::stopped:
-      return why + tr("The robot stays stopped until you have checked it and hold button 1.");
+      return why + tr("The robot stays stopped until you have checked it and hold button 1.") +
+             (state.tool_is_out ? " " + where_the_tool_is() : QString());
     case robot::LinkPhase::starting:
     case robot::LinkPhase::moving:
       return tr("The robot moves.");
     case robot::LinkPhase::ready:
       break;
   }
-  if (state.tool_is_out) return tr("The tool is at a tunnel: hold button 5 to withdraw it first.");
-  if (state.order) return tr("Inspect the path in both X-ray images, then hold button 4.");
+  if (state.tool_is_out) return where_the_tool_is();
+  if (state.order) return tr("Inspect the path in both X-ray images, then hold button 4. %1").arg(state.way);
   if (!state.measured) return tr("Acquire the X-ray images first (Alt+1).");
-  if (!state.hand_eye_rms_mm) return tr("Hold button 2 to register the robot.");
+  if (!state.hand_eye_rms_mm) return tr("Hold button 2 to register the robot. %1").arg(state.tour);
   if (next_pick(state)) return tr("Place the tunnels' ends first (Alt+4).");
   if (const auto refusal = state.refusals.find(Phase::plan); refusal != state.refusals.end())
     return sentence_of(refusal->second) + tr(". Pick its ends again (Alt+4).");
@@ -97,7 +122,7 @@ void NavigatePage::allow() {
   const bool free = !state.busy && (state.source == Source::virtual_or || state.source == Source::devices);
   const bool ready = free && phase_ == robot::LinkPhase::ready;
   const bool placed = state.measured && !next_pick(state) && !state.refusals.contains(Phase::plan);
-  says_->setText(next_step());
+  tell();
   unlock_->setEnabled(free && (phase_ == robot::LinkPhase::idle || phase_ == robot::LinkPhase::stopped));
   register_->setEnabled(ready && !state.tool_is_out);
   plan_->setEnabled(ready && placed && state.hand_eye_rms_mm && !state.tool_is_out);
@@ -105,14 +130,36 @@ void NavigatePage::allow() {
   withdraw_->setEnabled(ready && state.tool_is_out);
 }
 
+bool NavigatePage::is_held() const {
+  return std::ranges::any_of(std::initializer_list<const HoldButton*>{unlock_, register_, go_, withdraw_},
+                             &HoldButton::isDown);
+}
+
+/// Not under the finger: a longer text would move the button that is held.
+void NavigatePage::tell() {
+  says_->setMinimumHeight(4 * (says_->fontMetrics().lineSpacing() + 2));  // the buttons below stay where they are
+  if (!is_held()) says_->setText(next_step());
+}
+
 VerifyPage::VerifyPage(Controller& controller, QWidget* parent)
     : Page(tr("Error: distance of each tunnel end from the tool's axis by tracker and X-ray images, mm, with "
               "its predicted value. From the X-ray images alone: Eq. 17 in px and mm, and the distance in "
               "space, mm."),
            controller, parent) {
-  table_ = add_table(report::verification_table({}), "outcomeTable");
   add_button(tr("&Export report, CSV, JSON and other formats..."), "export",
              [this] { emit report_wanted(); });
+  for (QLabel** label : {&lacks_, &exported_}) {
+    *label = new QLabel;
+    (*label)->setWordWrap(true);
+    layout()->addWidget(*label);
+  }
+  lacks_->setObjectName("exportLacks");
+  lacks_->setProperty("class", "attention");
+  exported_->setObjectName("exportedTo");
+  exported_->setTextFormat(Qt::RichText);
+  connect(exported_, &QLabel::linkActivated, this,
+          [](const QString& folder) { QDesktopServices::openUrl(QUrl::fromLocalFile(folder)); });
+  table_ = add_table(report::verification_table({}), "outcomeTable");
 }
 
 void VerifyPage::show_state(const ApplicationState& state) {
@@ -125,6 +172,16 @@ void VerifyPage::show_state(const ApplicationState& state) {
                        outcome.verification ? (*outcome.verification).*in_images : std::nullopt});
   if (tools.empty() && state.result) tools = report::tools_at_ends(state.result->verifications);
   fill(table_, report::verification_table(tools));
+  const QStringList lacks = lacks_of_export(state);
+  lacks_->setText(lacks.isEmpty() ? QString() : tr("An export lacks:\n%1").arg(lacks.join("\n")));
+  if (!state.exported) return exported_->clear();
+  const QString folder = text(state.exported->folder.string()).toHtmlEscaped();
+  QString words =
+      tr("Exported at %1 to <a href=\"%2\">%2</a>.").arg(state.exported->at.toHtmlEscaped(), folder);
+  if (!state.exported->lacks.isEmpty())
+    words += tr("<br>Without: %1.").arg(state.exported->lacks.join("; ").toHtmlEscaped());
+  if (!is_exported(state)) words += tr("<br><b>Changed since: export again.</b>");
+  exported_->setText(words);
 }
 
 }  // namespace helicarm::gui

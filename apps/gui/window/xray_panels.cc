@@ -70,6 +70,10 @@ void XrayPanels::build() {
             [this, panel](const QString& name, const QPointF& raw) {
               if (const auto view = panel->view()) emit pick_moved(*view, name, raw);
             });
+    connect(&panel->xray(), &XrayView::pick_menu_wanted, this,
+            [this, panel](const QString& name, const QPoint& global) {
+              if (const auto view = panel->view()) emit pick_menu_wanted(*view, name, global);
+            });
     connect(panel, &FramedXray::frame_read, this, &XrayPanels::displayed);
     connect(panel, &FramedXray::frame_changed, this, [this](std::size_t view, int frame) {
       frames_.at(view) = frame;

@@ -40,6 +40,7 @@ class XrayPanels : public QWidget {
  signals:
   void picked(std::size_t view, const QPointF& raw);
   void pick_moved(std::size_t view, const QString& name, const QPointF& raw);
+  void pick_menu_wanted(std::size_t view, const QString& name, const QPoint& global);
   /// Other views or frames are displayed.
   void displayed();
   void frame_changed(std::size_t view, int frame);

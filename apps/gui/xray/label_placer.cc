@@ -30,6 +30,24 @@ void text_box(QPainter& painter, const QPointF& at, const QString& words, const 
   painter.drawText(box.adjusted(rim, rim, rim, rim), words);
 }
 
+void wrapped_box(QPainter& painter, const QPointF& at, const QString& words, const QRectF& bounds,
+                 const QColor& edge) {
+  constexpr double apart = 16, rim = 6, widest = 250;
+  const QRectF room(0, 0, std::min(widest, bounds.width() - 2 * rim), bounds.height());
+  const QRectF text = QFontMetricsF(painter.font()).boundingRect(room, Qt::TextWordWrap, words);
+  QRectF box(at + QPointF(apart, apart), text.size() + QSizeF(2 * rim, 2 * rim));
+  if (box.right() > bounds.right()) box.moveRight(at.x() - apart);
+  if (box.bottom() > bounds.bottom()) box.moveBottom(at.y() - apart);
+  box.moveLeft(std::max(box.left(), bounds.left()));
+  box.moveTop(std::max(box.top(), bounds.top()));
+  painter.setPen(QPen(edge, 1.5));
+  painter.setBrush(QColor(16, 20, 26, 225));
+  painter.drawRoundedRect(box, 5, 5);
+  painter.setBrush(Qt::NoBrush);
+  painter.setPen(QColor(240, 243, 247));
+  painter.drawText(box.adjusted(rim, rim, -rim, -rim), Qt::TextWordWrap, words);
+}
+
 double LabelPlacer::hidden_by(const QRectF& box) const {
   const auto area = [](const QRectF& r) { return r.isEmpty() ? 0 : r.width() * r.height(); };
   double hidden = 4 * (area(box) - area(box.intersected(bounds_)));

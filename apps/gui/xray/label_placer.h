@@ -14,6 +14,10 @@ void outlined_text(QPainter& painter, const QPointF& at, const QString& words, c
 /// A few lines in a dark box beside `at`, kept within `bounds`.
 void text_box(QPainter& painter, const QPointF& at, const QString& words, const QRectF& bounds);
 
+/// As `text_box`, wrapped at a readable width, with a coloured edge.
+void wrapped_box(QPainter& painter, const QPointF& at, const QString& words, const QRectF& bounds,
+                 const QColor& edge);
+
 /// Places labels beside their marks without overlap of marks or labels where space permits.
 class LabelPlacer {
  public:

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gui/xray/live_marks.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "gui/xray/label_placer.h"
@@ -18,6 +20,20 @@ void paint_pick(QPainter& painter, const QPointF& at, const QString& name) {
       painter.drawLine(at + 5 * arm, at + 13 * arm);
   }
   outlined_text(painter, at + QPointF(13, -9), name, ink::point);
+}
+
+/// Unlike a pick in shape and colour, with the reason beside it.
+void paint_failed(QPainter& painter, const QPointF& at, const FreshPick& pick, const QRectF& bounds) {
+  constexpr double arm = 7;
+  for (const QPen& pen : {QPen(QColor(0, 0, 0, 170), 4), QPen(ink::rejected, 2)}) {
+    painter.setPen(pen);
+    painter.drawLine(at + QPointF(-arm, -arm), at + QPointF(arm, arm));
+    painter.drawLine(at + QPointF(-arm, arm), at + QPointF(arm, -arm));
+  }
+  painter.setPen(QPen(ink::rejected, 1.6, Qt::DashLine));
+  painter.drawEllipse(at, 13, 13);
+  wrapped_box(painter, at, QObject::tr("%1 is not picked: %2").arg(pick.name, pick.why_failed), bounds,
+              ink::rejected);
 }
 
 }  // namespace
@@ -80,6 +96,8 @@ void LiveMarks::carry(const pipeline::ViewResult& view, Layer layer) {
         outline.in_layer.dots.push_back(*place);
     for (const auto& [name, at] : outline.given.points)
       if (const auto place = in_layer(view, layer, at)) outline.in_layer.points.emplace_back(name, *place);
+    for (const rectification::PixelPath& tunnel : outline.given.tunnels)
+      std::ranges::move(in_layer(view, layer, tunnel), std::back_inserter(outline.in_layer.tunnels));
   }
   for (CarriedPick& pick : picks_)
     if (!pick.in_layer) pick.in_layer = layer_from_raw(view, layer, pick.given.raw);
@@ -88,28 +106,41 @@ void LiveMarks::carry(const pipeline::ViewResult& view, Layer layer) {
 
 namespace {
 
+/// Unlike a picked tunnel in stroke and colour.
+void paint_planned_tunnel(QPainter& painter, const rectification::PixelPath& tunnel, const ImageFrame& frame,
+                          const QColor& colour) {
+  paint_path(painter, tunnel, frame, QPen(QColor(0, 0, 0, 200), 3));
+  paint_path(painter, tunnel, frame, QPen(colour, 2.4, Qt::DashLine));
+}
+
 void paint_outline(QPainter& painter, const ModelOutline& outline, const ImageFrame& frame,
-                   const QColor& colour) {
+                   const QColor& colour, LabelPlacer& labels) {
   QList<QPointF> dots;
   for (const Eigen::Vector2d& dot : outline.dots) dots.append(frame.to_widget(dot));
   painter.setPen(QPen(colour, 2));
   painter.drawPoints(dots.data(), int(dots.size()));
+  for (const rectification::PixelPath& tunnel : outline.tunnels)
+    paint_planned_tunnel(painter, tunnel, frame, colour);
+  constexpr double arm = 10;
   for (const auto& [name, at] : outline.points) {
-    paint_open_cross(painter, frame.to_widget(at), colour);
-    outlined_text(painter, frame.to_widget(at) + QPointF(12, -8), name, colour);
+    const QPointF place = frame.to_widget(at);
+    labels.keep_free({place - QPointF(arm, arm), QSizeF(2 * arm, 2 * arm)});
+    paint_open_cross(painter, place, colour, 4, arm);
   }
+  for (const auto& [name, at] : outline.points) labels.place(painter, frame.to_widget(at), arm, name, colour);
 }
 
 }  // namespace
 
-void LiveMarks::paint(QPainter& painter, const ImageFrame& frame) const {
+void LiveMarks::paint(QPainter& painter, const ImageFrame& frame, const QRectF& bounds) const {
   for (const Carried& line : epipolar_)
     for (const rectification::PixelPath& piece : line.in_layer)
       paint_path(painter, piece, frame, QPen(ink::epipolar, 1.6, Qt::DashLine));
   for (const rectification::PixelPath& piece : path_.in_layer)
     paint_path(painter, piece, frame, QPen(ink::residual, 2.2));
+  LabelPlacer labels(bounds);
   for (std::size_t i = 0; i < outlines_.size(); ++i)
-    paint_outline(painter, outlines_[i].in_layer, frame, ink::of_model(i));
+    paint_outline(painter, outlines_[i].in_layer, frame, ink::of_model(i), labels);
   painter.setBrush(ink::residual);
   painter.setPen(Qt::NoPen);
   if (path_.end) painter.drawEllipse(frame.to_widget(*path_.end), 4, 4);
@@ -124,9 +155,13 @@ void LiveMarks::paint(QPainter& painter, const ImageFrame& frame) const {
     }
     if (!note_.isEmpty()) outlined_text(painter, at + QPointF(12, 18), note_, QColor(255, 255, 255));
   }
-  for (const auto& [pick, place] : picks_)
-    if (place && !(moved_ && moved_->given.name == pick.name))
+  for (const auto& [pick, place] : picks_) {
+    if (!place || (moved_ && moved_->given.name == pick.name)) continue;
+    if (pick.why_failed.isEmpty())
       paint_pick(painter, frame.to_widget(*place), pick.name);
+    else
+      paint_failed(painter, frame.to_widget(*place), pick, bounds);
+  }
   if (moved_ && moved_->in_layer) paint_pick(painter, frame.to_widget(*moved_->in_layer), moved_->given.name);
 }
 

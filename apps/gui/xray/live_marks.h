@@ -14,12 +14,14 @@ namespace helicarm::gui {
 struct FreshPick {
   QString name;
   Eigen::Vector2d raw;
+  QString why_failed = {};  ///< not empty: it is no pick
 };
 
-/// A registered model: dots along its outline and the points of its plan, rectified px.
+/// A registered model: dots along its outline, points and tunnels of its plan, rectified px.
 struct ModelOutline {
   std::vector<Eigen::Vector2d> dots;
   std::vector<std::pair<QString, Eigen::Vector2d>> points;
+  std::vector<rectification::PixelPath> tunnels = {};
 };
 
 /// Changing marks over the image: as given (picks raw, the rest rectified) and in the layer's pixels.
@@ -39,7 +41,7 @@ class LiveMarks {
   void forget_layer();
   /// Converts the remaining positions to the layer; call it after a change.
   void carry(const pipeline::ViewResult& view, Layer layer);
-  void paint(QPainter& painter, const ImageFrame& frame) const;
+  void paint(QPainter& painter, const ImageFrame& frame, const QRectF& bounds) const;
 
  private:
   struct Carried {

@@ -186,7 +186,7 @@ void XrayView::hide_repeated_picks() {
     const auto mark = std::ranges::find(marks_.points, name, &report::PointMark::name);
     const bool is_marked = mark != marks_.points.end() && shown_;
     const auto raw = is_marked ? raw_from_layer(view(), shown_->layer, mark->place) : std::nullopt;
-    if (raw && (*raw - pick.raw).norm() < reach_px) continue;
+    if (raw && (*raw - pick.raw).norm() < reach_px && pick.why_failed.isEmpty()) continue;
     if (is_marked) moved.insert(name);
     fresh.push_back(pick);
   }

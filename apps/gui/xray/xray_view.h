@@ -86,6 +86,8 @@ class XrayView : public QWidget {
   void measure_finished();
   /// A movable pick was dropped at a raw pixel.
   void pick_moved(const QString& name, QPointF raw_pixel);
+  /// A right click, without a drag, on a movable pick.
+  void pick_menu_wanted(const QString& name, const QPoint& global);
   void hovered(std::optional<helicarm::gui::MarkUnderCursor> mark);
   void layer_changed(helicarm::gui::Layer layer);
   void window_changed(helicarm::image::GreyWindow window);

@@ -100,6 +100,9 @@ void XrayView::mouseReleaseEvent(QMouseEvent* event) {
   const double half = 0.5 / devicePixelRatioF();
   const QPointF at = event->position() + QPointF(half, half);
   show_moved({});
+  if (ended.button == Qt::RightButton && !ended.moved)
+    if (const QString pick = movable_at(event->position()); !pick.isEmpty())
+      Q_EMIT pick_menu_wanted(pick, event->globalPosition().toPoint());
   if (ended.may_pick && !ended.moved) pick_at(at);
   if (!ended.pick.isEmpty() && ended.moved)
     if (const auto raw = raw_at(at)) Q_EMIT pick_moved(ended.pick, *raw);

@@ -35,7 +35,7 @@ void XrayView::paintEvent(QPaintEvent*) {
   painter.setRenderHint(QPainter::Antialiasing);
   painter.setFont(label_font(font()));
   if (shown_) {
-    live_.paint(painter, frame_);
+    live_.paint(painter, frame_, QRectF(rect()).adjusted(6, 6, -6, -6));
     measures_.paint(painter, frame_);
     if (magnifier_) paint_magnifier(painter);
     if (cursor_) paint_open_cross(painter, frame_.to_widget(*cursor_), Qt::white, 4, 16);
@@ -60,6 +60,10 @@ void XrayView::paint_still() {
   painter.setFont(label_font(font()));
   report::ViewMarks marks = only(groups_, marks_);
   std::erase_if(marks.points, [&](const report::PointMark& mark) { return superseded_.contains(mark.name); });
+  if (!superseded_.empty()) {  // they join the earlier places
+    marks.tunnels.clear();
+    marks.tool_lines.clear();
+  }
   paint_marks(painter, marks, frame_, grey_.width(), rect());
 }
 
@@ -70,7 +74,7 @@ QImage XrayView::image_with_marks() {
   QPainter painter(&image);
   painter.setRenderHint(QPainter::Antialiasing);
   painter.setFont(label_font(font()));
-  live_.paint(painter, frame_);
+  live_.paint(painter, frame_, QRectF(rect()).adjusted(6, 6, -6, -6));
   measures_.paint(painter, frame_);
   return image;
 }
