@@ -4,6 +4,7 @@
 #include "helicarm/case_registration/register_fields.h"
 #include "helicarm/devices/receiver/receiver_fields.h"
 #include "helicarm/operation/plan_fields.h"
+#include "helicarm/pipeline/map_cache.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/virtual_devices/virtual_devices_fields.h"
 
@@ -42,6 +43,7 @@ void keep_settings(QSettings& store, const Settings& settings) {
 
 Settings kept_settings(const QSettings& store) {
   Settings settings;
+  settings.run.cache = pipeline::user_cache_folder();
   for_each_part([&](auto part, const auto& fields, const char* name) {
     for (const auto& field : fields) {
       const QString kept = store.value(key_of(name, field.name)).toString();
