@@ -25,6 +25,8 @@ void add_cases(py::module_& module);
 void add_registration(py::module_& module);
 /// check_c_arm, c_arm_report.
 void add_c_arm(py::module_& module);
+/// sweep, Sweep.
+void add_sweep(py::module_& module);
 /// measure_phantom, MeasuredPhantom, verify_phantom.
 void add_phantom_calibration(py::module_& module);
 

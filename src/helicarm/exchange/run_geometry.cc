@@ -2,10 +2,12 @@
 #include "helicarm/exchange/run_geometry.h"
 
 #include <bit>
-#include <cstring>
+#include <cmath>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "helicarm/core/json.h"
 #include "helicarm/exchange/rtk_projection.h"
 
 namespace helicarm::exchange {
@@ -21,6 +23,23 @@ std::string numbers_of(const Eigen::MatrixXd& matrix, std::string_view between, 
                           : i + 1 < matrix.rows() ? after_row
                                                   : "");
   return text;
+}
+
+Json list_of(const Eigen::VectorXd& values) { return std::vector<double>(values.begin(), values.end()); }
+
+/// Angles a, b, c of a rotation Rz(a) Ry(b) Rz(c), rad.
+Eigen::Vector3d zyz_angles(const Eigen::Matrix3d& r) {
+  constexpr double locked_sine = 1e-9;
+  const double sine = std::hypot(r(0, 2), r(1, 2));
+  if (sine < locked_sine)
+    return {std::atan2(r(1, 0), r(0, 0) * (r(2, 2) < 0 ? -1 : 1)), std::atan2(sine, r(2, 2)), 0};
+  return {std::atan2(r(1, 2), r(0, 2)), std::atan2(sine, r(2, 2)), std::atan2(r(2, 1), -r(2, 0))};
+}
+
+/// Angles a, b, c of a rotation Rz(a) Ry(b) Rx(c), rad.
+Eigen::Vector3d zyx_angles(const Eigen::Matrix3d& r) {
+  return {std::atan2(r(1, 0), r(0, 0)), std::atan2(-r(2, 0), std::hypot(r(2, 1), r(2, 2))),
+          std::atan2(r(2, 1), r(2, 2))};
 }
 
 }  // namespace
@@ -78,6 +97,70 @@ std::string astra_vectors(const RunGeometry& run) {
   return text;
 }
 
+std::string leap_modular(const RunGeometry& run) {
+  Json json = {{"numAngles", run.images.size()}, {"numRows", run.size.y()}, {"numCols", run.size.x()}};
+  json["pixelHeight"] = json["pixelWidth"] = nullptr;
+  for (const char* key : {"sourcePositions", "moduleCenters", "rowVectors", "colVectors"})
+    json[key] = Json::array();
+  for (const RunGeometry::Image& image : run.images) {
+    const PlacedDetector d = placed_detector(image.view, run.size, run.pixel_mm);
+    json["pixelHeight"] = d.along_v.norm();
+    json["pixelWidth"] = d.along_u.norm();
+    json["sourcePositions"].push_back(list_of(d.source));
+    json["moduleCenters"].push_back(list_of(d.centre));
+    json["rowVectors"].push_back(list_of(d.along_v.normalized()));
+    json["colVectors"].push_back(list_of(d.along_u.normalized()));
+  }
+  return to_text(json) + "\n";
+}
+
+Expected<std::string> tigre_geometry(const RunGeometry& run) {
+  constexpr double rounding_px = 1e-6;
+  Json json = {
+      {"mode", "cone"}, {"nDetector", {run.size.y(), run.size.x()}}, {"dDetector", nullptr}, {"COR", 0}};
+  for (const char* key : {"DSD", "DSO", "offDetector", "rotDetector", "angles"}) json[key] = Json::array();
+  for (const RunGeometry::Image& image : run.images) {
+    if (std::abs(image.view.intrinsics.skew) > rounding_px)
+      return fail(Reason::unsupported,
+                  fmt::format("{}: TIGRE's detector has no skew; the camera's is {:g} px", image.name,
+                              image.view.intrinsics.skew));
+    const PlacedDetector d = placed_detector(image.view, run.size, run.pixel_mm);
+    // Turned so that the source lies on x; the detector's columns run along y, its rows against z.
+    Eigen::Matrix3d axes, detector;
+    axes.col(0) = d.source.normalized();
+    axes.col(1) = (d.along_u - axes.col(0) * axes.col(0).dot(d.along_u)).normalized();
+    axes.col(2) = axes.col(0).cross(axes.col(1));
+    detector.col(1) = d.along_u.normalized();
+    detector.col(2) = -d.along_v.normalized();
+    detector.col(0) = detector.col(1).cross(detector.col(2));
+    const Eigen::Vector3d centre = axes.transpose() * d.centre;
+    const double distance = d.source.norm();
+    json["dDetector"] = {d.along_v.norm(), d.along_u.norm()};
+    json["DSO"].push_back(distance);
+    json["DSD"].push_back(distance - centre.x());
+    json["offDetector"].push_back({centre.z(), centre.y()});
+    json["rotDetector"].push_back(list_of(zyx_angles(axes.transpose() * detector)));
+    json["angles"].push_back(list_of(zyz_angles(axes)));
+  }
+  return to_text(json) + "\n";
+}
+
+std::string plastimatch_matrix(const geometry::View& view, double pixel_mm) {
+  const geometry::Intrinsics& k = view.intrinsics;
+  const double distance = k.fy * pixel_mm;
+  const Eigen::Matrix4d extrinsic = view.camera_from_world.matrix();
+  Eigen::Matrix<double, 3, 4> intrinsic = Eigen::Matrix<double, 3, 4>::Zero();
+  intrinsic(0, 0) = k.fx / distance;
+  intrinsic(0, 1) = k.skew / distance;
+  intrinsic(1, 1) = k.fy / distance;
+  intrinsic(2, 2) = 1 / distance;
+  const Eigen::Matrix<double, 3, 4> matrix = intrinsic * extrinsic;
+  return fmt::format("{} {}\n{}\n{}\n{}\n{}\nExtrinsic\n{}\nIntrinsic\n{}\n", k.u0, k.v0,
+                     numbers_of(matrix, " ", "\n"), extrinsic(2, 3), distance,
+                     numbers_of(extrinsic.block<1, 3>(2, 0), " ", "\n"), numbers_of(extrinsic, " ", "\n"),
+                     numbers_of(intrinsic, " ", "\n"));
+}
+
 std::string ompl_matrices(const RunGeometry& run) {
   std::string text;
   for (const RunGeometry::Image& image : run.images)
@@ -99,11 +182,11 @@ std::string matrices_npy(const RunGeometry& run) {
   std::string header =
       fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 3, 4), }}", run.images.size());
   constexpr std::size_t preamble = 10, alignment = 64;
-  header += std::string(alignment - (preamble + header.size() + 1) % alignment, ' ') + "\n";
-  std::string bytes = std::string("\x93NUMPY\x01\x00", 8);
-  bytes += char(header.size() & 0xFF);
-  bytes += char(header.size() >> 8);
-  bytes += header;
+  const std::size_t padded = (preamble + header.size() + alignment) / alignment * alignment - preamble;
+  header.resize(padded, ' ');
+  header.back() = '\n';
+  std::string bytes =
+      fmt::format("\x93NUMPY{}{}{}{}{}", '\x01', '\0', char(padded & 0xFF), char(padded >> 8), header);
   for (const RunGeometry::Image& image : run.images) {
     const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = image.view.projection();
     bytes.append(reinterpret_cast<const char*>(rows.data()), sizeof(double) * std::size_t(rows.size()));

@@ -37,6 +37,17 @@ Expected<std::string> rtk_geometry(const RunGeometry& run);
 /// ASTRA's cone_vec: a row of source, detector's middle, u and v (12 numbers) an image.
 std::string astra_vectors(const RunGeometry& run);
 
+/// LEAP's modular beam as JSON: the arguments of `set_modularbeam` by their names.
+std::string leap_modular(const RunGeometry& run);
+
+/// TIGRE's cone beam as JSON: DSD, DSO, offDetector, rotDetector and Euler angles ZYZ of each image, in the
+/// units and the order of its `geometry`; the volume's middle is the origin. Refuses skewed pixels
+/// (`unsupported`).
+Expected<std::string> tigre_geometry(const RunGeometry& run);
+
+/// plastimatch's projection matrix file of one image.
+std::string plastimatch_matrix(const geometry::View& view, double pixel_mm);
+
 /// A 3 x 4 matrix a line, "[a b c d; e f g h; i j k l]": the world (mm) to pixels.
 std::string ompl_matrices(const RunGeometry& run);
 

@@ -16,8 +16,9 @@
 namespace helicarm::sweep {
 namespace {
 
-// Both limits leave room for what the model lacks: of 6 and 8 degrees of freedom, by chance one run in 1e6.
-constexpr double step_chi2 = 60;
+// By chance one run in 1000 (chi2 of 6 degrees of freedom at some 20 independent places); runs without a
+// motion reach 8 to 12, those moved by 0.6 mm at 2 mm of flex 50 to 70.
+constexpr double step_chi2 = 32;
 constexpr double off_path_limit = 5.5;  // standard deviations
 constexpr std::size_t least_path = 8;   // frames
 constexpr int relinearisations = 4;
@@ -124,7 +125,9 @@ Joint joint_of(const std::vector<FrameEstimate>& estimates, const std::vector<st
       joint.observations.push_back(
           observation_of(joint.points[i], joint.at[i], joint.angles_deg[i], joint.fit.orbit, detector));
     const Stiffness stiffness =
-        round < choices ? choose_stiffness(joint.observations, joint.prior) : joint.smooth.stiffness;
+        round == 0        ? choose_stiffness(joint.observations, joint.prior)
+        : round < choices ? choose_stiffness(joint.observations, joint.prior, joint.smooth.stiffness)
+                          : joint.smooth.stiffness;
     joint.smooth = smooth_path(joint.observations, joint.prior, stiffness);
     for (std::size_t i = 0; i < joint.at.size(); ++i)
       joint.at[i] = deviated(joint.fit.orbit.at(joint.angles_deg[i]), joint.smooth.points[i].camera);

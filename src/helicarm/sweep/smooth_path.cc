@@ -163,9 +163,14 @@ double posterior_of(const std::vector<PathObservation>& frames, const PathPrior&
 
 }  // namespace
 
-Stiffness choose_stiffness(const std::vector<PathObservation>& frames, const PathPrior& prior) {
+Stiffness choose_stiffness(const std::vector<PathObservation>& frames, const PathPrior& prior,
+                           const std::optional<Stiffness>& start) {
   // Coordinate search with steps that grow where they gain and shrink where they do not.
   LogStiffness at = typical, step = LogStiffness::Constant(1);
+  if (start) {
+    at << start->bend.array().log(), start->jitter.array().log();
+    step.setConstant(0.5);
+  }
   double best = posterior_of(frames, prior, at);
   constexpr int most_rounds = 30;
   constexpr double least_step = 0.1;
@@ -229,9 +234,17 @@ std::vector<Eigen::MatrixXd> response(const std::vector<PathObservation>& frames
   return cameras;
 }
 
-std::optional<PhantomStep> find_step(const std::vector<PathObservation>& frames, const PathPrior& prior,
+namespace {
+
+/// The step that explains the frames best at this stiffness.
+std::optional<PhantomStep> best_step(const std::vector<PathObservation>& frames, const PathPrior& prior,
                                      const Stiffness& stiffness, const std::vector<std::size_t>& order) {
   constexpr std::size_t least_frames = 3;  // on either side
+  // A turn about the axis is free: of what the images do not determine, the least is taken.
+  constexpr double plausible_rad = 0.1, plausible_mm = 20;
+  Eigen::Matrix<double, 6, 6> plausible = Eigen::Matrix<double, 6, 6>::Zero();
+  plausible.diagonal().head<3>().setConstant(1 / (plausible_rad * plausible_rad));
+  plausible.diagonal().tail<3>().setConstant(1 / (plausible_mm * plausible_mm));
   const Problem problem = problem_of(frames, prior, stiffness);
   const auto path = path_for(problem, values_of(frames), &prior.gradient);
   std::optional<PhantomStep> best;
@@ -248,9 +261,37 @@ std::optional<PhantomStep> find_step(const std::vector<PathObservation>& frames,
       information += weighted * (frames[i].motion - followed[i].topRows<camera_size>());
       gradient += weighted * (frames[i].value - path[i].topRows<camera_size>());
     }
-    const Eigen::Matrix<double, 6, 1> motion = information.ldlt().solve(gradient);
+    const Eigen::Matrix<double, 6, 1> motion = (information + plausible).ldlt().solve(gradient);
     const double chi2 = gradient.dot(motion);
     if (std::isfinite(chi2) && (!best || chi2 > best->chi2)) best = PhantomStep{first, motion, chi2};
+  }
+  return best;
+}
+
+LogStiffness logs_of(const Stiffness& stiffness) {
+  LogStiffness logs;
+  logs << stiffness.bend.array().log(), stiffness.jitter.array().log();
+  return logs;
+}
+
+}  // namespace
+
+std::optional<PhantomStep> find_step(const std::vector<PathObservation>& frames, const PathPrior& prior,
+                                     const Stiffness& stiffness, const std::vector<std::size_t>& order) {
+  constexpr int rounds = 3;
+  const double without = posterior_of(frames, prior, logs_of(stiffness));
+  std::optional<PhantomStep> best;
+  Stiffness at = stiffness;
+  for (int round = 0; round < rounds; ++round) {
+    const auto step = best_step(frames, prior, at, order);
+    if (!step) return best;
+    std::vector<PathObservation> corrected = frames;
+    for (std::size_t k = step->first; k < order.size(); ++k)
+      corrected[order[k]].value -= frames[order[k]].motion * step->motion;
+    at = choose_stiffness(corrected, prior, at);
+    const double gain = 2 * (posterior_of(corrected, prior, logs_of(at)) - without);
+    if (best && gain <= best->chi2) break;
+    best = PhantomStep{step->first, step->motion, gain};
   }
   return best;
 }

@@ -52,7 +52,9 @@ struct PathPrior {
 
 /// The path of maximum marginal likelihood: a cubic smoothing spline of source, detector and rotation over
 /// the angle, with jitter of each frame, stiffness and jitter chosen by the data. Time linear in the frames.
-Stiffness choose_stiffness(const std::vector<PathObservation>& frames, const PathPrior& prior);
+/// `start`: of a search that is nearly done.
+Stiffness choose_stiffness(const std::vector<PathObservation>& frames, const PathPrior& prior,
+                           const std::optional<Stiffness>& start = {});
 SmoothPath smooth_path(const std::vector<PathObservation>& frames, const PathPrior& prior,
                        const Stiffness& stiffness);
 
@@ -67,7 +69,9 @@ struct PhantomStep {
   double chi2 = 0;  ///< twice the gain of the logarithm of the likelihood, 6 degrees of freedom
 };
 
-/// The step that explains the frames best. `order`: the frames' indices in the order of time.
+/// The step that explains the frames best; stiffness and jitter are chosen anew with it, as a step makes the
+/// path seem softer. `stiffness`: of the frames without a step; `order`: the frames' indices in the order of
+/// time.
 std::optional<PhantomStep> find_step(const std::vector<PathObservation>& frames, const PathPrior& prior,
                                      const Stiffness& stiffness, const std::vector<std::size_t>& order);
 

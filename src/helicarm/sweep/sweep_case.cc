@@ -30,6 +30,7 @@ std::vector<std::string> take_frames(Json& json, const std::string& origin) {
         throw BadInput(Reason::bad_value,
                        fmt::format("{}: \"frames\" is not a text: \"all\" or \"A-B[:STEP]\"", where));
       of_view = found->get<std::string>();
+      if (of_view.empty()) throw BadInput(Reason::bad_value, fmt::format("{}: \"frames\" is empty", where));
       if (const auto frame = view.find("frame"); frame != view.end() && !frame->is_null())
         throw BadInput(Reason::bad_value,
                        fmt::format("{}: \"frame\" cannot be combined with \"frames\"", where));

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <utility>
+#include <vector>
+
+#include <fmt/format.h>
 
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/exchange/run_geometry.h"
+#include "helicarm/pipeline/case_json.h"
 #include "helicarm/sweep/sweep.h"
 
 namespace helicarm::sweep {
@@ -25,12 +29,31 @@ Expected<std::string> always(const exchange::RunGeometry& run) {
   return write(run);
 }
 
-constexpr std::array<std::pair<const char*, Writer>, 5> geometry_files{
+constexpr std::array<std::pair<const char*, Writer>, 7> geometry_files{
     {{"rtk.xml", exchange::rtk_geometry},
+     {"tigre.json", exchange::tigre_geometry},
+     {"leap.json", always<exchange::leap_modular>},
      {"astra.txt", always<exchange::astra_vectors>},
      {"matrices.ompl", always<exchange::ompl_matrices>},
      {"matrices.csv", always<exchange::matrices_csv>},
      {"matrices.npy", always<exchange::matrices_npy>}}};
+
+/// plastimatch reads a folder of files in the order of their names.
+std::string plastimatch_name(std::size_t image) { return fmt::format("{:04d}.txt", image + 1); }
+
+std::vector<std::string> plastimatch_files(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < pipeline::most_frames; ++i)
+    if (std::error_code ignored; std::filesystem::exists(folder / plastimatch_name(i), ignored))
+      names.push_back(plastimatch_name(i));
+  return names;
+}
+
+void remove_if_empty(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(folder, ignored) && std::filesystem::is_empty(folder, ignored))
+    std::filesystem::remove(folder, ignored);
+}
 
 }  // namespace
 
@@ -38,10 +61,10 @@ void forget_sweep(const std::filesystem::path& folder) {
   std::vector<std::string> names;
   for (const auto& [name, writer] : geometry_files) names.emplace_back(name);
   forget_files(folder / "geometry", names);
-  std::error_code ignored;
-  if (std::filesystem::is_directory(folder / "geometry", ignored) &&
-      std::filesystem::is_empty(folder / "geometry", ignored))
-    std::filesystem::remove(folder / "geometry", ignored);
+  const std::filesystem::path plastimatch = folder / "geometry" / "plastimatch";
+  forget_files(plastimatch, plastimatch_files(plastimatch));
+  remove_if_empty(plastimatch);
+  remove_if_empty(folder / "geometry");
   forget_files(folder, std::vector<std::string>{"report.html", "sweep.json"});
 }
 
@@ -51,6 +74,9 @@ Expected<void> write_sweep(const Sweep& sweep, const std::filesystem::path& fold
       const exchange::RunGeometry run = geometry_of(sweep);
       for (const auto& [name, writer] : geometry_files)
         value_or_throw(write_file(folder / "geometry" / name, value_or_throw(writer(run))));
+      for (std::size_t i = 0; i < run.images.size(); ++i)
+        value_or_throw(write_file(folder / "geometry" / "plastimatch" / plastimatch_name(i),
+                                  exchange::plastimatch_matrix(run.images[i].view, run.pixel_mm)));
     }
     value_or_throw(write_file(folder / "report.html", sweep_report(sweep)));
     value_or_throw(write_file(folder / "sweep.json", to_text(to_json(sweep)) + "\n"));

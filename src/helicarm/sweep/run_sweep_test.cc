@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <gtest/gtest.h>
+
+#include "helicarm/core/temporary_folder.h"
+#include "helicarm/sweep/drawn_run_test.h"
+#include "helicarm/sweep/sweep.h"
+
+namespace helicarm::sweep {
+namespace {
+
+Sweep sweep_of(const DrawnRun& run, const SweepOptions& options = {}) {
+  const TemporaryFolder folder;
+  run.write(folder.path());
+  return *run_sweep(*read_sweep_case(folder.path()), options);
+}
+
+double reprojection_px(const geometry::View& estimated, const geometry::View& truth) {
+  double squares = 0;
+  for (const Eigen::Vector3d& ball : DrawnRun::balls())
+    squares += (estimated.project(ball) - truth.project(ball)).squaredNorm();
+  return std::sqrt(squares / double(DrawnRun::balls().size()));
+}
+
+TEST(RunSweep, CamerasOfARunAreNearTheTruthAndBlankImagesAreNamed) {
+  DrawnRun run;
+  run.blank = {9};
+  const Sweep sweep = sweep_of(run);
+  ASSERT_FALSE(sweep.failure) << sweep.failure->message;
+  ASSERT_EQ(sweep.frames.size(), 20u);
+  int inside = 0, accepted = 0;
+  for (const SweepFrame& frame : sweep.frames) {
+    if (frame.number == 9) {
+      ASSERT_TRUE(frame.failure);
+      EXPECT_EQ(frame.failure->reason, Reason::blank_image);
+      continue;
+    }
+    ASSERT_TRUE(frame.best) << frame.failure->message;
+    const geometry::View truth = run.view(frame.number - 1);
+    EXPECT_LT(reprojection_px(frame.best->view, truth), 0.1);
+    const Eigen::Vector3d off = frame.best->view.source_in_world() - truth.source_in_world();
+    EXPECT_LT(off.norm(), 3);
+    inside += off.dot(calibration::source_covariance(*frame.best).ldlt().solve(off)) < 11.34;  // 99 %
+    ++accepted;
+  }
+  EXPECT_GE(inside, accepted - 2);
+  ASSERT_TRUE(sweep.path);
+  EXPECT_EQ(sweep.path->kind, PathKind::smooth);
+  EXPECT_NEAR(sweep.path->arc_deg, 95, 0.3);
+  EXPECT_NEAR(std::abs(sweep.path->axis->z()), 1, 1e-4);
+  EXPECT_NEAR(sweep.path->source_to_axis_mm, 620, 2);
+  EXPECT_NEAR(*sweep.path->source_to_detector_mm, 1000, 3);
+}
+
+TEST(RunSweep, FromAMotionOfThePhantomOnTheImagesAreRefused) {
+  DrawnRun run;
+  run.frames = 26;
+  run.step_deg = 3;
+  run.moved_from = 18;
+  const Sweep sweep = sweep_of(run);
+  ASSERT_FALSE(sweep.failure);
+  for (const SweepFrame& frame : sweep.frames) {
+    EXPECT_EQ(frame.failure.has_value(), frame.number >= 18) << frame.number;
+    if (frame.failure) EXPECT_EQ(frame.failure->reason, Reason::phantom_changed);
+  }
+}
+
+TEST(RunSweep, FewImagesAreCalibratedAloneUnlessAPathIsAskedFor) {
+  DrawnRun run;
+  run.frames = 9;
+  const Sweep free = sweep_of(run);
+  EXPECT_EQ(free.path->kind, PathKind::free);
+  EXPECT_EQ(free.frames[4].best->view.projection(), free.frames[4].alone->view.projection());
+  SweepOptions options;
+  options.path = PathKind::smooth;
+  EXPECT_EQ(sweep_of(run, options).path->kind, PathKind::smooth);
+}
+
+TEST(RunSweep, ARunWithoutAnyBallIsRefused) {
+  DrawnRun run;
+  run.frames = 2;
+  run.blank = {1, 2};
+  const Sweep sweep = sweep_of(run);
+  ASSERT_TRUE(sweep.failure);
+  EXPECT_EQ(sweep.failure->reason, Reason::blank_image);
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_sweep(sweep, folder.path()));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "geometry"));
+}
+
+TEST(RunSweep, FilesOfAnEarlierRunAreRemoved) {
+  DrawnRun run;
+  run.frames = 3;
+  const Sweep sweep = sweep_of(run);
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_sweep(sweep, folder.path()));
+  for (const char* name : {"sweep.json", "report.html", "geometry/rtk.xml", "geometry/plastimatch/0003.txt"})
+    EXPECT_TRUE(std::filesystem::exists(folder.path() / name)) << name;
+  const auto json = read_json(folder.path() / "sweep.json");
+  ASSERT_TRUE(json);
+  EXPECT_EQ((*json)["format"], "helicarm-sweep/1");
+  EXPECT_EQ((*json)["frames"][2]["view"], "RUN/3");
+  EXPECT_EQ((*json)["frames"][2]["parameters"]["order"].size(), 11u);
+  forget_sweep(folder.path());
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+}  // namespace
+}  // namespace helicarm::sweep
