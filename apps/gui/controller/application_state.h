@@ -83,6 +83,7 @@ struct ApplicationState {
   std::vector<pipeline::Pick> picks;
   std::vector<pipeline::Pick> measured_picks = {};        ///< those of `result`
   std::vector<FailedPick> failed_picks = {};              ///< of `picks`
+  std::string changed_file = {};                          ///< of the case, on disk since it was read
   bool has_other_options = false;                         ///< than those of the measurement
   std::optional<std::filesystem::path> case_folder = {};  ///< where picks are kept; not of replays
   bool has_unsaved_picks = false;                         ///< not in the case.json of `case_folder`

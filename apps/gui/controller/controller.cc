@@ -39,6 +39,11 @@ void forget_measurement(ApplicationState& state) {
 Controller::Controller(QObject* parent) : QObject(parent) {
   connect(&images_, &QTimer::timeout, this, &Controller::take_waiting_image);
   images_.start(look_for_images_ms);
+  connect(&files_, &QFileSystemWatcher::fileChanged, this, [this](const QString& file) {
+    if (state_.source != Source::files) return;
+    state_.changed_file = file.toStdString();
+    emit changed();
+  });
 }
 
 Controller::~Controller() {
@@ -171,6 +176,11 @@ Controller::Change Controller::measured(Equipment& equipment, const std::vector<
   };
 }
 
+void Controller::measure_again() {
+  if (state_.changed_file.empty()) return measure();
+  open_case(state_.folder, state_.case_folder.has_value());
+}
+
 void Controller::measure() {
   if (!equipment_ || (!equipment_->given && !equipment_->operation)) return;
   measures_again_ = state_.busy.has_value();
@@ -203,7 +213,7 @@ void Controller::export_to(const fs::path& folder) {
   if (state_.busy)
     return emit refused(*state_.busy, tr("Nothing is exported during other work (%1): export again after it.")
                                           .arg(QString::fromStdString(state_.doing)));
-  if (state_.has_other_options)
+  if (state_.has_other_options || !state_.changed_file.empty())
     return emit refused(Phase::verify,
                         tr("Nothing is exported: %1. Measure again (F5).").arg(stale(state_, Phase::verify)));
   pipeline::Result result = *state_.result;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <QFileSystemWatcher>
 #include <QObject>
 #include <QThreadPool>
 #include <QTimer>
@@ -83,6 +84,8 @@ class Controller : public QObject {
   void undo_picks() { step_picks(earlier_picks_, later_picks_); }
   void redo_picks() { step_picks(later_picks_, earlier_picks_); }
   void measure();
+  /// Reads the case again if a file of it has changed.
+  void measure_again();
 
   /// Registers the models of a measured case, the nudged one from its present pose.
   void register_models();
@@ -141,6 +144,7 @@ class Controller : public QObject {
   static Change with_plan(const operation::OperationPlan& plan, const std::vector<pipeline::Pick>& offered);
   Change with_case(pipeline::Case given, Equipment& equipment, std::optional<Picks> unsaved = {});
   void keep_unsaved_picks();
+  void watch_files_of(const std::filesystem::path& case_folder);
   void outline_nudged();
   Change came(std::vector<pipeline::ViewResult> images);
 
@@ -156,9 +160,10 @@ class Controller : public QObject {
   case_registration::RegisterOptions options_;
   std::optional<operation::FreshnessLimits> freshness_;
   QTimer images_;
-  QThreadPool faults_;  ///< of the virtual devices
-  QThreadPool stops_;   ///< of the robot; they wait for no other task
-  Worker worker_;       ///< last: its jobs use all other members
+  QFileSystemWatcher files_;  ///< of the case
+  QThreadPool faults_;        ///< of the virtual devices
+  QThreadPool stops_;         ///< of the robot; they wait for no other task
+  Worker worker_;             ///< last: its jobs use all other members
 };
 
 }  // namespace helicarm::gui

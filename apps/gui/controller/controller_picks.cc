@@ -38,7 +38,9 @@ void Controller::save_picks() {
   std::vector<pipeline::TunnelPlan> tunnels;
   for (const operation::PlannedTunnel& tunnel : state_.tunnels)
     tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
+  if (!files_.files().isEmpty()) files_.removePaths(files_.files());  // this change is its own
   const auto saved = gui::save_picks(*state_.case_folder, state_.picks, tunnels);
+  watch_files_of(*state_.case_folder);
   state_.has_unsaved_picks = !saved;
   state_.picks_not_kept = saved ? std::nullopt : std::optional(saved.error());
   emit changed();

@@ -138,6 +138,27 @@ TEST_F(ControllerRegistration, OtherSettingsMeasureTheCaseAgain) {
   EXPECT_FALSE(state().registration);
 }
 
+TEST_F(ControllerRegistration, AChangedFileOfTheCasePutsEveryStepOutOfDateUntilItIsReadAgain) {
+  const TemporaryFolder own;
+  write_case_with_model(own.path());
+  controller_->open_case(own.path());
+  wait([&] { return !state().busy; });
+  ASSERT_TRUE(state().measured);
+  Json json = read_json(own.path() / "case.json").value();
+  json["notes"] = "changed";
+  ASSERT_TRUE(write_file(own.path() / "case.json", to_text(json)));
+  wait([&] { return !state().changed_file.empty(); });
+  const auto status = [&](Phase phase) { return steps_of(state())[std::size_t(phase)].status; };
+  for (const Phase phase : {Phase::acquire, Phase::rectify, Phase::calibrate})
+    EXPECT_EQ(status(phase), StepStatus::stale);
+  controller_->export_to(own.path() / "export");
+  EXPECT_FALSE(state().busy);
+  controller_->measure_again();
+  wait([&] { return state().measured && !state().busy; });
+  EXPECT_TRUE(state().changed_file.empty());
+  EXPECT_EQ(status(Phase::calibrate), StepStatus::good);
+}
+
 TEST_F(ControllerRegistration, AnOwnCalibratorIsNotAskedForTheKneesTunnels) {
   const TemporaryFolder own;
   simulation::SimulationOptions options;

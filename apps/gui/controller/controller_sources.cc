@@ -32,6 +32,17 @@ std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given, bo
   return tunnels;
 }
 
+/// Every file of the folder that a JSON value names.
+void add_files(const Json& json, const fs::path& folder, QStringList& files) {
+  std::error_code unreadable;
+  if (json.is_string()) {
+    const fs::path file = folder / json.get<std::string>();
+    if (fs::is_regular_file(file, unreadable)) files << QString::fromStdString(file.string());
+  } else if (json.is_structured()) {
+    for (const Json& part : json) add_files(part, folder, files);
+  }
+}
+
 /// What the operation reports of a step follows.
 std::string words_of(operation::Step step) {
   switch (step) {
@@ -66,6 +77,7 @@ void Controller::open(Source source, const fs::path& folder, std::string doing,
   live_tool_.reset();
   earlier_picks_.clear();
   later_picks_.clear();
+  if (!files_.files().isEmpty()) files_.removePaths(files_.files());
   state_ = ApplicationState{};
   state_.asked_for = folder;
   begin(Phase::acquire, std::move(doing),
@@ -162,6 +174,7 @@ void Controller::open_case(const fs::path& folder, bool keeps_picks) {
          return [this, change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)),
                  folder, unsaved](ApplicationState& state) {
            change(state);
+           watch_files_of(folder);
            if (unsaved)
              state.case_folder = folder;
            else
@@ -172,6 +185,14 @@ void Controller::open_case(const fs::path& folder, bool keeps_picks) {
                     "of case.json."));
          };
        });
+}
+
+void Controller::watch_files_of(const fs::path& case_folder) {
+  const fs::path file = case_folder / "case.json";
+  QStringList files{QString::fromStdString(file.string())};
+  if (const auto json = read_json(file)) add_files(*json, case_folder, files);
+  files.removeDuplicates();
+  files_.addPaths(files);
 }
 
 void Controller::open_images(const std::vector<fs::path>& files) {

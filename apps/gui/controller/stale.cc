@@ -71,6 +71,8 @@ bool is_moved(const ApplicationState& state, std::size_t model) {
 }
 
 QString stale(const ApplicationState& state, Phase phase) {
+  if (!state.changed_file.empty())
+    return stale_tr("%1 has changed since it was read: F5 measures again").arg(as_text(state.changed_file));
   if (phase == Phase::acquire || !state.measured) return {};
   if (state.has_other_options) return stale_tr("the settings have changed since the measurement");
   if (phase == Phase::rectify || phase == Phase::calibrate) return {};
@@ -146,7 +148,7 @@ QStringList lacks_of_export(const ApplicationState& state) {
 bool is_exported(const ApplicationState& state) {
   return state.exported && state.exported->result == state.result &&
          state.exported->registration == state.registration && !state.nudged && !state.has_other_options &&
-         are_same(state.exported->picks, state.picks);
+         state.changed_file.empty() && are_same(state.exported->picks, state.picks);
 }
 
 }  // namespace helicarm::gui

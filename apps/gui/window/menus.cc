@@ -53,7 +53,7 @@ void MainWindow::build_menus() {
   QMenu* edit = menuBar()->addMenu(tr("&Edit"));
   undo_ = edit->addAction(tr("&Undo pick"), QKeySequence::Undo, &controller_, &Controller::undo_picks);
   redo_ = edit->addAction(tr("&Redo pick"), QKeySequence::Redo, &controller_, &Controller::redo_picks);
-  edit->addAction(tr("&Measure again"), QKeySequence(Qt::Key_F5), &controller_, &Controller::measure);
+  edit->addAction(tr("&Measure again"), QKeySequence(Qt::Key_F5), &controller_, &Controller::measure_again);
   edit->addSeparator();
   edit->addAction(tr("&Copy image or table"), QKeySequence::Copy, this, &MainWindow::copy);
 

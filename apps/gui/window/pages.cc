@@ -117,11 +117,13 @@ void AcquirePage::show_state(const ApplicationState& state) {
   const auto refusal = state.refusals.find(Phase::acquire);
   const bool is_refused = refusal != state.refusals.end() && !state.busy;
   refused_->setVisible(is_refused);
-  if (is_refused)
-    refused_->setText(
-        state.source == Source::none
-            ? tr("%1 is not opened: %2").arg(text(state.asked_for.string()), sentence_of(refusal->second))
-            : sentence_of(refusal->second));
+  if (is_refused) {
+    const QString why = sentence_of(refusal->second), asked = text(state.asked_for.string());
+    const bool is_named = state.source != Source::none || why.contains(asked);
+    refused_->setText(state.source != Source::none ? why
+                      : is_named                   ? tr("Not opened: %1").arg(why)
+                                                   : tr("%1 is not opened: %2").arg(asked, why));
+  }
   new_case_->setText(loose ? tr("New &case of these images...") : tr("New &case of X-ray images..."));
   new_case_->setVisible(loose || ways_in_->isVisibleTo(this));
   where_->setText(

@@ -279,7 +279,8 @@ QString contradicting_pick(const ApplicationState& state) {
 
 void PlanPage::tell_next() {
   delete_->setEnabled(chosen_.has_value() && controller_.takes_picks());
-  next_->setMinimumHeight(3 * (next_->fontMetrics().lineSpacing() + 2));  // the controls below stay where they are
+  next_->setMinimumHeight(
+      3 * (next_->fontMetrics().lineSpacing() + 2));  // the controls below stay where they are
   next_->setText(next_words());
 }
 

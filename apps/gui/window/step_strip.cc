@@ -43,7 +43,9 @@ QString two_lines(const QString& text, const QFontMetrics& metrics, int width) {
     if (metrics.horizontalAdvance(longer) > width) break;
     first = longer;
   }
-  if (first.isEmpty()) first = metrics.elidedText(text, Qt::ElideRight, width);
+  if (first.isEmpty())  // a word of more than a line
+    while (first.size() < text.size() && metrics.horizontalAdvance(text.left(first.size() + 1)) <= width)
+      first = text.left(first.size() + 1);
   const QString rest = text.mid(first.size()).trimmed();
   return rest.isEmpty() ? first : first + '\n' + metrics.elidedText(rest, Qt::ElideRight, width);
 }

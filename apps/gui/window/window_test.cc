@@ -171,8 +171,8 @@ TEST_F(Window, AfterAStopOnTheWayThePageSaysHowFarOffTheToolIs) {
   EXPECT_FALSE(state().path.by_view.empty());  // stays in sight
   QTest::qWait(300);
   const std::string says = find<QLabel>("robotSays")->text().toStdString();
-  EXPECT_THAT(says, HasSubstr("stopped on its way to the tunnel femur"));
-  EXPECT_THAT(says, HasSubstr("mm off the axis"));
+  EXPECT_THAT(says, HasSubstr("stopped on its way to femur"));
+  EXPECT_THAT(says, HasSubstr("mm off its axis"));
   EXPECT_EQ(go->mapTo(window_.get(), QPoint()), place);
   screenshot("stopped");
 }

@@ -15,9 +15,9 @@
 namespace helicarm::gui {
 
 NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
-    : Page(tr("Nothing moves unless you hold a yellow button until it is full; one hold starts all moves of "
-              "its "
-              "step. The space bar stops the robot."),
+    : Page(tr("Nothing moves unless you hold a yellow button until it is full; one hold starts all its "
+              "moves. Space "
+              "bar: stop."),
            controller, parent) {
   says_ = new QLabel;
   says_->setObjectName("robotSays");
@@ -74,9 +74,8 @@ QString NavigatePage::where_the_tool_is() const {
   const QString tunnel = text(state.bound_for);
   if (state.has_arrived)
     return tr("The tool is at the tunnel %1: hold button 5 to withdraw it first.").arg(tunnel);
-  const QString off = aim_ ? tr(", %1 mm off the axis").arg(aim_->distance_mm, 0, 'f', 1) : QString();
-  return tr("The robot stopped on its way to the tunnel %1%2; the X-ray images show the path it was on. Hold "
-            "button 5 to withdraw the tool.")
+  const QString off = aim_ ? tr(", %1 mm off its axis").arg(aim_->distance_mm, 0, 'f', 1) : QString();
+  return tr("The tool stopped on its way to %1%2 (path in the X-ray images): withdraw it with button 5.")
       .arg(tunnel, off);
 }
 
@@ -95,7 +94,7 @@ QString NavigatePage::next_step() const {
     case robot::LinkPhase::idle:
       return tr("The robot is locked. Hold button 1 when no person is near it.");
     case robot::LinkPhase::stopped:
-      return why + tr("The robot stays stopped until you have checked it and hold button 1.") +
+      return why + tr("Check the robot, then hold button 1.") +
              (state.tool_is_out ? " " + where_the_tool_is() : QString());
     case robot::LinkPhase::starting:
     case robot::LinkPhase::moving:
@@ -137,7 +136,8 @@ bool NavigatePage::is_held() const {
 
 /// Not under the finger: a longer text would move the button that is held.
 void NavigatePage::tell() {
-  says_->setMinimumHeight(4 * (says_->fontMetrics().lineSpacing() + 2));  // the buttons below stay where they are
+  says_->setMinimumHeight(4 *
+                          (says_->fontMetrics().lineSpacing() + 2));  // the buttons below stay where they are
   if (!is_held()) says_->setText(next_step());
 }
 
