@@ -144,7 +144,10 @@ void navigate(StepCard& card, const ApplicationState& state) {
     card.why = tr("images from files: no robot");
     return;
   }
-  if (!state.hand_eye_rms_mm) return;
+  if (!state.hand_eye_rms_mm) {
+    card.why = tr("unlock the robot, then register it");
+    return;
+  }
   card.figure = tr("registered, %1 mm rms").arg(*state.hand_eye_rms_mm, 0, 'f', 2);
   if (state.order) card.why = tr("%1: inspect the path, then confirm").arg(text(state.order->name));
   if (state.outcomes.empty()) return;

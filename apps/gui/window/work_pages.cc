@@ -34,7 +34,7 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
   layout()->addWidget(tunnel_);
   connect(tunnel_, &QComboBox::currentTextChanged, this,
           [this](const QString& name) { controller_.follow(name.toStdString()); });
-  plan_ = add_button(tr("3  &Plan the approach path and show it in both images"), "planWay",
+  plan_ = add_button(tr("3  &Plan the path and show it in both images"), "planWay",
                      [this] { controller_.plan_tunnel(tunnel_->currentText().toStdString()); });
   go_ = add_hold(tr("4  &Move to the tunnel"), "go", [this] { controller_.go(); });
   withdraw_ = add_hold(tr("5  With&draw the tool"), "withdraw", [this] { controller_.withdraw(); });
