@@ -164,7 +164,7 @@ std::string plastimatch_matrix(const geometry::View& view, double pixel_mm) {
 std::string ompl_matrices(const RunGeometry& run) {
   std::string text;
   for (const RunGeometry::Image& image : run.images)
-    text += "[" + numbers_of(image.view.projection(), " ", "; ") + "]\n";
+    text += fmt::format("[{}]\n", numbers_of(image.view.projection(), " ", "; "));
   return text;
 }
 

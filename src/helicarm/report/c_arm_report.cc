@@ -66,7 +66,7 @@ std::vector<Chart> charts_of(const CArmModel& model) {
   constexpr int steps = 60;
   constexpr double margin_deg = 5, normal_at_95 = 1.96;
   for (int i = 0; i <= steps; ++i) {
-    calibration::HistoryEntry entry;
+    calibration::HistoryEntry entry{{}, {}, Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()};
     entry.primary_deg = low - margin_deg + (high - low + 2 * margin_deg) * i / steps;
     at.push_back(std::move(entry));
   }
