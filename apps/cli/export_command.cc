@@ -26,10 +26,15 @@ std::vector<report::Export> exports_named(const std::vector<std::string>& words)
   std::vector<report::Export> kinds;
   for (const std::string& word : words) {
     const auto found = std::ranges::find(report::export_words, word);
-    if (found == report::export_words.end())
-      throw BadInput(Reason::usage,
-                     fmt::format("--as: \"{}\" is none of: {}", word, fmt::join(report::export_words, ", ")));
-    kinds.push_back(report::every_export[std::size_t(found - report::export_words.begin())]);
+    const auto requested = std::ranges::find(report::requested_words, word);
+    if (found != report::export_words.end())
+      kinds.push_back(report::every_export[std::size_t(found - report::export_words.begin())]);
+    else if (requested != report::requested_words.end())
+      kinds.push_back(report::requested_export[std::size_t(requested - report::requested_words.begin())]);
+    else
+      throw BadInput(Reason::usage, fmt::format("--as: \"{}\" is none of: {}, {}", word,
+                                                fmt::join(report::export_words, ", "),
+                                                fmt::join(report::requested_words, ", ")));
   }
   if (kinds.empty()) kinds.assign(report::every_export.begin(), report::every_export.end());
   return kinds;
@@ -69,9 +74,12 @@ void add_export(CLI::App& app, Action& action) {
   command->add_option("CASE", a.run.folder, "Folder that holds case.json")->required();
   command->add_option("--out", a.run.out, "Folder for the files")->capture_default_str();
   command
-      ->add_option("--as", a.as,
-                   fmt::format("One or more of {}, separated by commas (default: all)",
-                               fmt::join(report::export_words, ", ")))
+      ->add_option(
+          "--as", a.as,
+          fmt::format(
+              "One or more of {}, separated by commas (default: all of these); for reconstruction also "
+              "{}: all views in one file",
+              fmt::join(report::export_words, ", "), fmt::join(report::requested_words, ", ")))
       ->type_name("WORD")
       ->delimiter(',');
   add_run_options(command, a.run, "The C-arm's history (JSON), read only");

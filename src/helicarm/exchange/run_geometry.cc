@@ -80,19 +80,20 @@ Expected<std::string> rtk_geometry(const RunGeometry& run) {
                                         {"ProjectionOffsetX", p.projection_offset.x()},
                                         {"ProjectionOffsetY", p.projection_offset.y()}})
         text += fmt::format("    <{0}>{1}</{0}>\n", name, value);
-      text += "    <Matrix>\n" + numbers_of(p.matrix(), " ", "\n") + "\n    </Matrix>\n  </Projection>\n";
+      text += fmt::format("    <Matrix>\n{}\n    </Matrix>\n  </Projection>\n",
+                          numbers_of(p.matrix(), " ", "\n"));
     }
-    return text + "</RTKThreeDCircularGeometry>\n";
+    return fmt::format("{}</RTKThreeDCircularGeometry>\n", text);
   });
 }
 
 std::string astra_vectors(const RunGeometry& run) {
-  std::string text;
+  std::string text = "# ASTRA cone_vec: source, middle of the detector, u and v of a pixel, mm\n";
   for (const RunGeometry::Image& image : run.images) {
     const PlacedDetector d = placed_detector(image.view, run.size, run.pixel_mm);
     Eigen::RowVectorXd row(12);
     row << d.source.transpose(), d.centre.transpose(), d.along_u.transpose(), d.along_v.transpose();
-    text += numbers_of(row, " ", "") + "\n";
+    text += fmt::format("{}\n", numbers_of(row, " ", ""));
   }
   return text;
 }
@@ -173,7 +174,7 @@ std::string matrices_csv(const RunGeometry& run) {
   for (int i = 0; i < 12; ++i) text += fmt::format(",p{}{}", i / 4 + 1, i % 4 + 1);
   text += "\n";
   for (const RunGeometry::Image& image : run.images)
-    text += image.name + "," + numbers_of(image.view.projection(), ",", ",") + "\n";
+    text += fmt::format("{},{}\n", image.name, numbers_of(image.view.projection(), ",", ","));
   return text;
 }
 

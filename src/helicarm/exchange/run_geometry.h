@@ -34,7 +34,7 @@ PlacedDetector placed_detector(const geometry::View& view, const Eigen::Vector2i
 /// RTK's ThreeDCircularProjectionGeometry with one Projection an image. Fails as `rtk_view`.
 Expected<std::string> rtk_geometry(const RunGeometry& run);
 
-/// ASTRA's cone_vec: a row of source, detector's middle, u and v (12 numbers) an image.
+/// ASTRA's cone_vec below a `#` line: a row of source, detector's middle, u and v (12 numbers) an image.
 std::string astra_vectors(const RunGeometry& run);
 
 /// LEAP's modular beam as JSON: the arguments of `set_modularbeam` by their names.

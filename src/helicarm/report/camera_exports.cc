@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/report/camera_exports.h"
 
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "helicarm/exchange/import_matrix.h"
 #include "helicarm/exchange/itk_transform.h"
-#include "helicarm/exchange/run_geometry.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::report {
@@ -93,6 +94,25 @@ std::string dlt_csv(std::span<const pipeline::ViewResult* const> views) {
         scaled.row(2).head<3>().transpose();
   }
   return rows_of(columns, ",");
+}
+
+exchange::RunGeometry run_geometry(std::span<const pipeline::ViewResult* const> views) {
+  constexpr double tolerance = 1e-3;  // of the pixel size
+  exchange::RunGeometry run;
+  for (const pipeline::ViewResult* view : views) {
+    if (run.images.empty()) {
+      run.size = image_size(*view);
+      run.pixel_mm = detector_pixel_mm(*view);
+    }
+    if (image_size(*view) != run.size || std::abs(detector_pixel_mm(*view) / run.pixel_mm - 1) > tolerance)
+      throw BadInput({Reason::unsupported,
+                      fmt::format("has another image or pixel size than {}: one file is of one detector",
+                                  views.front()->name),
+                      view->name,
+                      {}});
+    run.images.push_back({view->name, view->calibrated->view});
+  }
+  return run;
 }
 
 }  // namespace helicarm::report

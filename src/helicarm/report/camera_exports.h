@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 
+#include "helicarm/exchange/run_geometry.h"
 #include "helicarm/pipeline/result.h"
 
 /// Files of calibrated views for other programs (docs/formats.md). A view has its image and its calibration.
@@ -28,5 +29,8 @@ std::string itk_pose(const pipeline::ViewResult& view);
 /// L1 to L11, one column per view, in XMALab's pixels: u + 1 = (L1 x + L2 y + L3 z + L4) / (L9 x + L10 y +
 /// L11 z + 1), height - v with L5 to L8. Throws `point_at_infinity` for a view without them.
 std::string dlt_csv(std::span<const pipeline::ViewResult* const> views);
+
+/// Calibrated views of one detector. Throws BadInput (`unsupported`) where their sizes or pixels differ.
+exchange::RunGeometry run_geometry(std::span<const pipeline::ViewResult* const> views);
 
 }  // namespace helicarm::report

@@ -147,6 +147,16 @@ Files files_of(const pipeline::Result& result, std::span<const Export> kinds) {
       add(stem + "_rtk.xml", rtk_if_possible(view, kinds.size() == every_export.size()));
   }
   if (wanted(Export::dlt) && !calibrated.empty()) add("dlt.csv", dlt_csv(calibrated));
+  if (calibrated.empty() || !std::ranges::any_of(requested_export, wanted)) return files;
+  const exchange::RunGeometry run = run_geometry(calibrated);
+  if (wanted(Export::tigre)) add("views_tigre.json", value_or_throw(exchange::tigre_geometry(run)));
+  if (wanted(Export::astra)) add("views_astra.txt", exchange::astra_vectors(run));
+  if (wanted(Export::leap)) add("views_leap.json", exchange::leap_modular(run));
+  if (wanted(Export::ompl)) add("views_matrices.ompl", exchange::ompl_matrices(run));
+  if (wanted(Export::npy)) add("views_matrices.npy", exchange::matrices_npy(run));
+  for (std::size_t i = 0; wanted(Export::plastimatch) && i < run.images.size(); ++i)
+    add(file_stem(run.images[i].name, i) + "_plastimatch.txt",
+        exchange::plastimatch_matrix(run.images[i].view, run.pixel_mm));
   return files;
 }
 
@@ -162,7 +172,13 @@ constexpr std::array exported_files{ExportedFile{"points.csv", points_header},
                                     ExportedFile{"_opencv.yml", "%YAML:1.0\n---\nimage_width: "},
                                     ExportedFile{"_pose.tfm", "#Insight Transform File"},
                                     ExportedFile{"_rtk.xml", "<!-- Projection image: spacing"},
-                                    ExportedFile{"_rectified.dcm", "helicarm"}};
+                                    ExportedFile{"_rectified.dcm", "helicarm"},
+                                    ExportedFile{"views_tigre.json", "\"offDetector\""},
+                                    ExportedFile{"views_astra.txt", "# ASTRA cone_vec"},
+                                    ExportedFile{"views_leap.json", "\"moduleCenters\""},
+                                    ExportedFile{"views_matrices.ompl", "["},
+                                    ExportedFile{"views_matrices.npy", "NUMPY"},
+                                    ExportedFile{"_plastimatch.txt", "\nExtrinsic\n"}};
 
 /// Rows of 11 coefficients of each view, nothing else.
 bool is_dlt_table(std::string_view text) {

@@ -13,14 +13,36 @@ namespace helicarm::report {
 
 /// Export formats: table of points, 3D Slicer markups, MayaCam 2.0 per view, DLT coefficients of the views,
 /// 3x4 matrix per view, rectified image per view as DICOM, camera of OpenCV, RTK and as ITK transform per
-/// view (docs/formats.md).
-enum class Export { csv, slicer, mayacam, dlt, matrix, images, opencv, rtk, itk };
+/// view, and on request all views in one file for reconstruction (docs/formats.md).
+enum class Export {
+  csv,
+  slicer,
+  mayacam,
+  dlt,
+  matrix,
+  images,
+  opencv,
+  rtk,
+  itk,
+  tigre,
+  astra,
+  leap,
+  plastimatch,
+  ompl,
+  npy
+};
 
 inline constexpr std::array every_export{Export::csv,    Export::slicer, Export::mayacam,
                                          Export::dlt,    Export::matrix, Export::images,
                                          Export::opencv, Export::rtk,    Export::itk};
 inline constexpr std::array<std::string_view, every_export.size()> export_words{
     "csv", "slicer", "mayacam", "dlt", "matrix", "images", "opencv", "rtk", "itk"};
+
+/// Written on request only: a reconstruction program takes one of them.
+inline constexpr std::array requested_export{Export::tigre,       Export::astra, Export::leap,
+                                             Export::plastimatch, Export::ompl,  Export::npy};
+inline constexpr std::array<std::string_view, requested_export.size()> requested_words{
+    "tigre", "astra", "leap", "plastimatch", "ompl", "npy"};
 
 /// Removes the files of an earlier export, recognised by name and content.
 void forget_exports(const std::filesystem::path& folder);

@@ -188,5 +188,28 @@ TEST_F(Exports, ViewWithoutDltCoefficientsIsNamedInTheMessage) {
   EXPECT_EQ(written.error().view, "LAT");
 }
 
+TEST_F(Exports, GeometryForReconstructionIsOfAllViewsOnRequest) {
+  for (pipeline::ViewResult& view : result_.views) view.calibrated->view.intrinsics.skew = 0;
+  const auto written = write_exports(result_, folder_, requested_export);
+  ASSERT_TRUE(written) << written.error().message;
+  std::vector<std::string> names;
+  for (const auto& path : *written) names.push_back(path.filename().string());
+  EXPECT_THAT(names, testing::ElementsAre("AP_plastimatch.txt", "LAT_plastimatch.txt", "views_astra.txt",
+                                          "views_leap.json", "views_matrices.npy", "views_matrices.ompl",
+                                          "views_tigre.json"));
+  EXPECT_EQ(parse_json(text("views_tigre.json"), "tigre")->at("DSO").size(), 2u);
+  forget_exports(folder_);
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(Exports, GeometryForReconstructionIsOfOneDetector) {
+  result_.views[1].xray_image = std::make_shared<const xray::XrayImage>(
+      xray::XrayImage{"LAT", image::Image<float>(48, 48), 0, 4095, {}, {}});
+  const std::array only{Export::astra};
+  const auto refused = write_exports(result_, folder_, only);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::unsupported);
+}
+
 }  // namespace
 }  // namespace helicarm::report

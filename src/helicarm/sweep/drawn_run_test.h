@@ -61,14 +61,22 @@ struct DrawnRun {
       if (frame + 1 >= moved_from) place += shift_mm;
     RandomStream random{77, std::uint32_t(frame)};
     constexpr int parts = 3;
+    const auto is_near_a_ball = [&](double u, double v) {
+      for (std::size_t b = 0; b < places.size(); ++b) {
+        const double reach = 0.6 * diameter_mm(b) * at.intrinsics.fy / at.depth(places[b]) + 2;
+        if ((at.project(places[b]) - Eigen::Vector2d(u, v)).norm() < reach) return true;
+      }
+      return false;
+    };
     for (int row = 0; row < size; ++row)
       for (int column = 0; column < size; ++column) {
-        double light = 0;
-        for (int k = 0; k < parts * parts; ++k) {
+        const bool is_drawn = !is_blank && is_near_a_ball(column, row);
+        double light = is_drawn ? 0 : 1;
+        for (int k = 0; is_drawn && k < parts * parts; ++k) {
           const Eigen::Vector3d pixel(column + (k % parts - 1.0) / parts, row + (k / parts - 1.0) / parts, 1);
           const Eigen::Vector3d ray = (back * pixel).normalized();
           double chord = 0;
-          for (std::size_t b = 0; b < places.size() && !is_blank; ++b) {
+          for (std::size_t b = 0; b < places.size(); ++b) {
             const Eigen::Vector3d from = places[b] - source;
             const double across2 = from.squaredNorm() - std::pow(from.dot(ray), 2),
                          radius = diameter_mm(b) / 2;

@@ -252,8 +252,7 @@ Eigen::Vector3d nearest_to_rays(const std::vector<PlacedCamera>& cameras, std::s
 }
 
 /// Isocentre with the standard deviation of a jackknife over blocks of neighbouring frames.
-void describe(SweepPath& path, const std::vector<PlacedCamera>& cameras,
-              const std::vector<double>& angles_deg) {
+void describe(SweepPath& path, const std::vector<PlacedCamera>& cameras) {
   path.isocentre = nearest_to_rays(cameras, 0, 0);
   const std::size_t blocks = std::min<std::size_t>(8, cameras.size() / 2);
   std::vector<Eigen::Vector3d> without;
@@ -275,6 +274,7 @@ void describe(SweepPath& path, const std::vector<PlacedCamera>& cameras,
   }
   path.source_to_axis_mm = to_axis;
   path.source_to_detector_mm = to_detector;
+  const std::vector<double> angles_deg = fit_orbit(cameras, path.isocentre).angles_deg;
   const auto [least, most] = std::ranges::minmax(angles_deg);
   path.arc_deg = most - least;
 }
@@ -299,7 +299,7 @@ void take_free_path(Sweep& sweep, const Eigen::Vector3d& centre) {
   }
   SweepPath path;
   path.axis = fit.orbit.axis;
-  describe(path, cameras, fit.angles_deg);
+  describe(path, cameras);
   sweep.path = path;
 }
 
@@ -344,7 +344,7 @@ std::optional<Failure> estimate_path(Sweep& sweep, const pipeline::Case& base,
     path.kind = PathKind::smooth;
     path.axis = joint.fit.orbit.axis;
     path.stiffness = joint.smooth.stiffness;
-    describe(path, joint.at, joint.angles_deg);
+    describe(path, joint.at);
     if (!sweep.pixel_known) path.source_to_detector_mm.reset();
     sweep.path = path;
     return std::nullopt;

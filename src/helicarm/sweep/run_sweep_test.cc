@@ -63,7 +63,9 @@ TEST(RunSweep, FromAMotionOfThePhantomOnTheImagesAreRefused) {
   ASSERT_FALSE(sweep.failure);
   for (const SweepFrame& frame : sweep.frames) {
     EXPECT_EQ(frame.failure.has_value(), frame.number >= 18) << frame.number;
-    if (frame.failure) EXPECT_EQ(frame.failure->reason, Reason::phantom_changed);
+    if (frame.failure) {
+      EXPECT_EQ(frame.failure->reason, Reason::phantom_changed);
+    }
   }
 }
 

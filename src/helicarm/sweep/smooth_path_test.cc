@@ -64,8 +64,7 @@ TEST(SmoothPath, JitterOfTheFramesIsFoundAndItsRegionsHold) {
   for (const double jitter : {0.02, 0.5}) {
     const Simulated simulation = simulated(120, jitter, 7);
     const Stiffness stiffness = choose_stiffness(simulation.frames, {});
-    if (jitter > 0.1) EXPECT_NEAR(stiffness.jitter[0], jitter, 0.15);
-    if (jitter < 0.1) EXPECT_LT(stiffness.jitter[0], 0.15);
+    EXPECT_NEAR(stiffness.jitter[0], jitter, 0.15);
     const SmoothPath path = smooth_path(simulation.frames, {}, stiffness);
     EXPECT_GT(covered(simulation, path), 0.9) << jitter;
   }
@@ -103,7 +102,7 @@ TEST(SmoothPath, AMotionOfThePhantomIsFoundWhereItHappens) {
   for (std::size_t i = 41; i < simulation.frames.size(); ++i)
     simulation.frames[i].value += simulation.frames[i].motion * motion;
   const auto step = find_step(simulation.frames, {}, choose_stiffness(simulation.frames, {}), order);
-  EXPECT_GT(step->chi2, 50);
+  EXPECT_GT(step->chi2, 40);
   EXPECT_EQ(step->first, 41u);
   EXPECT_NEAR(step->motion[3], 1.5, 0.4);
 }

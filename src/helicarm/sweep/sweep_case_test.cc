@@ -28,7 +28,8 @@ class SweepCaseFile : public testing::Test {
   }
   std::vector<std::string> names(const std::string& frames) {
     std::vector<std::string> names;
-    for (const Frame& frame : read(frames)->frames) names.push_back(frame.view.name);
+    const SweepCase given = *read(frames);
+    for (const Frame& frame : given.frames) names.push_back(frame.view.name);
     return names;
   }
 

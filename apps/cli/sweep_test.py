@@ -1,0 +1,72 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of `sweep` at its edges. Usage: sweep_test.py PROGRAM"""
+
+import json
+import struct
+import unittest
+import zlib
+
+from program import SimulatedCase, run
+
+
+def grey_png(grey, size=64):
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", size, size, 8, 0, 0, 0, 0)) +
+            chunk(b"IDAT", zlib.compress((b"\0" + bytes([grey]) * size) * size)) + chunk(b"IEND", b""))
+
+
+class Sweep(SimulatedCase):
+    def case_of(self, name, frames, **view):
+        folder = self.root / name
+        folder.mkdir()
+        for number in range(1, 4):
+            (folder / f"run_{number:02d}.png").write_bytes(grey_png(120))
+        view = {"name": "RUN", "image": "run_{frame:02d}.png", "frames": frames, **view}
+        (folder / "case.json").write_text(json.dumps(
+            {"format": "helicarm-case/1", "calibrator": "udcsc", "plate": None, "views": [view]}))
+        return folder
+
+    def test_a_single_view_is_calibrated_and_its_geometry_written(self):
+        case = json.loads((self.root / "case/case.json").read_text())
+        case["views"] = case["views"][:1]
+        case.pop("picks", None), case.pop("tunnels", None), case.pop("tool_lines", None)
+        (self.root / "case/one.json").write_text(json.dumps(case))
+        out = self.root / "one"
+        done = run("sweep", self.root / "case/one.json", "--out", out, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        answer = json.loads(done.stdout)
+        self.assertEqual(answer, json.loads((out / "sweep.json").read_text()))
+        self.assertEqual((answer["format"], answer["status"]), ("helicarm-sweep/1", "ok"))
+        self.assertIn(answer["frames"][0]["decision"], ("accept", "warn"))
+        for name in ("rtk.xml", "tigre.json", "leap.json", "astra.txt", "matrices.ompl", "matrices.csv", "matrices.npy",
+                     "plastimatch/0001.txt"):
+            self.assertTrue((out / "geometry" / name).exists(), name)
+        blank = self.case_of("blank-after", "all")
+        self.assertEqual(run("sweep", blank, "--out", out).returncode, 3)
+        self.assertEqual(json.loads((out / "sweep.json").read_text())["status"], "refused")
+        self.assertFalse((out / "geometry").exists())
+
+    def test_a_run_without_any_usable_image_is_refused(self):
+        done = run("sweep", self.case_of("blank", "all"), "--out", self.root / "blank-out")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("blank_image: none of 3 images is accepted", done.stderr)
+        frames = json.loads((self.root / "blank-out/sweep.json").read_text())["frames"]
+        self.assertEqual([frame["failure"]["code"] for frame in frames], 3 * ["blank_image"])
+
+    def test_wrong_input_is_named(self):
+        out = self.root / "wrong"
+        for name, frames, word in (("missing", "1-5", "2 of 5 images do not exist, the first: run_04.png"),
+                                   ("words", "some", 'frames: "some" is neither A-B nor A-B:STEP')):
+            done = run("sweep", self.case_of(name, frames), "--out", out)
+            self.assertEqual((done.returncode, word in done.stderr), (2, True), done.stderr)
+            self.assertFalse((out / "sweep.json").exists())
+        done = run("sweep", self.root / "missing", "--path", "curved")
+        self.assertEqual((done.returncode, "--path" in done.stderr), (2, True), done.stderr)
+        done = run("run", self.root / "missing", "--out", out)
+        self.assertEqual((done.returncode, "helicarm sweep" in done.stderr), (2, True), done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
