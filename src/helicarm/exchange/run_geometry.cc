@@ -9,6 +9,7 @@
 
 #include "helicarm/core/json.h"
 #include "helicarm/exchange/rtk_projection.h"
+#include "helicarm/geometry/view_json.h"
 
 namespace helicarm::exchange {
 namespace {
@@ -40,6 +41,13 @@ Eigen::Vector3d zyz_angles(const Eigen::Matrix3d& r) {
 Eigen::Vector3d zyx_angles(const Eigen::Matrix3d& r) {
   return {std::atan2(r(1, 0), r(0, 0)), std::atan2(-r(2, 0), std::hypot(r(2, 1), r(2, 2))),
           std::atan2(r(2, 1), r(2, 2))};
+}
+
+Expected<void> check_not_skewed(const RunGeometry::Image& image, const char* program) {
+  constexpr double rounding_px = 1e-6;
+  if (std::abs(image.view.intrinsics.skew) <= rounding_px) return {};
+  return fail(Reason::unsupported, fmt::format("{}: {}'s detector has no skew; the camera's is {:g} px",
+                                               image.name, program, image.view.intrinsics.skew));
 }
 
 }  // namespace
@@ -116,15 +124,12 @@ std::string leap_modular(const RunGeometry& run) {
 }
 
 Expected<std::string> tigre_geometry(const RunGeometry& run) {
-  constexpr double rounding_px = 1e-6;
   Json json = {
       {"mode", "cone"}, {"nDetector", {run.size.y(), run.size.x()}}, {"dDetector", nullptr}, {"COR", 0}};
   for (const char* key : {"DSD", "DSO", "offDetector", "rotDetector", "angles"}) json[key] = Json::array();
   for (const RunGeometry::Image& image : run.images) {
-    if (std::abs(image.view.intrinsics.skew) > rounding_px)
-      return fail(Reason::unsupported,
-                  fmt::format("{}: TIGRE's detector has no skew; the camera's is {:g} px", image.name,
-                              image.view.intrinsics.skew));
+    if (auto square = check_not_skewed(image, "TIGRE"); !square)
+      return tl::unexpected<Failure>(std::move(square).error());
     const PlacedDetector d = placed_detector(image.view, run.size, run.pixel_mm);
     // Turned so that the source lies on x; the detector's columns run along y, its rows against z.
     Eigen::Matrix3d axes, detector;
@@ -144,6 +149,46 @@ Expected<std::string> tigre_geometry(const RunGeometry& run) {
     json["angles"].push_back(list_of(zyz_angles(axes)));
   }
   return to_text(json) + "\n";
+}
+
+Expected<std::string> diffdrr_cameras(const RunGeometry& run) {
+  Json images = Json::array();
+  for (const RunGeometry::Image& image : run.images) {
+    if (auto square = check_not_skewed(image, "DiffDRR"); !square)
+      return tl::unexpected<Failure>(std::move(square).error());
+    const geometry::Intrinsics& k = image.view.intrinsics;
+    // Its camera has x to the left and y upwards; columns run against x unless the image is mirrored. The
+    // middle of the first pixel is (0.5, 0.5).
+    const Eigen::DiagonalMatrix<double, 3> turned(-1, -1, 1);
+    Eigen::Matrix4d camera_from_world = image.view.camera_from_world.matrix();
+    camera_from_world.topRows<3>() = turned * camera_from_world.topRows<3>();
+    const bool against_x = k.fx > 0;
+    const double sdd = k.fy * run.pixel_mm, delx = sdd / std::abs(k.fx);
+    const double column = against_x ? run.size.x() - k.u0 - 0.5 : k.u0 + 0.5;
+    const double row = run.size.y() - k.v0 - 0.5;
+    images.push_back({{"name", image.name},
+                      {"sdd", sdd},
+                      {"height", run.size.y()},
+                      {"width", run.size.x()},
+                      {"delx", delx},
+                      {"dely", run.pixel_mm},
+                      {"x0", delx * (run.size.x() / 2.0 - column)},
+                      {"y0", run.pixel_mm * (run.size.y() / 2.0 - row)},
+                      {"reverse_x_axis", against_x},
+                      {"pose", geometry::json_rows(Eigen::Matrix4d(camera_from_world.inverse()))}});
+  }
+  return to_text(Json{{"diffdrr", std::move(images)}}) + "\n";
+}
+
+std::string deepdrr_cameras(const RunGeometry& run) {
+  Json images = Json::array();
+  for (const RunGeometry::Image& image : run.images)
+    images.push_back({{"name", image.name},
+                      {"intrinsic", geometry::json_rows(image.view.intrinsics.matrix())},
+                      {"extrinsic", geometry::json_rows(image.view.camera_from_world.matrix())},
+                      {"sensor_width", run.size.x()},
+                      {"sensor_height", run.size.y()}});
+  return to_text(Json{{"deepdrr", std::move(images)}}) + "\n";
 }
 
 std::string plastimatch_matrix(const geometry::View& view, double pixel_mm) {

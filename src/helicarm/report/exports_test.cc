@@ -195,8 +195,8 @@ TEST_F(Exports, GeometryForReconstructionIsOfAllViewsOnRequest) {
   std::vector<std::string> names;
   for (const auto& path : *written) names.push_back(path.filename().string());
   EXPECT_THAT(names, testing::ElementsAre("AP_plastimatch.txt", "LAT_plastimatch.txt", "views_astra.txt",
-                                          "views_leap.json", "views_matrices.npy", "views_matrices.ompl",
-                                          "views_tigre.json"));
+                                          "views_deepdrr.json", "views_diffdrr.json", "views_leap.json",
+                                          "views_matrices.npy", "views_matrices.ompl", "views_tigre.json"));
   EXPECT_EQ(parse_json(text("views_tigre.json"), "tigre")->at("DSO").size(), 2u);
   forget_exports(folder_);
   EXPECT_TRUE(fs::is_empty(folder_));
