@@ -111,21 +111,20 @@ TEST(Steps, PointThatCannotBeLocatedRefusesThePlan) {
 }
 
 TEST(Steps, WarningsStandUnderTheStepThatTheyConcern) {
-  auto image = std::make_shared<xray::XrayImage>();
-  image->warnings = {{Reason::spacing_missing, "no pixel size"}};
   pipeline::ViewResult view;
   view.name = "AP";
-  view.xray_image = image;
+  view.xray_image = std::make_shared<xray::XrayImage>();
   view.rectification.emplace();
-  view.rectification->warnings = {{Reason::residual_too_large, "few dots"}};
   view.found.emplace();
   view.calibrated.emplace();
   ApplicationState state = state_with({view});
   auto result = std::make_shared<pipeline::Result>(*state.result);
-  result->warnings = {image->warnings[0],
-                      view.rectification->warnings[0],
-                      {Reason::few_fiducials, "five balls"},
-                      {Reason::residual_too_large, "the rays miss", {}, {{"ray_gap_mm", 3}}}};
+  using pipeline::Stage;
+  result->warnings = {
+      {{Reason::spacing_missing, "no pixel size"}, Stage::read},
+      {{Reason::residual_too_large, "few dots"}, Stage::rectify},
+      {{Reason::few_fiducials, "five balls"}, Stage::calibrate},
+      {{Reason::residual_too_large, "the rays miss", {}, {{"ray_gap_mm", 3}}}, Stage::locate}};
   state.result = result;
   const auto cards = steps_of(state);
   const auto why = [&](Phase phase) { return card_of(cards, phase).why.toStdString(); };

@@ -15,8 +15,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-const Vector3d nominal(1000, 0, 0);
-const CArmPrior unknown{IntrinsicsVariation{10, 1.4}, IntrinsicsVariation{7, 4.2}};
+const Vector3d arm_nominal_mm(1000, 0, 0);
+const CArmPrior unknown_arm{IntrinsicsVariation{10, 1.4}, IntrinsicsVariation{7, 4.2}};
 
 /// A C-arm whose sag is a sine of its primary angle: 1 mm in the source distance, 2 mm in the principal
 /// point.
@@ -50,16 +50,16 @@ class SaggingArm {
 };
 
 TEST(CArmModel, WithoutAcquisitionsPredictsTheNominalValuesWithTheirDoubt) {
-  const CArmModel model = c_arm_model({}, nominal, unknown);
+  const CArmModel model = c_arm_model({}, arm_nominal_mm, unknown_arm);
   const HistoryEntry at{"", "AP", {}, Matrix3d::Identity(), 0, 0};
   const IntrinsicsPrediction predicted = predict_intrinsics(model, {&at, 1});
-  EXPECT_EQ(predicted.mean_mm, nominal);
+  EXPECT_EQ(predicted.mean_mm, arm_nominal_mm);
   EXPECT_GT(predicted.covariance_mm2(0, 0), 100);
 }
 
 TEST(CArmModel, SagIsPredictedAtPositionsThatWereNotAcquired) {
   SaggingArm arm(1);
-  const CArmModel model = c_arm_model(arm.history(24), nominal, unknown);
+  const CArmModel model = c_arm_model(arm.history(24), arm_nominal_mm, unknown_arm);
   for (const double angle : {-70., -20., 35., 80.}) {
     const HistoryEntry at{"", "AP", {}, Matrix3d::Identity(), angle, 0};
     const IntrinsicsPrediction predicted = predict_intrinsics(model, {&at, 1});
@@ -73,7 +73,7 @@ TEST(CArmModel, NextAcquisitionsLieInTheirRegions) {
   int inside = 0, all = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     SaggingArm arm(seed);
-    const CArmModel model = c_arm_model(arm.history(16), nominal, unknown);
+    const CArmModel model = c_arm_model(arm.history(16), arm_nominal_mm, unknown_arm);
     for (const double angle : {-60., -15., 40., 75.}) {
       const HistoryEntry next = arm.acquisition(angle);
       const CArmCheck check = check_c_arm(model, {&next, 1}, {});
@@ -90,7 +90,7 @@ TEST(CArmModel, UnchangedArmRaisesNoAlarm) {
   int alarms = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     SaggingArm arm(seed);
-    const CArmModel model = c_arm_model(arm.history(12), nominal, unknown);
+    const CArmModel model = c_arm_model(arm.history(12), arm_nominal_mm, unknown_arm);
     const std::vector next{arm.acquisition(0), arm.acquisition(88)};
     alarms += check_c_arm(model, next, {}).changed;
   }
@@ -101,7 +101,7 @@ TEST(CArmModel, ReceiverMovedByTwoMillimetresIsAChange) {
   int alarms = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SaggingArm arm(seed);
-    const CArmModel model = c_arm_model(arm.history(24), nominal, unknown);
+    const CArmModel model = c_arm_model(arm.history(24), arm_nominal_mm, unknown_arm);
     const std::vector next{arm.acquisition(0, {0, 2, 2}), arm.acquisition(88, {0, 2, 2})};
     alarms += check_c_arm(model, next, {}).changed;
   }
@@ -110,7 +110,7 @@ TEST(CArmModel, ReceiverMovedByTwoMillimetresIsAChange) {
 
 TEST(CArmModel, ChangeWithinTheToleranceIsNone) {
   SaggingArm arm(3);
-  const CArmModel model = c_arm_model(arm.history(24), nominal, unknown);
+  const CArmModel model = c_arm_model(arm.history(24), arm_nominal_mm, unknown_arm);
   const std::vector next{arm.acquisition(0, {0, 4, 4}), arm.acquisition(88, {0, 4, 4})};
   EXPECT_TRUE(check_c_arm(model, next, {0, 0}).changed);
   EXPECT_FALSE(check_c_arm(model, next, {20, 20}).changed);
@@ -120,7 +120,7 @@ TEST(CArmModel, ImagesWithoutAnglesAreNotTakenForOnePosition) {
   SaggingArm arm(4);
   std::vector<HistoryEntry> entries = arm.history(10);
   for (HistoryEntry& entry : entries) entry.primary_deg.reset();
-  const CArmModel model = c_arm_model(entries, nominal, unknown);
+  const CArmModel model = c_arm_model(entries, arm_nominal_mm, unknown_arm);
   HistoryEntry next = arm.acquisition(0);
   next.primary_deg.reset();
   EXPECT_FALSE(check_c_arm(model, {&next, 1}, {}).changed);

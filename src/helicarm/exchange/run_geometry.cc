@@ -44,8 +44,8 @@ Eigen::Vector3d zyx_angles(const Eigen::Matrix3d& r) {
 }
 
 Expected<void> check_not_skewed(const RunGeometry::Image& image, const char* program) {
-  constexpr double rounding_px = 1e-6;
-  if (std::abs(image.view.intrinsics.skew) <= rounding_px) return {};
+  constexpr double largest_skew_px = 1e-6;
+  if (std::abs(image.view.intrinsics.skew) <= largest_skew_px) return {};
   return fail(Reason::unsupported, fmt::format("{}: {}'s detector has no skew; the camera's is {:g} px",
                                                image.name, program, image.view.intrinsics.skew));
 }

@@ -55,7 +55,7 @@ pipeline::Result full_result() {
   result.tool_lines.push_back({nasty, nasty, {0, 0, 0}, {0, 10, 0}});
   result.verifications.push_back(
       {nasty, guidance::LineError{{1.0, {}}, 1, 2, 3}, guidance::LineError{{1.0, {}}, 1, 2, 3}});
-  result.warnings.push_back({Reason::few_fiducials, nasty, nasty, {}});
+  result.warnings.push_back({{Reason::few_fiducials, nasty, nasty, {}}, pipeline::Stage::calibrate});
   result.accuracy.fre_mm = {0.1, 0.1, 0.2, 0.05, 12};
   result.accuracy.targets.push_back({nasty, 0.1, 0.1, 0.2});
   result.timing_ms.total = 12;
