@@ -26,7 +26,7 @@ TEST(Statistics, ChiSquareQuantilesAreThoseOfTables) {
   constexpr double normal_at_95 = 1.6448536;
   EXPECT_NEAR(chi2_quantile(10, normal_at_95), 18.307, 0.02);
   EXPECT_NEAR(chi2_quantile(100, normal_at_95), 124.342, 0.02);
-  EXPECT_NEAR(chi2_quantile(6, normal_at_999), 22.458, 0.1);
+  EXPECT_NEAR(chi2_quantile(6, normal_at_999), 22.458, 0.25);
 }
 
 TEST(Statistics, ExcessInvertsTheQuantile) {

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "helicarm/core/temporary_folder.h"
 #include "helicarm/study/journal.h"
 #include "helicarm/study/small_studies.h"
 
@@ -19,21 +20,16 @@ namespace fs = std::filesystem;
 
 class EveryStudy : public ::testing::TestWithParam<SmallStudy> {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) / ("every_study_" + GetParam().name);
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
+  std::string bytes(const EngineOptions& engine) const {
+    return GetParam().bytes(engine, Ranks(), folder_.path());
   }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string bytes(const EngineOptions& engine) const { return GetParam().bytes(engine, Ranks(), folder_); }
   std::string bytes_by(unsigned threads) const {
     EngineOptions engine;
     engine.threads = threads;
     return bytes(engine);
   }
 
-  fs::path folder_;
+  TemporaryFolder folder_;
 };
 
 TEST_P(EveryStudy, BytesDoNotDependOnThreads) { EXPECT_EQ(bytes_by(1), bytes_by(3)); }
@@ -51,7 +47,7 @@ TEST_P(EveryStudy, KilledRunKeepsFinishedBlocksAndResumesToTheSameBytes) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");  // OpenCV may have threads
   EngineOptions engine;
   engine.threads = 2;
-  engine.journal = folder_ / "some.partial";
+  engine.journal = folder_.path() / "some.partial";
   engine.journal_after_s = 0;
   engine.progress = [done = std::size_t{0}](double) mutable {
     if (++done == GetParam().stop) std::raise(SIGKILL);
@@ -64,8 +60,8 @@ TEST_P(EveryStudy, KilledRunKeepsFinishedBlocksAndResumesToTheSameBytes) {
   engine.progress = [](double) {};
   EXPECT_EQ(bytes(engine), bytes_by(1));
   fs::remove(engine.journal);
-  fs::remove_all(folder_ / kept_biplane_case);  // an output of its study
-  EXPECT_TRUE(fs::is_empty(folder_));
+  fs::remove_all(folder_.path() / kept_biplane_case);  // an output of its study
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
 INSTANTIATE_TEST_SUITE_P(All, EveryStudy, ::testing::ValuesIn(small_studies()),
