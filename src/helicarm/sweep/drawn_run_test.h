@@ -22,7 +22,8 @@ namespace helicarm::sweep {
 struct DrawnRun {
   int frames = 20, size = 256;
   double pixel_mm = 1.0, step_deg = 5;
-  int moved_from = 1000;  ///< from this frame on the balls are shifted
+  double stated_source_detector_mm = 1000;  ///< in the sidecars
+  int moved_from = 1000;                    ///< from this frame on the balls are shifted
   Eigen::Vector3d shift_mm = Eigen::Vector3d(1.5, 0, 0);
   std::vector<int> blank = {};
 
@@ -106,8 +107,9 @@ struct DrawnRun {
     value_or_throw(write_file(folder / "case.json", json.dump()));
     for (int i = 0; i < frames; ++i) {
       value_or_throw(write_file(folder / fmt::format("run_{:03d}.png", i + 1), image::encode_png(image(i))));
-      value_or_throw(write_file(folder / fmt::format("run_{:03d}.json", i + 1),
-                                Json({{"pixel_mm", pixel_mm}, {"source_detector_mm", 1000}}).dump()));
+      value_or_throw(write_file(
+          folder / fmt::format("run_{:03d}.json", i + 1),
+          Json({{"pixel_mm", pixel_mm}, {"source_detector_mm", stated_source_detector_mm}}).dump()));
     }
   }
 };

@@ -153,6 +153,26 @@ bool is_one_run(const SweepCase& given) {
                              [&](const Frame& frame) { return frame.run == given.frames.front().run; });
 }
 
+/// Warns where the source distance that the images show with the stated pixel size is not the stated one.
+void compare_distance(Sweep& sweep, const std::vector<FrameEstimate>& estimates) {
+  constexpr double limit = 0.05;
+  const auto stated = std::ranges::find_if(
+      estimates, [](const FrameEstimate& estimate) { return estimate.source_detector_mm.has_value(); });
+  if (stated == estimates.end() || !sweep.pixel_known || !sweep.path || !sweep.path->source_to_detector_mm)
+    return;
+  const double stated_mm = *stated->source_detector_mm, found_mm = *sweep.path->source_to_detector_mm;
+  if (std::abs(found_mm / stated_mm - 1) <= limit) return;
+  sweep.warnings.push_back(
+      {Reason::intrinsics_inconsistent,
+       fmt::format(
+           "the images show a source distance of {:.0f} mm with the stated pixel size, and {:.0f} mm is "
+           "stated: pixel size, source distance or the calibrator's size is wrong. Lengths along the central "
+           "rays, and with them the source, are wrong too",
+           found_mm, stated_mm),
+       {},
+       {{"found_mm", found_mm}, {"stated_mm", stated_mm}}});
+}
+
 /// Warns where the angles that the file states are not those of the images.
 void compare_angles(Sweep& sweep) {
   constexpr double limit_deg = 2;
@@ -253,6 +273,7 @@ Sweep swept(const SweepCase& given, const SweepOptions& options,
                                                                                             : PathKind::free);
   sweep.failure = estimate_path(sweep, given.base, estimates, kind);
   compare_angles(sweep);
+  compare_distance(sweep, estimates);
   warn_of_refused(sweep);
   return sweep;
 }

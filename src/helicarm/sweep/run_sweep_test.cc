@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -52,6 +53,16 @@ TEST(RunSweep, CamerasOfARunAreNearTheTruthAndBlankImagesAreNamed) {
   EXPECT_NEAR(std::abs(sweep.path->axis->z()), 1, 1e-4);
   EXPECT_NEAR(sweep.path->source_to_axis_mm, 620, 2);
   EXPECT_NEAR(*sweep.path->source_to_detector_mm, 1000, 3);
+}
+
+TEST(RunSweep, StatedDistanceThatTheImagesContradictIsWarnedOf) {
+  DrawnRun run;
+  run.stated_source_detector_mm = 1300;
+  const Sweep sweep = sweep_of(run);
+  ASSERT_FALSE(sweep.failure) << sweep.failure->message;
+  EXPECT_TRUE(std::ranges::any_of(sweep.warnings, [](const Warning& warning) {
+    return warning.reason == Reason::intrinsics_inconsistent && warning.figures.at("stated_mm") == 1300;
+  }));
 }
 
 TEST(RunSweep, FromAMotionOfThePhantomOnTheImagesAreRefused) {
