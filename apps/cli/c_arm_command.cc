@@ -59,12 +59,7 @@ CommandResult c_arm_report_command(const CArmReportArguments& arguments, Console
         value_or_throw(calibration::read_history(arguments.record)), arguments.record.string()));
     value_or_throw(report::write_c_arm_report(model, arguments.out));
     if (console.json)
-      console.out << to_text(
-                         Json{{"focal_mm", {{"smooth", model.focal.smooth}, {"repeat", model.focal.repeat}}},
-                              {"principal_mm",
-                               {{"smooth", model.principal.smooth}, {"repeat", model.principal.repeat}}},
-                              {"acquisitions", report::c_arm_json(calibration::leave_one_out(model))}})
-                  << '\n';
+      console.out << to_text(report::to_json(model)) << '\n';
     else
       console.out << fmt::format(
           "{} acquisitions; source distance varies by {:.2f} mm over the positions and {:.2f} mm in one, "
@@ -81,12 +76,10 @@ CommandResult c_arm_check_command(const CArmCheckArguments& arguments, Console& 
         acquisitions_of(arguments.folder, console), record, arguments.record.string()));
     const std::optional<Failure> change = pipeline::c_arm_change(check);
     if (console.json) {
-      console.out << to_text(Json{{"status", change ? "refused" : "ok"},
-                                  {"failure", change ? pipeline::to_json(*change) : Json()},
-                                  {"chi2", check.chi2},
-                                  {"limit", check.limit},
-                                  {"acquisitions", report::c_arm_json(check.acquisitions)}})
-                  << '\n';
+      Json answer = report::to_json(check);
+      answer["status"] = change ? "refused" : "ok";
+      answer["failure"] = change ? pipeline::to_json(*change) : Json();
+      console.out << to_text(answer) << '\n';
       console.answered = true;
     } else {
       console.out << report::text_of(report::c_arm_table(check.acquisitions));

@@ -21,13 +21,6 @@ struct SweepArguments {
 };
 namespace {
 
-std::optional<sweep::PathKind> path_named(const std::string& word) {
-  if (word.empty()) return std::nullopt;
-  if (word == "free") return sweep::PathKind::free;
-  if (word == "smooth") return sweep::PathKind::smooth;
-  throw BadInput(Reason::usage, fmt::format("--path: \"{}\" is none of: free, smooth", word));
-}
-
 std::string summary_of(const sweep::Sweep& sweep) {
   const auto accepted =
       std::ranges::count_if(sweep.frames, [](const auto& frame) { return frame.best.has_value(); });
@@ -52,7 +45,7 @@ CommandResult sweep_command(const SweepArguments& arguments, Console& console) {
   return guarded([&] {
     sweep::forget_sweep(arguments.out);
     sweep::SweepOptions options;
-    options.path = path_named(arguments.path);
+    if (!arguments.path.empty()) options.path = value_or_throw(sweep::path_kind(arguments.path));
     options.threads = console.threads;
     const auto given = value_or_throw(sweep::read_sweep_case(arguments.folder));
     ProgressLine progress(console);

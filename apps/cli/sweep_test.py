@@ -63,7 +63,7 @@ class Sweep(SimulatedCase):
             self.assertEqual((done.returncode, word in done.stderr), (2, True), done.stderr)
             self.assertFalse((out / "sweep.json").exists())
         done = run("sweep", self.root / "missing", "--path", "curved")
-        self.assertEqual((done.returncode, "--path" in done.stderr), (2, True), done.stderr)
+        self.assertEqual((done.returncode, "path:" in done.stderr), (2, True), done.stderr)
         done = run("run", self.root / "missing", "--out", out)
         self.assertEqual((done.returncode, "helicarm sweep" in done.stderr), (2, True), done.stderr)
 

@@ -18,9 +18,7 @@ py::object check_c_arm(const std::filesystem::path& record, const std::filesyste
           std::move(acquired), value_or_throw(calibration::read_history(record)), record.string()));
     });
   }));
-  const py::object answer = python_from({{"chi2", check.chi2},
-                                         {"limit", check.limit},
-                                         {"acquisitions", report::c_arm_json(check.acquisitions)}});
+  const py::object answer = python_from(report::to_json(check));
   if (const auto change = pipeline::c_arm_change(check)) raise(*change, answer);
   return answer;
 }
@@ -32,10 +30,7 @@ py::object c_arm_report(const std::filesystem::path& record,
         return pipeline::model_of_record(history, record.string());
       }));
   if (out) value_or_raise(report::write_c_arm_report(model, *out));
-  return python_from(
-      {{"focal_mm", {{"smooth", model.focal.smooth}, {"repeat", model.focal.repeat}}},
-       {"principal_mm", {{"smooth", model.principal.smooth}, {"repeat", model.principal.repeat}}},
-       {"acquisitions", report::c_arm_json(calibration::leave_one_out(model))}});
+  return python_from(report::to_json(model));
 }
 
 }  // namespace

@@ -17,11 +17,7 @@ sweep::Sweep swept(const std::filesystem::path& folder, const std::optional<std:
                    unsigned threads, const py::object& progress) {
   sweep::SweepOptions options;
   options.threads = threads;
-  if (path) {
-    if (*path != "free" && *path != "smooth")
-      raise({Reason::bad_value, fmt::format("sweep: path: \"{}\" is none of: free, smooth", *path), {}, {}});
-    options.path = *path == "free" ? sweep::PathKind::free : sweep::PathKind::smooth;
-  }
+  if (path) options.path = value_or_raise(sweep::path_kind(*path));
   const py::object nothing = py::none();
   const RunHooks hooks = run_hooks(nothing);
   sweep::Sweep result = value_or_raise(without_gil([&] {

@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/core/random.h"
-#include "helicarm/geometry/framed_transform.h"
 
 namespace helicarm::geometry {
 namespace {
@@ -99,13 +98,6 @@ TEST(RigidTransformFrom, ScaleReflectionLastRowZeroAndNanAreRefused) {
   EXPECT_EQ(rigid_transform_from(affine, "x").error().reason, Reason::bad_value);
   EXPECT_EQ(rigid_transform_from(Eigen::Matrix4d::Zero(), "x").error().reason, Reason::bad_value);
   EXPECT_EQ(rigid_transform_from(broken, "x").error().reason, Reason::not_finite);
-}
-
-TEST(FramedTransform, ProductChecksTheInnerFrames) {
-  const FramedTransform a{"tracker", "calibrator", {}}, b{"tracker", "femur", {}};
-  EXPECT_EQ((b.inverse() * a).to, "femur");
-  EXPECT_EQ((b.inverse() * a).from, "calibrator");
-  EXPECT_THROW(a * b, std::invalid_argument);
 }
 
 }  // namespace

@@ -133,7 +133,9 @@ std::string c_arm_csv(std::span<const AcquisitionCheck> acquisitions) {
   return csv;
 }
 
-Json c_arm_json(std::span<const AcquisitionCheck> acquisitions) {
+namespace {
+
+Json json_of(std::span<const AcquisitionCheck> acquisitions) {
   Json list = Json::array();
   const auto angle = [](const std::optional<double>& deg) { return deg ? Json(*deg) : Json(); };
   const auto row = [](const Eigen::Vector3d& v) { return Json{v.x(), v.y(), v.z()}; };
@@ -148,6 +150,21 @@ Json c_arm_json(std::span<const AcquisitionCheck> acquisitions) {
                     {"chi2", a.chi2},
                     {"changed", a.is_changed}});
   return list;
+}
+
+}  // namespace
+
+Json to_json(const CArmModel& model) {
+  const auto variation = [](const calibration::CArmVariation& of) {
+    return Json{{"smooth", of.smooth}, {"repeat", of.repeat}};
+  };
+  return {{"focal_mm", variation(model.focal)},
+          {"principal_mm", variation(model.principal)},
+          {"acquisitions", json_of(calibration::leave_one_out(model))}};
+}
+
+Json to_json(const calibration::CArmCheck& check) {
+  return {{"chi2", check.chi2}, {"limit", check.limit}, {"acquisitions", json_of(check.acquisitions)}};
 }
 
 std::string c_arm_report_html(const CArmModel& model, std::span<const AcquisitionCheck> left_out) {

@@ -17,8 +17,11 @@ Table c_arm_table(std::span<const calibration::AcquisitionCheck> acquisitions);
 /// prediction and the sigma of their difference, and chi2.
 std::string c_arm_csv(std::span<const calibration::AcquisitionCheck> acquisitions);
 
-/// The same as JSON, a list.
-Json c_arm_json(std::span<const calibration::AcquisitionCheck> acquisitions);
+/// Both variations, and each acquisition beside the prediction by all others.
+Json to_json(const calibration::CArmModel& model);
+
+/// Chi-square of all acquisitions with its limit, and each acquisition.
+Json to_json(const calibration::CArmCheck& check);
 
 /// A page with the C-arm's variation, its curves over the primary angle, and each acquisition beside the
 /// prediction by all others. It names no image and no person.

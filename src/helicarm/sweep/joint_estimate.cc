@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/view_problem.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/dlt.h"
 #include "helicarm/pipeline/prior.h"
@@ -23,23 +24,11 @@ constexpr double off_path_limit = 5.5;  // standard deviations
 constexpr std::size_t least_path = 8;   // frames
 constexpr int relinearisations = 4;
 
-/// Chi-square as a standard normal deviate (Wilson and Hilferty 1931).
-double deviate(double chi2, int dof) {
-  const double spread = 2.0 / (9 * dof);
-  return (std::cbrt(chi2 / dof) - (1 - spread)) / std::sqrt(spread);
-}
-
-Eigen::Vector3d centre_of_balls(const phantom::Calibrator& calibrator) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const phantom::CalibratorBall& ball : calibrator.balls) sum += ball.centre_in_calibrator;
-  return sum / double(calibrator.balls.size());
-}
-
 /// How each ball's position follows from independent unit errors of the phantom, its scale among them.
 std::vector<Eigen::Matrix3Xd> phantom_errors(const phantom::Calibrator& calibrator) {
   const calibration::CommonPrior common = pipeline::common_prior(calibrator);
   const calibration::OffsetRoots roots = calibration::offset_roots(common);
-  const Eigen::Vector3d centre = centre_of_balls(calibrator);
+  const Eigen::Vector3d centre = phantom::middle_of(calibrator);
   const auto n = Eigen::Index(calibrator.balls.size());
   const Eigen::Index own = roots.of_ball.empty() ? 0 : roots.joint ? roots.of_ball.front().cols() : 3 * n;
   std::vector<Eigen::Matrix3Xd> errors;
@@ -169,7 +158,7 @@ bool refuse_moved(Sweep& sweep, const Joint& joint) {
 bool refuse_off_path(Sweep& sweep, const Joint& joint) {
   std::vector<double> off;
   for (const PathPoint& point : joint.smooth.points)
-    off.push_back(deviate(point.off_path_chi2, path_dof(joint)));
+    off.push_back(chi2_excess(point.off_path_chi2, path_dof(joint)));
   const double worst = *std::ranges::max_element(off);
   if (!(worst > off_path_limit)) return false;
   constexpr double share = 0.7;  // a frame beside the worst may be off because of it
@@ -228,7 +217,7 @@ void set_best(SweepFrame& frame, const Joint& joint, std::size_t i, const Camera
   best.dof = int(std::lround(2 * double(points.points.size()) - fitted));
   frame.best = std::move(best);
   frame.path_angle_deg = joint.angles_deg[i];
-  frame.off_path_sigma = deviate(point.off_path_chi2, path_dof(joint));
+  frame.off_path_sigma = chi2_excess(point.off_path_chi2, path_dof(joint));
   frame.flex = point.path;
   frame.own = point.camera;
   constexpr double noticeable = 4;
@@ -279,12 +268,6 @@ void describe(SweepPath& path, const std::vector<PlacedCamera>& cameras) {
   path.arc_deg = most - least;
 }
 
-std::optional<double> stated_distance(const std::vector<FrameEstimate>& estimates) {
-  for (const FrameEstimate& estimate : estimates)
-    if (estimate.source_detector_mm) return estimate.source_detector_mm;
-  return std::nullopt;
-}
-
 /// The path through the frames' own estimates, of which nothing is changed.
 void take_free_path(Sweep& sweep, const Eigen::Vector3d& centre) {
   std::vector<PlacedCamera> cameras;
@@ -316,16 +299,22 @@ Failure contradiction(const Sweep& sweep, std::size_t accepted, std::size_t esti
 
 }  // namespace
 
+std::optional<double> stated_distance_mm(const std::vector<FrameEstimate>& estimates) {
+  for (const FrameEstimate& estimate : estimates)
+    if (estimate.source_detector_mm) return estimate.source_detector_mm;
+  return std::nullopt;
+}
+
 std::optional<Failure> estimate_path(Sweep& sweep, const pipeline::Case& base,
                                      const std::vector<FrameEstimate>& estimates, PathKind kind) {
-  const Eigen::Vector3d centre = centre_of_balls(base.calibrator);
+  const Eigen::Vector3d centre = phantom::middle_of(base.calibrator);
   const std::size_t estimated = accepted_in(sweep).size();
   if (kind == PathKind::free || estimated < least_path) {
     take_free_path(sweep, centre);
     return std::nullopt;
   }
   const auto errors = phantom_errors(base.calibrator);
-  const auto distance = sweep.pixel_known ? stated_distance(estimates) : std::nullopt;
+  const auto distance = sweep.pixel_known ? stated_distance_mm(estimates) : std::nullopt;
   bool moved = false;
   for (;;) {
     const std::vector<std::size_t> accepted = accepted_in(sweep);

@@ -9,6 +9,9 @@
 
 namespace helicarm::sweep {
 
+/// Of source and detector, as the first image that states it has it.
+std::optional<double> stated_distance_mm(const std::vector<FrameEstimate>& estimates);
+
 /// Sets the path and, of a smooth one, the best estimate of each accepted frame. Frames that contradict the
 /// path are refused: `phantom_changed` from the image on that shows the phantom moved, `residual_too_large`
 /// of single ones. Returns why the run as a whole is refused, if it is.

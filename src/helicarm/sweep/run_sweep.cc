@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/sweep/estimate_frame.h"
 #include "helicarm/sweep/joint_estimate.h"
@@ -78,10 +79,7 @@ Detector detector_of(const SweepCase& given, const std::vector<FrameEstimate>& e
       pixel_known = true;
     }
   constexpr double plausible_mm = 1000;  // of source and detector
-  if (!pixel_known && !focals.empty()) {
-    std::ranges::nth_element(focals, focals.begin() + std::ptrdiff_t(focals.size() / 2));
-    detector.pixel_mm = plausible_mm / focals[focals.size() / 2];
-  }
+  if (!pixel_known && !focals.empty()) detector.pixel_mm = plausible_mm / median(std::move(focals));
   return detector;
 }
 
@@ -113,11 +111,10 @@ double noise_factor(const std::vector<FrameEstimate>& estimates) {
   for (const FrameEstimate& at : estimates)
     if (!at.failure && at.alone->dof > 0) ratios.push_back(at.alone->chi2 / at.alone->dof);
   if (ratios.empty()) return 1;
-  std::ranges::nth_element(ratios, ratios.begin() + std::ptrdiff_t(ratios.size() / 2));
-  const double median = ratios[ratios.size() / 2];
+  const double typical = median(std::move(ratios));
   double chi2 = 0, dof = 0;
   for (const FrameEstimate& at : estimates)
-    if (!at.failure && at.alone->dof > 0 && at.alone->chi2 / at.alone->dof <= most_of_median * median)
+    if (!at.failure && at.alone->dof > 0 && at.alone->chi2 / at.alone->dof <= most_of_median * typical)
       chi2 += at.alone->chi2, dof += at.alone->dof;
   const double factor = std::sqrt(chi2 / dof);
   return dof < enough_dof ? std::max(1.0, factor) : std::max(least, factor);
@@ -156,11 +153,9 @@ bool is_one_run(const SweepCase& given) {
 /// Warns where the source distance that the images show with the stated pixel size is not the stated one.
 void compare_distance(Sweep& sweep, const std::vector<FrameEstimate>& estimates) {
   constexpr double limit = 0.05;
-  const auto stated = std::ranges::find_if(
-      estimates, [](const FrameEstimate& estimate) { return estimate.source_detector_mm.has_value(); });
-  if (stated == estimates.end() || !sweep.pixel_known || !sweep.path || !sweep.path->source_to_detector_mm)
-    return;
-  const double stated_mm = *stated->source_detector_mm, found_mm = *sweep.path->source_to_detector_mm;
+  const auto stated = stated_distance_mm(estimates);
+  if (!stated || !sweep.pixel_known || !sweep.path || !sweep.path->source_to_detector_mm) return;
+  const double stated_mm = *stated, found_mm = *sweep.path->source_to_detector_mm;
   if (std::abs(found_mm / stated_mm - 1) <= limit) return;
   sweep.warnings.push_back(
       {Reason::intrinsics_inconsistent,
@@ -235,6 +230,43 @@ SweepFrame reported(const Frame& frame, const FrameEstimate& estimate) {
   return made;
 }
 
+/// What was odd in the images' files and their labels: of each kind the first, with the number of images.
+void report_images(Sweep& sweep, const std::vector<FrameEstimate>& estimates) {
+  std::map<Reason, std::pair<Warning, int>> kinds;
+  for (const FrameEstimate& at : estimates)
+    for (const Warning& warning : at.warnings)
+      ++kinds.try_emplace(warning.reason, warning, 0).first->second.second;
+  for (auto& [reason, kind] : kinds) {
+    auto& [warning, count] = kind;
+    if (count > 1) warning.message += fmt::format(" (in {} of {} images)", count, estimates.size());
+    warning.figures["images"] = count;
+    (reason == Reason::irregular_file ? sweep.notes : sweep.warnings).push_back(std::move(warning));
+  }
+}
+
+/// Balls of the file that the accepted images hardly use.
+void warn_of_unused_balls(Sweep& sweep, const std::vector<FrameEstimate>& estimates,
+                          const phantom::Calibrator& calibrator) {
+  constexpr int least_images = 3, most_share = 4;
+  for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
+    int images = 0, used = 0;
+    for (const FrameEstimate& at : estimates) {
+      if (at.failure) continue;
+      ++images;
+      used += at.fiducials.fiducials[k].status == fiducials::FiducialStatus::used;
+    }
+    if (images < least_images || most_share * used >= images) continue;
+    sweep.warnings.push_back(
+        {Reason::ball_displaced,
+         fmt::format(
+             "fiducial {} fits in {} of {} images: its coordinates in the calibrator's file are wrong, or it "
+             "is lost or hidden",
+             calibrator.balls[k].label, used, images),
+         {},
+         {{"used", double(used)}, {"images", double(images)}}});
+  }
+}
+
 void warn_of_refused(Sweep& sweep) {
   std::map<Reason, std::vector<int>> refused;
   for (const SweepFrame& frame : sweep.frames)
@@ -271,6 +303,8 @@ Sweep swept(const SweepCase& given, const SweepOptions& options,
   }
   const PathKind kind = options.path.value_or(accepted >= least_smooth && is_one_run(given) ? PathKind::smooth
                                                                                             : PathKind::free);
+  report_images(sweep, estimates);
+  warn_of_unused_balls(sweep, estimates, given.base.calibrator);
   sweep.failure = estimate_path(sweep, given.base, estimates, kind);
   compare_angles(sweep);
   compare_distance(sweep, estimates);
@@ -279,6 +313,14 @@ Sweep swept(const SweepCase& given, const SweepOptions& options,
 }
 
 }  // namespace
+
+Expected<PathKind> path_kind(const std::string& word) {
+  const auto found = std::ranges::find(path_words, word);
+  if (found == path_words.end())
+    return fail(Reason::bad_value,
+                fmt::format("path: \"{}\" is none of: {}", word, fmt::join(path_words, ", ")));
+  return static_cast<PathKind>(found - path_words.begin());
+}
 
 Expected<Sweep> run_sweep(const SweepCase& given, const SweepOptions& options,
                           const std::function<void(double share)>& progress) {

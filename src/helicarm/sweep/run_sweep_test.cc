@@ -65,6 +65,22 @@ TEST(RunSweep, StatedDistanceThatTheImagesContradictIsWarnedOf) {
   }));
 }
 
+TEST(RunSweep, BallWhoseCoordinatesAreWrongIsNamed) {
+  const TemporaryFolder folder;
+  DrawnRun run;
+  run.frames = 8;
+  run.write(folder.path());
+  Json calibrator = *read_json(folder.path() / "calibrator.json");
+  calibrator["balls"][2]["xyz_mm"][0] = calibrator["balls"][2]["xyz_mm"][0].get<double>() + 5;
+  ASSERT_TRUE(write_file(folder.path() / "calibrator.json", calibrator.dump()));
+  const Sweep sweep = *run_sweep(*read_sweep_case(folder.path()));
+  ASSERT_FALSE(sweep.failure) << sweep.failure->message;
+  const auto named = std::ranges::find(sweep.warnings, Reason::ball_displaced, &Warning::reason);
+  ASSERT_NE(named, sweep.warnings.end());
+  EXPECT_NE(named->message.find("G3 "), std::string::npos);
+  EXPECT_EQ(std::ranges::count(sweep.warnings, Reason::ball_displaced, &Warning::reason), 1);
+}
+
 TEST(RunSweep, FromAMotionOfThePhantomOnTheImagesAreRefused) {
   DrawnRun run;
   run.frames = 26;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "helicarm/pipeline/result.h"
@@ -13,6 +15,10 @@
 namespace helicarm::sweep {
 
 enum class PathKind { free, smooth };
+inline constexpr std::array<std::string_view, 2> path_words{"free", "smooth"};
+/// By its word; bad_value otherwise.
+Expected<PathKind> path_kind(const std::string& word);
+
 enum class Decision { accept, warn, refuse };
 
 struct SweepOptions {

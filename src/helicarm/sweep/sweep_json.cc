@@ -75,7 +75,7 @@ Json flex_of(const Sweep& sweep) {
 }
 
 Json json_of(const SweepPath& path, const Sweep& sweep) {
-  Json json = {{"kind", path.kind == PathKind::smooth ? "smooth" : "free"},
+  Json json = {{"kind", path_words[std::size_t(path.kind)]},
                {"axis", path.axis ? json_list(*path.axis) : Json(nullptr)},
                {"isocentre_mm", json_list(path.isocentre)},
                {"isocentre_sigma_mm", json_list(path.isocentre_sigma)},
