@@ -104,6 +104,17 @@ constexpr ReasonEntry entries[] = {
     {Reason::pixels_taken_as_rectified, "pixels_taken_as_rectified", refused},
     {Reason::record_lost, "record_lost", refused},
     {Reason::image_changed, "image_changed", refused},
+    {Reason::tunnel_breach, "tunnel_breach", refused},
+    {Reason::bridge_thin, "bridge_thin", refused},
+    {Reason::registration_stale, "registration_stale", refused},
+    {Reason::registration_not_confirmed, "registration_not_confirmed", refused},
+    {Reason::marker_lost, "marker_lost", refused},
+    {Reason::marker_loose, "marker_loose", refused},
+    {Reason::markers_swapped, "markers_swapped", refused},
+    {Reason::bodies_exchanged, "bodies_exchanged", refused},
+    {Reason::body_ill_conditioned, "body_ill_conditioned", refused},
+    {Reason::cameras_not_in_step, "cameras_not_in_step", refused},
+    {Reason::frames_missing, "frames_missing", refused},
 };
 
 constexpr auto reasons = [] {
@@ -116,7 +127,7 @@ constexpr auto reasons = [] {
 static_assert([] {
   for (std::size_t i = 0; i < reasons.size(); ++i)
     if (reasons[i] != Reason(i)) return false;
-  return reasons.back() == Reason::image_changed;
+  return reasons.back() == Reason::frames_missing;
 }());
 
 const ReasonEntry& entry(Reason reason) { return entries[std::size_t(reason)]; }

@@ -109,6 +109,19 @@ enum class Reason {
   // An operation whose record or images were changed from outside.
   record_lost,
   image_changed,
+  // Planned tunnels beside the bone's surface, and registrations that guide a tool.
+  tunnel_breach,
+  bridge_thin,
+  registration_stale,
+  registration_not_confirmed,
+  // Markers and bodies through a sequence.
+  marker_lost,
+  marker_loose,
+  markers_swapped,
+  bodies_exchanged,
+  body_ill_conditioned,
+  cameras_not_in_step,
+  frames_missing,
 };
 
 /// Machine-readable code of a reason, e.g. "too_few_fiducials".
