@@ -16,6 +16,10 @@ target_compile_definitions(helicarm_flags INTERFACE HELICARM_VERSION="${PROJECT_
 if(HELICARM_WERROR)
   target_compile_options(helicarm_flags INTERFACE -Werror)
 endif()
+# GCC collects garbage only above this many kB: up to a fifth of a large unit's time.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(helicarm_flags INTERFACE "SHELL:--param ggc-min-heapsize=1000000")
+endif()
 if(NOT HELICARM_PORTABLE)
   target_compile_options(helicarm_flags INTERFACE -march=x86-64-v3)
 endif()
@@ -49,9 +53,12 @@ set(helicarm_often_included <algorithm> <cmath> <filesystem> <functional> <map> 
     <Eigen/Dense> <fmt/format.h> <nlohmann/json.hpp> <tl/expected.hpp>)
 target_precompile_headers(helicarm_precompiled PRIVATE ${helicarm_often_included})
 if(HELICARM_TESTS)
+  # What a test itself does is not worth the optimiser's time; what it tests is optimised in its library.
+  set(helicarm_test_options $<$<CONFIG:Release>:-O1>)
   add_library(helicarm_precompiled_tests OBJECT ${PROJECT_SOURCE_DIR}/cmake/precompiled.cc)
   target_link_libraries(helicarm_precompiled_tests PRIVATE helicarm_flags Eigen3::Eigen nlohmann_json::nlohmann_json
                         fmt::fmt tl::expected GTest::gmock)
+  target_compile_options(helicarm_precompiled_tests PRIVATE ${helicarm_test_options})
   target_precompile_headers(helicarm_precompiled_tests PRIVATE ${helicarm_often_included}
                             <gmock/gmock.h> <gtest/gtest.h>)
 endif()
@@ -101,6 +108,7 @@ function(helicarm_module name)
   if(ARG_TESTS AND HELICARM_TESTS)
     add_executable(${name}_test ${ARG_TESTS})
     target_link_libraries(${name}_test PRIVATE helicarm_${name} ${ARG_TEST_USES} GTest::gmock GTest::gtest_main)
+    target_compile_options(${name}_test PRIVATE ${helicarm_test_options})
     target_precompile_headers(${name}_test REUSE_FROM helicarm_precompiled_tests)
     if(HELICARM_UNITY AND NOT ARG_TESTS_APART)
       set_target_properties(${name}_test PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
