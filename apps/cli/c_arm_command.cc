@@ -29,10 +29,8 @@ struct CArmCheckArguments {
   std::filesystem::path folder;
 };
 
-std::vector<calibration::HistoryEntry> acquisitions_of(const std::filesystem::path& folder,
-                                                       Console& console) {
-  const pipeline::Case given = value_or_throw(pipeline::read_case(folder));
-  auto measured = value_or_throw(pipeline::c_arm_acquisitions(given, console.threads));
+std::vector<calibration::HistoryEntry> acquisitions_of(const std::filesystem::path& from, Console& console) {
+  auto measured = value_or_throw(pipeline::c_arm_acquisitions(from, console.threads));
   print_warnings(measured.warnings, console);
   return std::move(measured.entries);
 }
@@ -95,20 +93,24 @@ CommandResult c_arm_check_command(const CArmCheckArguments& arguments, Console& 
 void add_c_arm(CLI::App& app, Action& action) {
   auto* command =
       add_command(app, group::images, "c-arm", "Record a C-arm over cases, report it, and see a change of it",
-                  "helicarm c-arm add arm-2.json monday tuesday\n"
+                  "helicarm c-arm add arm-2.json monday tuesday/result.json run/sweep.json\n"
                   "  helicarm c-arm report arm-2.json --out arm-2\n"
                   "  helicarm c-arm check arm-2.json wednesday\n\n"
                   "The record is the file of `run --machine`: source distance and principal point of each "
                   "acquisition with their\n"
-                  "covariance, positioner angles and date. A check ends with exit code 3 and c_arm_changed "
+                  "covariance, positioner angles and date; results of `run` and `sweep` hold them too. A "
+                  "check ends with exit code 3 and c_arm_changed "
                   "where a case lies beyond\n"
                   "what the record predicts for its positions (99.9 %) and beyond the record's "
                   "\"tolerances\".");
   command->require_subcommand(1);
-  auto* add = command->add_subcommand("add", "Measure cases and add their acquisitions, each once");
+  auto* add =
+      command->add_subcommand("add", "Add the acquisitions of cases, results and runs of images, each once");
   auto& added = arguments_of(add, action, c_arm_add_command);
   add->add_option("RECORD", added.record, "The record (JSON); made where there is none")->required();
-  add->add_option("CASE", added.cases, "Folders that hold case.json")->required();
+  add->add_option("CASE", added.cases,
+                  "Folders that hold case.json (measured now), or results: result.json, sweep.json")
+      ->required();
 
   auto* report =
       command->add_subcommand("report", "Sag, repeatability and every acquisition, as a page and a table");
@@ -120,7 +122,10 @@ void add_c_arm(CLI::App& app, Action& action) {
   auto* check = command->add_subcommand("check", "Compare a new case with what the record predicts");
   auto& checked = arguments_of(check, action, c_arm_check_command);
   check->add_option("RECORD", checked.record, "The record (JSON), read only")->required();
-  check->add_option("CASE", checked.folder, "Folder that holds case.json")->required();
+  check
+      ->add_option("CASE", checked.folder,
+                   "Folder that holds case.json, or a result: result.json, sweep.json")
+      ->required();
 }
 
 }  // namespace helicarm::cli

@@ -38,6 +38,10 @@ class CommandLine(SimulatedCase):
         done = run("c-arm", "add", record, other, "--json")
         self.assertEqual(json.loads(done.stdout)["added"][0]["added"], 2, done.stderr)
         self.assertEqual(run("c-arm", "check", record, other).returncode, 3)  # only its own acquisitions
+        self.assertEqual(run("run", other, "--out", self.root / "measured", "--no-report").returncode, 0)
+        self.assertEqual(run("c-arm", "add", self.root / "by_result.json", self.root / "measured/result.json").returncode, 0)
+        self.assertEqual(json.loads((self.root / "by_result.json").read_text())["shots"],
+                         json.loads(record.read_text())["shots"])
         done = run("c-arm", "check", record, self.root / "case", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertLess(json.loads(done.stdout)["chi2"], json.loads(done.stdout)["limit"])

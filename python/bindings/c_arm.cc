@@ -12,8 +12,7 @@ py::object check_c_arm(const std::filesystem::path& record, const std::filesyste
                        unsigned threads) {
   const auto check = value_or_raise(without_gil([&] {
     return guarded([&] {
-      const auto given = value_or_throw(pipeline::read_case(folder));
-      auto acquired = value_or_throw(pipeline::c_arm_acquisitions(given, threads)).entries;
+      auto acquired = value_or_throw(pipeline::c_arm_acquisitions(folder, threads)).entries;
       return value_or_throw(pipeline::check_against_record(
           std::move(acquired), value_or_throw(calibration::read_history(record)), record.string()));
     });
@@ -41,7 +40,7 @@ void add_c_arm(py::module_& module) {
       py::arg("threads") = 0u,
       R"(Compares a case with what a C-arm's record predicts for its positions, as `helicarm c-arm check` does.
 
-record: the file of run_case's history. folder: holds case.json. Returns chi2 of all acquisitions, its 99.9 % limit, and for
+record: the file of run_case's history. folder: holds case.json; or a result.json or sweep.json. Returns chi2 of all acquisitions, its 99.9 % limit, and for
 each acquisition estimate_mm, predicted_mm, sigma_mm (source distance, principal point) and chi2. Raises InputError;
 RefusedError, with c_arm_changed and the same figures in .result where the C-arm has changed.)");
   module.def(

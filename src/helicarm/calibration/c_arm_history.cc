@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/core/codec.h"
 #include "helicarm/core/file_lock.h"
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/dense_matrix.h"
@@ -34,25 +35,60 @@ double variance(double first, double observed, double n) {
   return (prior_weight * first * first + observed) / (prior_weight + n);
 }
 
-Json row(const Vector3d& v) { return Json::array({v.x(), v.y(), v.z()}); }
-
 std::string today() { return fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))); }
 
-HistoryEntry entry_from(JsonReader& reader) {
-  const auto estimate = reader.numbers("estimate_mm", 3, {-1e4, 1e4});
-  const auto information = reader.matrix("information_per_mm2", 3, 3, {-1e12, 1e12});
-  HistoryEntry entry{reader.text("picture"),
-                     reader.text("view"),
-                     Vector3d(estimate.data()),
-                     Matrix3d(information.data()),
-                     reader.optional_number("primary_deg", {-360, 360}),
-                     reader.optional_number("secondary_deg", {-360, 360}),
-                     reader.optional_text("date").value_or("")};
-  reader.finish();
-  const double lowest = geometry::symmetric_eigen(entry.information).values[0];
-  if (!(lowest > 0) || !entry.information.isApprox(entry.information.transpose(), 1e-9))
+void check_information(const Matrix3d& information, const JsonReader& reader) {
+  if (!(geometry::symmetric_eigen(information).values[0] > 0) ||
+      !information.isApprox(information.transpose(), 1e-9))
     reader.refuse(Reason::bad_value, "information_per_mm2", "is not symmetric and positive");
-  return entry;
+}
+
+template <class Codec, class Entry>
+void describe_acquisition(Codec& codec, Entry& entry) {
+  codec.text("picture", entry.image, "digest of the image's pixels, so that each image is added only once",
+             {0, 200});
+  codec.text("view", entry.view, "its name", {0, 200});
+  codec.vector(
+      "estimate_mm", entry.estimate_mm, {-1e4, 1e4},
+      "focal length, and principal point relative to the image centre (u, v; as if the image were not "
+      "mirrored), in the receiver's plane");
+  codec.matrix("information_per_mm2", entry.information, {-1e12, 1e12},
+               "inverse covariance of these three, without any prior");
+  codec.check([&](JsonReader& reader) { check_information(entry.information, reader); });
+  codec.number("primary_deg", entry.primary_deg, {-360, 360},
+               "positioner angle; `null` where the image does not state it");
+  codec.number("secondary_deg", entry.secondary_deg, {-360, 360}, "likewise");
+  codec.custom(
+      "date", false, {{"type", "string"}},
+      "day on which it was added, UTC (`2026-11-26`); `null` in files of earlier versions",
+      [&](JsonReader& reader) {
+        if constexpr (!std::is_const_v<Entry>) entry.date = reader.optional_text("date").value_or("");
+      },
+      [&] { return std::optional(entry.date.empty() ? Json() : Json(entry.date)); });
+}
+
+template <class Codec, class Entries>
+void describe_acquisitions(Codec& codec, const char* key, bool required, Entries& entries) {
+  codec.list(key, entries, required, most_entries, "one entry per image, see below",
+             [](auto& inner, auto& entry) { describe_acquisition(inner, entry); });
+}
+
+/// machine.json (docs/formats.md).
+template <class Codec, class History>
+void describe_history(Codec& codec, History& history) {
+  codec.custom(
+      "format", true, {{"enum", {"helicarm-machine/1"}}}, "`\"helicarm-machine/1\"`",
+      [](JsonReader& reader) { reader.choice("format", {"helicarm-machine/1"}); },
+      [] { return std::optional<Json>("helicarm-machine/1"); });
+  codec.object("tolerances", history.tolerances,
+               "smaller differences from what the record predicts are no `c_arm_changed`",
+               [](auto& inner, auto& tolerances) {
+                 inner.number_or_default("focal_mm", tolerances.focal_mm, tolerance_range_mm,
+                                         "of the source distance");
+                 inner.number_or_default("principal_mm", tolerances.principal_mm, tolerance_range_mm,
+                                         "of the principal point, per axis");
+               });
+  describe_acquisitions(codec, "shots", true, history.entries);
 }
 
 }  // namespace
@@ -179,38 +215,48 @@ Expected<void> check_history_file(const std::filesystem::path& path) {
 Expected<CArmHistory> history_from_json(const Json& json, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(json, origin);
-    reader.choice("format", {"helicarm-machine/1"});
     CArmHistory history;
-    for (JsonReader& entry : reader.objects("shots", true, most_entries))
-      history.entries.push_back(entry_from(entry));
-    if (!reader.raw("tolerances").is_null()) {
-      JsonReader stated = reader.object("tolerances");
-      history.tolerances = {stated.optional_number("focal_mm", tolerance_range_mm).value_or(0),
-                            stated.optional_number("principal_mm", tolerance_range_mm).value_or(0)};
-      stated.finish();
-    }
+    FromJson codec(reader);
+    describe_history(codec, history);
     reader.finish();
     return history;
   });
 }
 
+Json acquisitions_json(const std::vector<HistoryEntry>& entries) {
+  ToJson codec(ToJson::Unset::null);
+  describe_acquisitions(codec, "acquisitions", false, entries);
+  return std::move(codec.json["acquisitions"]);
+}
+
 Json to_json(const CArmHistory& history) {
-  Json json{{"format", "helicarm-machine/1"},
-            {"tolerances",
-             {{"focal_mm", history.tolerances.focal_mm}, {"principal_mm", history.tolerances.principal_mm}}},
-            {"shots", Json::array()}};
-  const auto number = [](const std::optional<double>& angle) { return angle ? Json(*angle) : Json(); };
-  for (const HistoryEntry& entry : history.entries)
-    json["shots"].push_back(
-        {{"picture", entry.image},
-         {"view", entry.view},
-         {"estimate_mm", row(entry.estimate_mm)},
-         {"information_per_mm2", Json::array({row(entry.information.col(0)), row(entry.information.col(1)),
-                                              row(entry.information.col(2))})},
-         {"primary_deg", number(entry.primary_deg)},
-         {"secondary_deg", number(entry.secondary_deg)},
-         {"date", entry.date.empty() ? Json() : Json(entry.date)}});
-  return json;
+  ToJson codec(ToJson::Unset::null);
+  describe_history(codec, history);
+  return std::move(codec.json);
+}
+
+Json history_schema() {
+  const CArmHistory shape;
+  return schema_of("machine.json", [&](ToSchema& codec) { describe_history(codec, shape); });
+}
+
+Expected<std::vector<HistoryEntry>> acquisitions_of_result(const Json& json, const std::string& origin) {
+  return guarded([&] {
+    JsonReader reader(json, origin);
+    reader.choice("format", {"helicarm-result/1", "helicarm-sweep/1"});
+    if (reader.choice("status", {"ok", "refused"}) == 1)
+      throw BadInput(Reason::too_few_views, origin + ": is of a refused measurement");
+    std::vector<HistoryEntry> entries;
+    FromJson codec(reader);
+    describe_acquisitions(codec, "acquisitions", false, entries);
+    if (entries.empty())
+      throw BadInput(
+          Reason::too_few_views,
+          origin +
+              ": holds no acquisitions: its residuals contradict the noise model, its images have no pixel "
+              "size or source distance, or an earlier version wrote it (measure again)");
+    return entries;
+  });
 }
 
 }  // namespace helicarm::calibration

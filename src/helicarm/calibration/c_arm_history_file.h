@@ -17,4 +17,12 @@ Expected<HistoryGrowth> add_to_history(const std::filesystem::path& path,
 /// Whether entries can be added to the file (cannot_write): ask before a measurement.
 Expected<void> check_history_file(const std::filesystem::path& path);
 
+/// The array `shots` of machine.json; results carry the same as `acquisitions`.
+Json acquisitions_json(const std::vector<HistoryEntry>& entries);
+/// The JSON Schema of machine.json.
+Json history_schema();
+/// Of a result (helicarm-result/1) or a run of images (helicarm-sweep/1). Refuses one that was refused or
+/// holds none (too_few_views), with what to do.
+Expected<std::vector<HistoryEntry>> acquisitions_of_result(const Json& json, const std::string& origin);
+
 }  // namespace helicarm::calibration

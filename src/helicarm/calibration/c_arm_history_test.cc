@@ -103,6 +103,31 @@ TEST(CArmHistoryJson, RoundTrip) {
   EXPECT_TRUE(again->entries[0].information.isApprox(history.entries[0].information));
 }
 
+Json result_with(const std::vector<HistoryEntry>& entries) {
+  return {{"format", "helicarm-result/1"}, {"status", "ok"}, {"acquisitions", acquisitions_json(entries)}};
+}
+
+TEST(CArmHistoryJson, AResultsAcquisitionsAreThoseThatWereWritten) {
+  HistoryEntry entry{"a", "AP", {901, 2, 3}, Eigen::Vector3d(1, 2, 3).asDiagonal()};
+  entry.primary_deg = -30;
+  const auto read = acquisitions_of_result(result_with({entry}), "result.json");
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read->size(), 1U);
+  EXPECT_EQ(read->front().image, "a");
+  EXPECT_EQ(read->front().estimate_mm, entry.estimate_mm);
+  EXPECT_EQ(read->front().information, entry.information);
+  EXPECT_EQ(read->front().primary_deg, -30);
+  EXPECT_FALSE(read->front().secondary_deg);
+}
+
+TEST(CArmHistoryJson, AResultWithoutAcquisitionsSaysSo) {
+  EXPECT_EQ(acquisitions_of_result(result_with({}), "result.json").error().reason, Reason::too_few_views);
+  Json refused = result_with({});
+  refused["status"] = "refused";
+  EXPECT_EQ(acquisitions_of_result(refused, "result.json").error().reason, Reason::too_few_views);
+  EXPECT_EQ(acquisitions_of_result({{"format", "helicarm-case/2"}}, "case.json").error().reason, Reason::bad_value);
+}
+
 TEST(CArmHistoryFile, AdditionsAtTheSameTimeAreAllKept) {
   const TemporaryFolder temporary;
   const std::filesystem::path file = temporary.path() / "new" / "machine.json";

@@ -161,6 +161,13 @@ std::vector<int> beyond(const Scene& scene, const Hypothesis& h, double sigmas) 
 
 }  // namespace
 
+bool ExpectedView::allows(const geometry::View& other) const {
+  const Eigen::AngleAxisd turned(other.camera_from_world.rotation *
+                                 view.camera_from_world.rotation.transpose());
+  return (other.intrinsics.fx < 0) == (view.intrinsics.fx < 0) &&
+         std::abs(turned.angle()) <= within_deg * EIGEN_PI / 180;
+}
+
 double match_sigma_px(const Scene& scene, const geometry::View& view, std::size_t ball,
                       std::size_t candidate) {
   const double own = scene.candidates[candidate].sigma_px;

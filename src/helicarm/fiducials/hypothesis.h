@@ -26,6 +26,14 @@ struct ModelBall {
   double sigma_mm = 0;  ///< of the centre, per axis
 };
 
+/// A camera known before the image is labelled, as from neighbouring images of a run.
+struct ExpectedView {
+  geometry::View view;
+  double within_deg;  ///< a camera turned from it by more is impossible
+
+  bool allows(const geometry::View& other) const;
+};
+
 /// One image's input to the labelling.
 struct Scene {
   std::vector<ModelBall> balls;
@@ -35,6 +43,7 @@ struct Scene {
   double radius_bias;      ///< of all measured radii, relative
   double radius_bias_sigma;
   std::optional<bool> mirrored = {};  ///< if known, only this handedness is tried
+  std::optional<ExpectedView> expected = {};
 };
 
 /// Possible mm per px at a candidate if it is a given ball, by its radius.

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/fiducials/covered.h"
 #include "helicarm/fiducials/rivals.h"
 #include "helicarm/fiducials/search.h"
@@ -46,6 +47,11 @@ Scene scene_of(const phantom::Calibrator& calibrator, const std::vector<BallCand
   scene.radius_bias = prior.radius_bias;
   scene.radius_bias_sigma = prior.radius_bias_sigma;
   scene.mirrored = prior.mirrored;
+  scene.expected = prior.expected;
+  if (scene.expected) {
+    geometry::RigidTransform& pose = scene.expected->view.camera_from_world;
+    pose.translation += pose.rotation * centre;
+  }
   return scene;
 }
 
@@ -283,6 +289,7 @@ LabellingAttempt attempt_labels(const phantom::Calibrator& calibrator,
   if (n < least_shown) return {{}, too_few(n, n).value()};
   const Scene scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
+  search.try_expected();
   // By then, a labelling with one fiducial less would have been found, too.
   try_random_triples(
       search, triples_required(least_balls, candidates.size()), [&](const Hypothesis& h, std::size_t tried) {

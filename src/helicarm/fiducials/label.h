@@ -25,6 +25,7 @@ struct LabellingPrior {
   /// a helix seen along its axis with an end fiducial hidden.
   double radius_bias = 0;
   double radius_bias_sigma = 0.03;
+  std::optional<ExpectedView> expected = {};  ///< world = calibrator
 };
 
 struct LabellingOptions {

@@ -229,6 +229,7 @@ LabellingInput labelling_input(const xray::XrayImage& xray_image, const rectific
   if (options.method == rectification::Method::paper) input.options.systematic_sigma = paper_systematic;
   input.prior = labelling_prior(xray_image, rectification::intrinsics_prior(xray_image, map));
   input.prior.mirrored = options.mirrored;
+  input.prior.expected = options.expected;
   if (options.radius_bias) {
     input.prior.radius_bias = *options.radius_bias;
     input.prior.radius_bias_sigma = shared_bias_sigma;

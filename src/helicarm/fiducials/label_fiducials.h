@@ -9,6 +9,7 @@
 #include "helicarm/detection/dot.h"
 #include "helicarm/fiducials/candidates.h"
 #include "helicarm/fiducials/fiducial.h"
+#include "helicarm/fiducials/hypothesis.h"
 #include "helicarm/geometry/view.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/rectification/rectify.h"
@@ -46,6 +47,8 @@ struct FiducialOptions {
   /// the radii distinguish some labellings.
   std::optional<double> radius_bias = {};
   std::optional<bool> mirrored = {};  ///< if known, only this handedness is tried
+  /// From other images: labels that only the camera's position distinguishes are then known.
+  std::optional<ExpectedView> expected = {};
 };
 
 /// Stage 3 (2.3.4): labels the fiducials among the candidates, refits them, fits those without a candidate at

@@ -324,5 +324,44 @@ TEST(LabelBalls, RadiusBiasOfAnotherViewResolvesMoreViews) {
   EXPECT_GT(after, before);
 }
 
+/// The camera turned by so many degrees about a random axis through the calibrator.
+ExpectedView turned_from(const geometry::View& truth, double deg, double within_deg, RandomStream& random) {
+  const Eigen::Vector3d axis =
+      Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
+  geometry::View view = truth;
+  view.camera_from_world.rotation =
+      view.camera_from_world.rotation * Eigen::AngleAxisd(deg * pi / 180, axis).toRotationMatrix();
+  return {view, within_deg};
+}
+
+TEST(LabelBalls, CameraKnownFromNeighbouringImagesResolvesLabels) {
+  int before = 0, after = 0, images = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    RandomStream random(4, 1, trial);
+    const auto view_image = image_of(helix(), {.hidden = 2, .noise_px = 0.5}, random);
+    if (view_image.axis_deg() > 12) continue;
+    ++images;
+    before += label_balls(helix(), view_image.candidates, nominal).has_value();
+    LabellingPrior informed = nominal;
+    informed.expected = turned_from(view_image.view, 1.5, 4, random);
+    const auto labelling = label_balls(helix(), view_image.candidates, informed);
+    after += labelling.has_value();
+    EXPECT_TRUE(!labelling || right(*labelling, view_image, helix())) << trial;
+  }
+  EXPECT_LT(before, images);
+  EXPECT_EQ(after, images);
+}
+
+TEST(LabelBalls, AWrongExpectationLabelsNothing) {
+  for (int trial = 0; trial < 60; ++trial) {
+    RandomStream random(5, 1, trial);
+    const auto view_image = image_of(helix(), {.hidden = 1, .outliers = 3, .noise_px = 0.2}, random);
+    LabellingPrior misled = nominal;
+    misled.expected = turned_from(view_image.view, 40, 4, random);
+    const auto labelling = label_balls(helix(), view_image.candidates, misled);
+    EXPECT_TRUE(!labelling || right(*labelling, view_image, helix())) << trial;
+  }
+}
+
 }  // namespace
 }  // namespace helicarm::fiducials

@@ -90,6 +90,10 @@ void LabelSearch::try_scale(const std::array<int, 3>& candidates, double focal_p
   }
 }
 
+void LabelSearch::try_expected() {
+  if (scene_.expected) keep(match_and_fit(scene_, scene_.expected->view, required()));
+}
+
 int LabelSearch::required() const {
   return std::max(least_balls - 1, (ranking_.empty() ? 0 : ranking_.front().matched) - 3);
 }
@@ -158,6 +162,7 @@ void LabelSearch::try_symmetric_poses(const Hypothesis& h) {
 
 void LabelSearch::keep(Hypothesis hypothesis) {
   if (!std::isfinite(hypothesis.log_odds)) return;
+  if (scene_.expected && !scene_.expected->allows(hypothesis.fit.view)) return;
   const auto same = std::find_if(ranking_.begin(), ranking_.end(), [&](const Hypothesis& other) {
     return other.candidate_of_ball == hypothesis.candidate_of_ball &&
            other.mirrored() == hypothesis.mirrored();

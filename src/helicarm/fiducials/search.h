@@ -26,6 +26,9 @@ class LabelSearch {
   /// False if the three are nearly collinear or have been tried.
   bool try_triple(std::array<int, 3> candidates);
 
+  /// Matches and fits from the expected camera.
+  void try_expected();
+
   /// Adds the variants of `h` in which a candidate near a ball, but outside its gate, is assigned to it: an
   /// outlier assigned to a hidden ball can shift the fit until a true candidate is outside.
   void try_near_misses(const Hypothesis& h);

@@ -2,6 +2,7 @@
 #include "helicarm/phantom/calibrator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -10,11 +11,13 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "helicarm/core/codec.h"
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/phantom/ball_covariance.h"
 #include "helicarm/phantom/calibrator_limits.h"
 #include "helicarm/phantom/conical_helix.h"
+#include "helicarm/phantom/schemas.h"
 
 namespace helicarm::phantom {
 namespace {
@@ -22,24 +25,11 @@ namespace {
 constexpr std::size_t least_balls = 6;
 constexpr std::size_t most_balls = 1000;
 constexpr double least_flatness = 0.01;
+constexpr TextLimits name_limits{1, 200};
+constexpr std::array<std::string_view, 3> target_words{"ball", "cross", "line_end"};
 
 Eigen::Vector3d vector3(const std::vector<double>& values, std::size_t first = 0) {
   return {values[first], values[first + 1], values[first + 2]};
-}
-
-std::string name_of(JsonReader& reader, const char* key) {
-  std::string name = reader.text(key);
-  if (name.empty()) reader.refuse(Reason::bad_value, key, "is empty");
-  return name;
-}
-
-CalibratorBall ball_from(JsonReader reader) {
-  CalibratorBall ball{name_of(reader, "label"), vector3(reader.numbers("xyz_mm", 3, coordinate_range)),
-                      reader.number("diameter_mm", diameter_range)};
-  if (!reader.raw("covariance_mm2").is_null())
-    ball.covariance_mm2 = covariance_from(reader, "covariance_mm2", 3);
-  reader.finish();
-  return ball;
 }
 
 std::vector<Eigen::Vector3d> directions_from(JsonReader& reader, std::size_t count) {
@@ -56,13 +46,8 @@ std::vector<Eigen::Vector3d> directions_from(JsonReader& reader, std::size_t cou
   return directions;
 }
 
-CalibratorTarget target_from(JsonReader reader) {
-  CalibratorTarget target;
-  target.name = name_of(reader, "name");
-  target.point_in_calibrator = vector3(reader.numbers("xyz_mm", 3, coordinate_range));
-  target.kind = static_cast<TargetKind>(reader.choice("kind", {"ball", "cross", "line_end"}));
-  target.diameter_mm = reader.number("diameter_mm", diameter_range);
-  target.length_mm = reader.optional_number("length_mm", {0.1, 1000}).value_or(0);
+/// Of a cross two, of a line's end one, of a ball none.
+void read_directions(CalibratorTarget& target, JsonReader& reader) {
   if (target.kind == TargetKind::cross) {
     target.directions = directions_from(reader, 2);
     if (target.directions[0].cross(target.directions[1]).norm() < 0.01)
@@ -73,8 +58,6 @@ CalibratorTarget target_from(JsonReader reader) {
              !directions.is_null() && !directions.empty()) {
     reader.refuse(Reason::bad_value, "directions", "a ball has none");
   }
-  reader.finish();
-  return target;
 }
 
 void check_names(const Calibrator& calibrator, const std::string& origin) {
@@ -130,7 +113,112 @@ void check_places(const std::vector<CalibratorBall>& balls, const std::string& o
          {{"plane_rms_mm", sizes[2]}, {"limit_mm", least_flatness * sizes[0]}}});
 }
 
-Json numbers(const Eigen::Vector3d& v) { return Json::array({v.x(), v.y(), v.z()}); }
+Json rows_of(const auto& vectors) {
+  Json rows;
+  for (const Eigen::Vector3d& row : vectors) rows.push_back({row.x(), row.y(), row.z()});
+  return rows;
+}
+
+Json rows_of(const Eigen::Matrix3d& matrix) {
+  return rows_of(std::array<Eigen::Vector3d, 3>{matrix.row(0), matrix.row(1), matrix.row(2)});
+}
+
+template <class Codec, class Ball>
+void describe_ball(Codec& codec, Ball& ball) {
+  codec.text("label", ball.label, "unique among fiducials and targets", name_limits);
+  codec.vector("xyz_mm", ball.centre_in_calibrator, coordinate_range, "centre");
+  codec.number("diameter_mm", ball.diameter_mm, diameter_range, "of the ball");
+  codec.custom(
+      "covariance_mm2", false,
+      {{"type", "array"}, {"minItems", 3}, {"maxItems", 3}, {"items", {{"type", "array"}}}},
+      "3x3 covariance of the centre, entries -100 to 100; symmetric, without negative eigenvalues. It "
+      "includes the "
+      "contribution of `scale_sigma`, `scale_sigma`² (x - c)(x - c)ᵀ about the centroid c of all balls, "
+      "which "
+      "helicarm subtracts and propagates as one error common to all views",
+      [&](JsonReader& reader) {
+        if constexpr (!std::is_const_v<Ball>)
+          if (!reader.raw("covariance_mm2").is_null())
+            ball.covariance_mm2 = covariance_from(reader, "covariance_mm2", 3);
+      },
+      [&] { return ball.covariance_mm2 ? std::optional(rows_of(*ball.covariance_mm2)) : std::nullopt; });
+}
+
+template <class Codec, class Target>
+void describe_target(Codec& codec, Target& target) {
+  codec.text("name", target.name, "unique among fiducials and targets", name_limits);
+  codec.vector("xyz_mm", target.point_in_calibrator, coordinate_range, "of the point");
+  codec.required_choice(
+      "kind", target.kind, target_words,
+      "a ball; two wires whose axes meet at `xyz_mm`; a wire that ends at `xyz_mm` with a flat face");
+  codec.number("diameter_mm", target.diameter_mm, diameter_range, "of the ball or wire");
+  codec.custom(
+      "directions", false, {{"type", "array"}, {"maxItems", 2}, {"items", {{"type", "array"}}}},
+      "unit vectors (within 0.001): two for a cross, not parallel; one for a line end, from the end into the "
+      "wire; none "
+      "for a ball",
+      [&](JsonReader& reader) {
+        if constexpr (!std::is_const_v<Target>) read_directions(target, reader);
+      },
+      [&] { return target.directions.empty() ? std::nullopt : std::optional(rows_of(target.directions)); });
+  if (codec.wants(target.length_mm > 0))
+    codec.custom(
+        "length_mm", false, {{"type", "number"}, {"minimum", 0.1}, {"maximum", 1000}},
+        "of a wire; `null` or absent: not known",
+        [&](JsonReader& reader) {
+          if constexpr (!std::is_const_v<Target>)
+            target.length_mm = reader.optional_number("length_mm", {0.1, 1000}).value_or(0);
+        },
+        [&] { return std::optional(Json(target.length_mm)); });
+}
+
+/// calibrator.json (docs/formats.md).
+template <class Codec, class CalibratorValue>
+void describe_calibrator(Codec& codec, CalibratorValue& calibrator) {
+  constexpr bool reads = !std::is_const_v<CalibratorValue>;
+  codec.text("name", calibrator.name, "of the calibrator", name_limits);
+  codec.list("balls", calibrator.balls, true, most_balls, "the fiducials, 6 or more",
+             [](auto& entry, auto& ball) { describe_ball(entry, ball); });
+  codec.list("targets", calibrator.targets, false, most_balls,
+             "check points, never used for calibration: TRE is theirs",
+             [](auto& entry, auto& target) { describe_target(entry, target); });
+  if (codec.wants(calibrator.tolerance_mm > 0))
+    codec.number_or_default("tolerance_mm", calibrator.tolerance_mm, tolerance_range,
+                            "standard deviation per axis of every fiducial's position. Its square is added "
+                            "to `covariance_mm2`. Labelling, "
+                            "calibration and rejection use it; the estimated deviations of the fiducials "
+                            "from the file are reported in the "
+                            "note `calibrator_deviates`");
+  if (codec.wants(calibrator.scale_sigma > 0))
+    codec.number_or_default("scale_sigma", calibrator.scale_sigma, scale_sigma_range,
+                            "relative standard error of the scale common to all coordinates");
+  codec.custom(
+      "measured", false, {{"type", "object"}},
+      "of any content: how the coordinates were obtained. Copied to `calibrator.measured` of results",
+      [&](JsonReader& reader) {
+        if constexpr (reads) {
+          calibrator.measured = reader.raw("measured");
+          if (!calibrator.measured.is_null() && !calibrator.measured.is_object())
+            reader.refuse(Reason::bad_value, "measured", "is not an object");
+        }
+      },
+      [&] { return calibrator.measured.is_null() ? std::nullopt : std::optional(calibrator.measured); });
+  codec.custom(
+      "joint_covariance", false, {{"type", "object"}},
+      "covariance of all centres together: `{\"balls\": [labels], \"mm2\": 3n x 3n}`, 1 to 100 labels, which "
+      "include "
+      "those of all `balls` (further ones are ignored); its blocks equal the balls' `covariance_mm2`",
+      [&](JsonReader& reader) {
+        if constexpr (reads)
+          if (!reader.raw("joint_covariance").is_null())
+            calibrator.joint_covariance =
+                joint_covariance_from(reader.object("joint_covariance"), calibrator.balls);
+      },
+      [&] {
+        return calibrator.joint_covariance ? std::optional(to_json(*calibrator.joint_covariance))
+                                           : std::nullopt;
+      });
+}
 
 }  // namespace
 
@@ -146,19 +234,8 @@ Expected<Calibrator> calibrator_from_json(const Json& json, const std::string& o
   return guarded([&] {
     JsonReader reader(json, origin);
     Calibrator calibrator;
-    calibrator.name = name_of(reader, "name");
-    for (JsonReader& ball : reader.objects("balls", true, most_balls))
-      calibrator.balls.push_back(ball_from(ball));
-    for (JsonReader& target : reader.objects("targets", false, most_balls))
-      calibrator.targets.push_back(target_from(target));
-    if (!reader.raw("joint_covariance").is_null())
-      calibrator.joint_covariance =
-          joint_covariance_from(reader.object("joint_covariance"), calibrator.balls);
-    calibrator.tolerance_mm = reader.optional_number("tolerance_mm", tolerance_range).value_or(0);
-    calibrator.scale_sigma = reader.optional_number("scale_sigma", scale_sigma_range).value_or(0);
-    calibrator.measured = reader.raw("measured");
-    if (!calibrator.measured.is_null() && !calibrator.measured.is_object())
-      reader.refuse(Reason::bad_value, "measured", "is not an object");
+    FromJson codec(reader);
+    describe_calibrator(codec, calibrator);
     reader.finish();
     check_names(calibrator, origin);
     check_places(calibrator.balls, origin);
@@ -181,31 +258,14 @@ Expected<Calibrator> calibrator_named(const std::string& name_or_path, const std
 }
 
 Json to_json(const Calibrator& calibrator) {
-  constexpr const char* kinds[] = {"ball", "cross", "line_end"};
-  Json json{{"name", calibrator.name}, {"balls", Json::array()}, {"targets", Json::array()}};
-  if (calibrator.tolerance_mm > 0) json["tolerance_mm"] = calibrator.tolerance_mm;
-  if (calibrator.scale_sigma > 0) json["scale_sigma"] = calibrator.scale_sigma;
-  if (!calibrator.measured.is_null()) json["measured"] = calibrator.measured;
-  if (calibrator.joint_covariance) json["joint_covariance"] = to_json(*calibrator.joint_covariance);
-  for (const auto& ball : calibrator.balls) {
-    Json entry{{"label", ball.label},
-               {"xyz_mm", numbers(ball.centre_in_calibrator)},
-               {"diameter_mm", ball.diameter_mm}};
-    if (ball.covariance_mm2)
-      for (const auto& row : ball.covariance_mm2->rowwise())
-        entry["covariance_mm2"].push_back(numbers(row.transpose()));
-    json["balls"].push_back(std::move(entry));
-  }
-  for (const auto& target : calibrator.targets) {
-    Json entry{{"name", target.name},
-               {"xyz_mm", numbers(target.point_in_calibrator)},
-               {"kind", kinds[static_cast<int>(target.kind)]},
-               {"diameter_mm", target.diameter_mm}};
-    for (const auto& direction : target.directions) entry["directions"].push_back(numbers(direction));
-    if (target.length_mm > 0) entry["length_mm"] = target.length_mm;
-    json["targets"].push_back(std::move(entry));
-  }
-  return json;
+  ToJson codec;
+  describe_calibrator(codec, calibrator);
+  return std::move(codec.json);
+}
+
+Json calibrator_schema() {
+  const Calibrator shape;
+  return schema_of("calibrator.json", [&](ToSchema& codec) { describe_calibrator(codec, shape); });
 }
 
 Eigen::Vector3d middle_of(const Calibrator& calibrator) {

@@ -2,12 +2,15 @@
 #include "helicarm/phantom/plate.h"
 
 #include <algorithm>
+#include <array>
 #include <set>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "helicarm/core/codec.h"
 #include "helicarm/core/files.h"
+#include "helicarm/phantom/schemas.h"
 
 namespace helicarm::phantom {
 namespace {
@@ -15,6 +18,8 @@ namespace {
 constexpr std::size_t most_dots = 20000;
 constexpr Range pitch_range{1, 200};
 constexpr double lattice_tolerance_mm = 0.1;
+constexpr std::array<std::string_view, 2> dot_words{"balls", "holes"};
+constexpr std::array<std::string_view, 2> lattice_words{"square", "hexagonal"};
 
 std::vector<Eigen::Vector2d> dots_from(JsonReader& reader) {
   const Json& raw = reader.raw("dots_xy_mm");
@@ -33,6 +38,33 @@ std::vector<Eigen::Vector2d> dots_from(JsonReader& reader) {
   return dots;
 }
 
+Json json_of_dots(const std::vector<Eigen::Vector2d>& dots) {
+  Json json;
+  for (const auto& dot : dots) json.push_back({dot.x(), dot.y()});
+  return json;
+}
+
+/// plate.json (docs/formats.md).
+template <class Codec, class PlateValue>
+void describe_plate(Codec& codec, PlateValue& plate) {
+  codec.text("name", plate.name, "of the plate", {0, 200});
+  codec.required_choice("kind", plate.kind, dot_words, "what the dots are");
+  codec.required_choice("lattice", plate.lattice, lattice_words, "of the dots");
+  codec.number("pitch_mm", plate.pitch_mm, pitch_range, "distance of neighbouring dots, if it is known");
+  codec.number("diameter_mm", plate.diameter_mm, {0.1, 30}, "of a dot, below the pitch");
+  codec.custom(
+      "dots_xy_mm", false,
+      {{"type", "array"}, {"minItems", 1}, {"maxItems", most_dots}, {"items", {{"type", "array"}}}},
+      "1 to 20000 distinct `[x, y]`, each within -1000 to 1000 mm and within 0.1 mm of a lattice of that "
+      "pitch in any "
+      "rotation and translation; `null`: unbounded lattice",
+      [&](JsonReader& reader) {
+        if constexpr (!std::is_const_v<PlateValue>) plate.dots_mm = dots_from(reader);
+      },
+      [&] { return std::optional(json_of_dots(plate.dots_mm)); });
+  codec.number("height_above_receiver_mm", plate.height_above_receiver_mm, {0, 1000}, "of the dots' plane");
+}
+
 }  // namespace
 
 Plate plate48() {
@@ -47,13 +79,8 @@ Expected<Plate> plate_from_json(const Json& json, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(json, origin);
     Plate plate;
-    plate.name = reader.text("name");
-    plate.kind = static_cast<DotKind>(reader.choice("kind", {"balls", "holes"}));
-    plate.lattice = static_cast<Lattice>(reader.choice("lattice", {"square", "hexagonal"}));
-    plate.pitch_mm = reader.optional_number("pitch_mm", pitch_range);
-    plate.diameter_mm = reader.number("diameter_mm", {0.1, 30});
-    plate.dots_mm = dots_from(reader);
-    plate.height_above_receiver_mm = reader.optional_number("height_above_receiver_mm", {0, 1000});
+    FromJson codec(reader);
+    describe_plate(codec, plate);
     reader.finish();
     if (plate.pitch_mm && plate.diameter_mm >= *plate.pitch_mm)
       reader.refuse(Reason::bad_value, "diameter_mm",
@@ -83,18 +110,14 @@ Expected<Plate> plate_named(const std::string& name_or_path, const std::filesyst
 }
 
 Json to_json(const Plate& plate) {
-  const auto or_null = [](const std::optional<double>& value) {
-    return value ? Json(*value) : Json(nullptr);
-  };
-  Json json{{"name", plate.name},
-            {"kind", plate.kind == DotKind::balls ? "balls" : "holes"},
-            {"lattice", plate.lattice == Lattice::square ? "square" : "hexagonal"},
-            {"pitch_mm", or_null(plate.pitch_mm)},
-            {"diameter_mm", plate.diameter_mm},
-            {"dots_xy_mm", nullptr},
-            {"height_above_receiver_mm", or_null(plate.height_above_receiver_mm)}};
-  for (const auto& dot : plate.dots_mm) json["dots_xy_mm"].push_back({dot.x(), dot.y()});
-  return json;
+  ToJson codec(ToJson::Unset::null);
+  describe_plate(codec, plate);
+  return std::move(codec.json);
+}
+
+Json plate_schema() {
+  const Plate shape;
+  return schema_of("plate.json", [&](ToSchema& codec) { describe_plate(codec, shape); });
 }
 
 }  // namespace helicarm::phantom

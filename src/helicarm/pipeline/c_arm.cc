@@ -5,16 +5,19 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/core/files.h"
 #include "helicarm/core/statistics.h"
 #include "helicarm/pipeline/measure.h"
 #include "helicarm/pipeline/prior.h"
 
 namespace helicarm::pipeline {
 
-Expected<CArmAcquisitions> c_arm_acquisitions(const Case& given, unsigned threads) {
+namespace {
+
+Expected<CArmAcquisitions> measured_acquisitions(const Case& given, unsigned threads) {
   RunOptions options;
   options.threads = threads;
-  options.history = calibration::CArmHistory();
   return measure(given, options).and_then([](const Measurement& measured) -> Expected<CArmAcquisitions> {
     const Result& result = measured.result;
     if (result.failure) return tl::unexpected<Failure>(*result.failure);
@@ -24,6 +27,25 @@ Expected<CArmAcquisitions> c_arm_acquisitions(const Case& given, unsigned thread
           "the residuals contradict the noise model, or no view alone determines its camera: the case "
           "says nothing of the C-arm");
     return CArmAcquisitions{result.entries, result.warnings};
+  });
+}
+
+}  // namespace
+
+Expected<CArmAcquisitions> c_arm_acquisitions(const std::filesystem::path& from, unsigned threads) {
+  std::filesystem::path result = from;
+  if (std::filesystem::is_directory(from)) {
+    const auto holds = [&](const char* name) { return std::filesystem::exists(from / name); };
+    if (holds("case.json") || (!holds("result.json") && !holds("sweep.json")))
+      return read_case(from).and_then(
+          [&](const Case& given) { return measured_acquisitions(given, threads); });
+    result /= holds("result.json") ? "result.json" : "sweep.json";
+  }
+  return read_json(result).and_then([&](const Json& json) {
+    return calibration::acquisitions_of_result(json, result.string())
+        .map([](std::vector<calibration::HistoryEntry> entries) {
+          return CArmAcquisitions{std::move(entries), {}};
+        });
   });
 }
 

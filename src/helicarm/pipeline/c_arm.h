@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <vector>
 
 #include "helicarm/calibration/c_arm_model.h"
@@ -15,9 +16,10 @@ struct CArmAcquisitions {
   std::vector<Finding> warnings;
 };
 
-/// Measures a case. Fails as `measure`, with a refused case's own failure, and with residual_too_large where
-/// its views say nothing of the C-arm.
-Expected<CArmAcquisitions> c_arm_acquisitions(const Case& given, unsigned threads);
+/// Measures the case in a folder, or reads a result.json or sweep.json (or a folder that holds one and no
+/// case). Fails as `read_case`, `measure` and `acquisitions_of_result`, with a refused case's own failure,
+/// and with residual_too_large where its views say nothing of the C-arm.
+Expected<CArmAcquisitions> c_arm_acquisitions(const std::filesystem::path& from, unsigned threads);
 
 /// The model of a record; a record without acquisitions is too_few_views. `origin`: the record's file.
 Expected<calibration::CArmModel> model_of_record(const calibration::CArmHistory& record,

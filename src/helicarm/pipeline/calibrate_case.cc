@@ -142,7 +142,7 @@ OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& give
     return tl::unexpected(std::move(refusal));
   }
   calibration->images = std::move(views);
-  if (options.history) calibration->entries = new_entries(*calibration, common_prior(given.calibrator));
+  calibration->entries = new_entries(*calibration, common_prior(given.calibrator));
   return *std::move(calibration);
 }
 

@@ -2,60 +2,16 @@
 #include "helicarm/pipeline/case.h"
 
 #include <algorithm>
-#include <set>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/core/json.h"
-#include "helicarm/geometry/view_json.h"
-#include "helicarm/pipeline/case_json.h"
-#include "helicarm/pipeline/poses_json.h"
-#include "helicarm/xray/dicom_acquisition.h"
+#include "helicarm/pipeline/case_description.h"
 
 namespace helicarm::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t most_views = 50;
-constexpr std::size_t most_picks = 1000;
-constexpr std::size_t most_note_characters = 100000;
-constexpr Range pixel_range{-0.5, 65535};
-constexpr Range place_range{-10000, 10000};
-
-template <class T, class Name>
-const T* find_named(const std::vector<T>& all, const std::string& name, Name name_of) {
-  const auto found = std::ranges::find(all, name, name_of);
-  return found == all.end() ? nullptr : &*found;
-}
-
-std::string name_from(JsonReader& reader, const char* key) {
-  std::string name = reader.text(key, 100);
-  if (name.empty()) reader.refuse(Reason::bad_value, key, "is empty");
-  return name;
-}
-
-void take_name(const JsonReader& reader, std::set<std::string>& names, const std::string& name) {
-  if (!names.insert(name).second)
-    reader.refuse(Reason::name_clash, "name", fmt::format("\"{}\" is given twice", name));
-}
-
-Eigen::Vector3d place_from(JsonReader& reader, const char* key) {
-  return Eigen::Vector3d(reader.numbers(key, 3, place_range).data());
-}
-
-fs::path file_named(const std::string& name, const JsonReader& reader, const char* key,
-                    const fs::path& folder) {
-  const auto path = path_inside(folder, name);
-  if (!path) reader.refuse(path.error().reason, key, path.error().message);
-  return *path;
-}
-
-std::optional<fs::path> file_from(JsonReader& reader, const char* key, const fs::path& folder) {
-  const auto name = reader.optional_text(key, 1000);
-  return name ? std::optional(file_named(*name, reader, key, folder)) : std::nullopt;
-}
 
 /// A pose whose translation is in metres: turned against the tracker's frame, yet within 10 mm of its origin.
 /// A frame that is a marker's own, or follows one, is not turned.
@@ -113,155 +69,6 @@ void refuse_metres(const Case& read) {
        {{"farthest_mm", farthest}, {"limit_mm", least_mm}}});
 }
 
-CaseView view_from(JsonReader reader, const Case& known) {
-  const fs::path& folder = known.folder;
-  CaseView view;
-  view.name = name_from(reader, "name");
-  view.image = file_named(reader.text("image", 1000), reader, "image", folder);
-  if (!reader.raw("frame").is_null()) view.frame = reader.integer("frame", 1, 100000);
-  if (!reader.raw("frames").is_null())
-    reader.refuse(Reason::bad_value, "frames",
-                  "makes the view a run of images: calibrate it with `helicarm sweep`, or name one image by "
-                  "\"frame\"");
-  view.plate_image = file_from(reader, "plate_image", folder);
-  view.map = file_from(reader, "map", folder);
-  if (view.plate_image && view.map)
-    reader.refuse(Reason::bad_value, "map", "cannot be combined with \"plate_image\"");
-  if (!reader.raw("mirrored").is_null()) view.mirrored = reader.boolean("mirrored", false);
-  view.pixel_mm = reader.optional_number("pixel_mm", {xray::min_pixel_mm, xray::max_pixel_mm});
-  view.source_detector_mm = reader.optional_number(
-      "source_detector_mm", {xray::min_source_detector_mm, xray::max_source_detector_mm});
-  if (!reader.raw("poses").is_null())
-    view.poses = poses_from(reader.object("poses"), known.bones, OtherMarker::calibrator);
-  reader.finish();
-  return view;
-}
-
-BoneLabel bone_label_from(JsonReader reader) {
-  BoneLabel bone{name_from(reader, "name")};
-  if (!reader.raw("side").is_null()) bone.side = static_cast<Side>(reader.choice("side", {"left", "right"}));
-  reader.finish();
-  return bone;
-}
-
-Pick pick_from(JsonReader reader, const std::vector<CaseView>& views,
-               const std::vector<guidance::Bone>& bones) {
-  Pick pick;
-  pick.name = name_from(reader, "name");
-  pick.view = name_from(reader, "view");
-  if (!find_named(views, pick.view, &CaseView::name))
-    reader.refuse(Reason::bad_value, "view", fmt::format("\"{}\" is not a view of the case", pick.view));
-  pick.uv_raw = Eigen::Vector2d(reader.numbers("uv", 2, pixel_range).data());
-  if (!reader.raw("snap").is_null()) pick.snap = static_cast<Snap>(reader.choice("snap", {"none", "ball"}));
-  pick.diameter_mm = reader.optional_number("diameter_mm", {0.5, 30}).value_or(pick.diameter_mm);
-  pick.sigma_px = reader.optional_number("sigma_px", {0, 100});
-  if (!reader.raw("moves_with").is_null()) pick.moves_with = bone_from(reader, "moves_with", bones);
-  if (!reader.raw("bone").is_null()) pick.bone = bone_label_from(reader.object("bone"));
-  reader.finish();
-  return pick;
-}
-
-std::vector<Pick> picks_of(JsonReader& reader, const std::vector<CaseView>& views,
-                           const std::vector<guidance::Bone>& bones,
-                           const std::vector<phantom::CalibratorTarget>& targets) {
-  std::vector<Pick> picks;
-  std::set<std::pair<std::string, std::string>> clicks;
-  for (JsonReader& entry : reader.objects("picks", false, most_picks)) {
-    Pick pick = pick_from(entry, views, bones);
-    if (!clicks.emplace(pick.name, pick.view).second)
-      entry.refuse(Reason::name_clash, "name",
-                   fmt::format("\"{}\" is given twice in {}", pick.name, pick.view));
-    if (find_named(targets, pick.name, &phantom::CalibratorTarget::name))
-      entry.refuse(Reason::name_clash, "name",
-                   fmt::format("\"{}\" is a target of the calibrator", pick.name));
-    const Pick* other = find_named(picks, pick.name, &Pick::name);
-    if (other && other->moves_with != pick.moves_with)
-      entry.refuse(Reason::bad_value, "moves_with",
-                   fmt::format("of \"{}\" differs between views", pick.name));
-    picks.push_back(std::move(pick));
-  }
-  return picks;
-}
-
-std::vector<TunnelPlan> tunnels_from(JsonReader& reader, const std::vector<Pick>& picks) {
-  std::vector<TunnelPlan> tunnels;
-  std::set<std::string> names;
-  for (JsonReader& entry : reader.objects("tunnels", false, most_picks)) {
-    TunnelPlan tunnel{name_from(entry, "name"), name_from(entry, "start"), name_from(entry, "end")};
-    take_name(entry, names, tunnel.name);
-    for (const auto& [key, pick] : {std::pair{"start", &tunnel.start}, {"end", &tunnel.end}})
-      if (!find_named(picks, *pick, &Pick::name))
-        entry.refuse(Reason::bad_value, key, fmt::format("\"{}\" is not a pick of the case", *pick));
-    entry.finish();
-    tunnels.push_back(std::move(tunnel));
-  }
-  return tunnels;
-}
-
-std::vector<guidance::ToolLine> tool_lines_from(JsonReader& reader, const std::vector<TunnelPlan>& tunnels) {
-  std::vector<guidance::ToolLine> lines;
-  std::set<std::string> names;
-  for (JsonReader& entry : reader.objects("tool_lines", false, most_picks)) {
-    guidance::ToolLine line{name_from(entry, "name"), name_from(entry, "tunnel"),
-                            place_from(entry, "p1_in_calibrator"), place_from(entry, "p2_in_calibrator")};
-    take_name(entry, names, line.name);
-    if (!find_named(tunnels, line.tunnel, &TunnelPlan::name))
-      entry.refuse(Reason::bad_value, "tunnel",
-                   fmt::format("\"{}\" is not a tunnel of the case", line.tunnel));
-    if ((line.p2_in_calibrator - line.p1_in_calibrator).norm() < 1)
-      entry.refuse(Reason::bad_value, "p2_in_calibrator", "is less than 1 mm from \"p1_in_calibrator\"");
-    entry.finish();
-    lines.push_back(std::move(line));
-  }
-  return lines;
-}
-
-guidance::TrackerNoise tracker_from(JsonReader reader) {
-  guidance::TrackerNoise noise;
-  noise.sigma_mm = reader.number("sigma_mm", {0, 100});
-  noise.sigma_deg = reader.number("sigma_deg", {0, 90});
-  if (!reader.raw("samples").is_null())
-    noise.samples = static_cast<guidance::Samples>(reader.choice("samples", {"shared", "independent"}));
-  reader.finish();
-  return noise;
-}
-
-std::vector<double> diameters_from(JsonReader& reader) {
-  constexpr std::size_t most_kinds = 10;
-  const Json& list = reader.raw("diameters_mm");
-  if (list.is_null()) return {};
-  if (!list.is_array() || list.empty() || list.size() > most_kinds)
-    reader.refuse(Reason::bad_value, "diameters_mm",
-                  fmt::format("is not a list of 1 to {} numbers", most_kinds));
-  return reader.numbers("diameters_mm", list.size(), {0.5, 30});
-}
-
-void read_calibrator_of(Case& read, JsonReader& reader, Purpose purpose) {
-  read.diameters_mm = diameters_from(reader);
-  if (purpose == Purpose::cameras && reader.raw("calibrator").is_null()) return;
-  if (purpose == Purpose::phantom && reader.raw("calibrator").is_null()) {
-    if (read.diameters_mm.empty())
-      reader.refuse(Reason::bad_value, "diameters_mm", "is missing: required where \"calibrator\" is null");
-    return;
-  }
-  read.calibrator_name = reader.text("calibrator", 1000);
-  read.calibrator = value_or_throw(phantom::calibrator_named(read.calibrator_name, read.folder));
-}
-
-std::vector<CaseView> views_from(JsonReader& reader, const Case& known, Purpose purpose) {
-  std::vector<CaseView> views;
-  std::set<std::string> names;
-  const std::size_t most = purpose == Purpose::sweep ? most_frames : most_views;
-  for (JsonReader& entry : reader.objects("views", true, most)) {
-    views.push_back(view_from(entry, known));
-    take_name(entry, names, views.back().name);
-    if (views.back().plate_image && !known.plate)
-      entry.refuse(Reason::bad_value, "plate_image", "is given, but the case has no plate");
-  }
-  if (views.empty()) reader.refuse(Reason::bad_value, "views", "is empty: at least one view is required");
-  return views;
-}
-
 void warn_of_name(Case& read) {
   if (read.calibrator.name == phantom::udcsc().name &&
       !phantom::same_places(read.calibrator, phantom::udcsc()))
@@ -276,29 +83,55 @@ void warn_of_name(Case& read) {
 
 }  // namespace
 
+namespace description {
+
+void read_calibrator(Case& read, JsonReader& reader, Purpose purpose) {
+  const bool is_null = reader.raw("calibrator").is_null();
+  if (purpose == Purpose::cameras && is_null) return;
+  if (purpose == Purpose::phantom && is_null) {
+    if (reader.raw("diameters_mm").is_null())
+      reader.refuse(Reason::bad_value, "diameters_mm", "is missing: required where \"calibrator\" is null");
+    return;
+  }
+  read.calibrator_name = reader.text("calibrator", 1000);
+  read.calibrator = value_or_throw(phantom::calibrator_named(read.calibrator_name, read.folder));
+}
+
+void read_plate(Case& read, JsonReader& reader) {
+  read.plate_name = reader.optional_text("plate", 1000);
+  if (read.plate_name) read.plate = value_or_throw(phantom::plate_named(*read.plate_name, read.folder));
+}
+
+}  // namespace description
+
 Case case_of(const Json& json, const std::string& origin, const fs::path& folder, Purpose purpose) {
   JsonReader reader(json, origin);
-  reader.choice("format", {"helicarm-case/2", "helicarm-case/1"});
-  const auto notes = reader.optional_text("notes", most_note_characters);
-  reader.raw("models");  // of the registration
   Case read;
   read.folder = folder;
-  read.notes = notes.value_or("");
-  read.bones = bones_from(reader);
-  read_calibrator_of(read, reader, purpose);
-  read.plate_name = reader.optional_text("plate", 1000);
-  if (read.plate_name) read.plate = value_or_throw(phantom::plate_named(*read.plate_name, folder));
-  read.views = views_from(reader, read, purpose);
-  if (!reader.raw("poses_now").is_null())
-    read.poses_now = poses_from(reader.object("poses_now"), read.bones, OtherMarker::tool);
-  if (!reader.raw("tracker").is_null()) read.tracker = tracker_from(reader.object("tracker"));
-  read.picks = picks_of(reader, read.views, read.bones, read.calibrator.targets);
-  read.tunnels = tunnels_from(reader, read.picks);
-  read.tool_lines = tool_lines_from(reader, read.tunnels);
+  FromJson codec(reader);
+  description::describe_case(codec, read, purpose);
   reader.finish();
   refuse_metres(read);
   warn_of_name(read);
   return read;
+}
+
+Json to_json(const Case& written) {
+  ToJson codec;
+  description::describe_case(codec, written, Purpose::run);
+  return std::move(codec.json);
+}
+
+Json to_json(const Pick& pick) {
+  ToJson codec;
+  description::describe_pick(codec, pick, {}, {});
+  return std::move(codec.json);
+}
+
+Json case_schema() {
+  const Case shape;
+  return schema_of("case.json",
+                   [&](ToSchema& codec) { description::describe_case(codec, shape, Purpose::run); });
 }
 
 namespace {
@@ -316,7 +149,7 @@ Expected<Case> checked_case(Case given) {
     for (const Pick& pick : given.picks) picks.push_back(to_json(pick));
     value_or_throw(picks_from(picks, "case.json", given.views, given.bones));
     for (const Pick& pick : given.picks)
-      if (find_named(given.calibrator.targets, pick.name, &phantom::CalibratorTarget::name))
+      if (description::find_named(given.calibrator.targets, pick.name, &phantom::CalibratorTarget::name))
         throw BadInput(Reason::name_clash,
                        fmt::format("pick \"{}\": is the name of a target of the calibrator", pick.name));
     refuse_metres(given);
@@ -331,7 +164,10 @@ Expected<std::vector<Pick>> picks_from(const Json& picks, const std::string& ori
   return guarded([&] {
     const Json json = {{"picks", picks}};
     JsonReader reader(json, origin);
-    return picks_of(reader, views, bones, {});
+    std::vector<Pick> read;
+    FromJson codec(reader);
+    description::describe_picks(codec, read, views, bones, {});
+    return read;
   });
 }
 

@@ -94,6 +94,9 @@ Expected<Case> read_case(const std::filesystem::path& path);
 /// case.json, the inverse of `read_case`. Its images, calibrator and plate must lie in the folder.
 Json to_json(const Case& written);
 
+/// The JSON Schema of case.json (docs/schemas).
+Json case_schema();
+
 /// What `read_case` checks of picks and poses, for values that are from no file; adds the warnings. Fails as
 /// `picks_from`, with name_clash for a pick named as a target, and with bad_value for poses in metres.
 Expected<Case> checked_case(Case given);

@@ -12,7 +12,7 @@
 namespace helicarm::pipeline {
 namespace {
 
-constexpr std::size_t most_bones = 20, most_name_characters = 100;
+constexpr std::size_t most_name_characters = 100;
 constexpr std::array other_frames{"calibrator", "tool", "tracker", "robot_base", "camera", "image", "world"};
 constexpr Range pose_range{-100000, 100000};
 

@@ -10,6 +10,8 @@
 /// JsonReader.
 namespace helicarm::pipeline {
 
+inline constexpr std::size_t most_bones = 20;
+
 /// "bones": 0 to 20 different names, by default the knee's. Refuses the name of another frame (name_clash).
 std::vector<guidance::Bone> bones_from(JsonReader& reader);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/fiducials/status_words.h"
 #include "helicarm/pipeline/diagnosis/advice.h"
 #include "helicarm/pipeline/view_parameters.h"
@@ -361,6 +362,7 @@ Json to_json(const Result& result) {
       {"dof", result.dof > 0 ? Json(result.dof) : Json(nullptr)},
       {"variance_scale", result.dof > 0 ? number(result.variance_scale) : Json(nullptr)}};
   json["machine"] = json_of(result.history);
+  json["acquisitions"] = calibration::acquisitions_json(result.entries);
   json["points"] = list_of(result.points, result.views, result.bones);
   json["accuracy"] = json_of(result.accuracy);
   json["tunnels"] = Json::array();

@@ -43,8 +43,17 @@ void keep_used_rows(calibration::ViewFiducials& view, const std::vector<fiducial
   view.map_covariance_px2 = view.map_covariance_px2(kept, kept).eval();
 }
 
+pipeline::LabelledView labelled_near(pipeline::DetectedView view, const fiducials::ExpectedView& expected,
+                                     const pipeline::Case& one, const pipeline::RunOptions& options) {
+  const fiducials::FiducialOptions how{options.method, {}, one.views.front().mirrored, expected};
+  auto labels = value_or_throw(
+      fiducials::label_fiducials(*view.xray_image, view.rectification, view.candidates, one.calibrator, how));
+  return {std::move(view), std::move(labels)};
+}
+
 void estimate_from(FrameEstimate& estimate, const Frame& frame, xray::XrayImage image,
-                   const pipeline::Case& base, const pipeline::RunOptions& options) {
+                   const pipeline::Case& base, const pipeline::RunOptions& options,
+                   const std::optional<fiducials::ExpectedView>& expected) {
   value_or_throw(rectification::check_usable(image));
   pipeline::Case one = base;
   one.views = {frame.view};
@@ -53,10 +62,12 @@ void estimate_from(FrameEstimate& estimate, const Frame& frame, xray::XrayImage 
   const auto& map = rectified.front().rectification.map;
   if (map.rectified_plane == rectification::RectifiedPlane::detector || map.is_identity())
     estimate.pixel_mm = map.rectified_pixel_mm;
-  const auto labelled = passed(pipeline::label_views(
-      passed(pipeline::detect_in_views(std::move(rectified), one, options)), one, options));
-  estimate.fiducials = pipeline::fiducials_of(labelled.front());
-  for (const Warning& warning : labelled.front().fiducials.warnings) estimate.warnings.push_back(warning);
+  auto detected = passed(pipeline::detect_in_views(std::move(rectified), one, options));
+  const pipeline::LabelledView labelled =
+      expected ? labelled_near(std::move(detected.front()), *expected, one, options)
+               : passed(pipeline::label_views(std::move(detected), one, options)).front();
+  estimate.fiducials = pipeline::fiducials_of(labelled);
+  for (const Warning& warning : labelled.fiducials.warnings) estimate.warnings.push_back(warning);
   value_or_throw(calibrate_alone(estimate, base));
 }
 
@@ -75,7 +86,8 @@ Expected<void> calibrate_alone(FrameEstimate& estimate, const pipeline::Case& ba
 }
 
 Expected<FrameEstimate> estimate_frame(const Frame& frame, const xray::ImageFile* file,
-                                       const pipeline::Case& base, const pipeline::RunOptions& options) {
+                                       const pipeline::Case& base, const pipeline::RunOptions& options,
+                                       const std::optional<fiducials::ExpectedView>& expected) {
   FrameEstimate estimate;
   const auto done = guarded([&] {
     xray::XrayImage image = image_of(frame, file);
@@ -83,10 +95,11 @@ Expected<FrameEstimate> estimate_frame(const Frame& frame, const xray::ImageFile
     estimate.primary_angle_deg = image.acquisition.primary_angle_deg;
     estimate.secondary_angle_deg = image.acquisition.secondary_angle_deg;
     estimate.source_detector_mm = image.acquisition.source_detector_mm;
+    estimate.image = image.acquisition.instance_key;
     estimate.warnings = image.warnings;
     pipeline::RunOptions alone = options;
     alone.threads = 1;
-    estimate_from(estimate, frame, std::move(image), base, alone);
+    estimate_from(estimate, frame, std::move(image), base, alone, expected);
   });
   if (done) return estimate;
   if (exit_code(done.error().reason) == 2) return tl::unexpected<Failure>(done.error());

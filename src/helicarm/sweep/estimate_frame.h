@@ -19,6 +19,7 @@ struct FrameEstimate {
   std::optional<double> pixel_mm;                                ///< on the detector, of a rectified pixel
   std::optional<double> primary_angle_deg, secondary_angle_deg;  ///< as the file states
   std::optional<double> source_detector_mm;                      ///< likewise
+  std::string image;                                             ///< digest of the pixels
   calibration::ViewFiducials fiducials;  ///< labelled by the evidence of this image; outliers are `rejected`
   std::optional<calibration::CalibratedView> alone;
   double variance_scale = 1;  ///< of the residuals over the noise model, where inconsistent
@@ -26,9 +27,11 @@ struct FrameEstimate {
 };
 
 /// Reads, rectifies, detects, labels and calibrates one image. `file`: the opened file of a run, null for a
-/// file of its own. Unreadable input (exit code 2) fails, a refusal is in the estimate.
+/// file of its own. `expected`: the camera by the neighbouring images, for labels that this image alone
+/// leaves open. Unreadable input (exit code 2) fails, a refusal is in the estimate.
 Expected<FrameEstimate> estimate_frame(const Frame& frame, const xray::ImageFile* file,
-                                       const pipeline::Case& base, const pipeline::RunOptions& options);
+                                       const pipeline::Case& base, const pipeline::RunOptions& options,
+                                       const std::optional<fiducials::ExpectedView>& expected = {});
 
 /// Sets `alone`, residuals and rejections of labelled fiducials, by their image alone. Fails as
 /// `calibration::calibrate`.

@@ -21,6 +21,11 @@ namespace {
 
 constexpr std::size_t least_smooth = 16;  // frames of a smooth path
 
+const xray::ImageFile* file_of(const Frame& frame, const SweepCase& given) {
+  const auto file = given.files.find(frame.view.image);
+  return file == given.files.end() ? nullptr : file->second.get();
+}
+
 /// Each frame's estimate; unreadable input is thrown.
 std::vector<FrameEstimate> estimates_of(const SweepCase& given, const SweepOptions& options,
                                         const std::function<void(double)>& progress) {
@@ -30,9 +35,7 @@ std::vector<FrameEstimate> estimates_of(const SweepCase& given, const SweepOptio
   std::mutex guard;
   std::size_t done = 0;
   parallel_for(count, options.threads, [&](std::size_t i) {
-    const auto file = given.files.find(given.frames[i].view.image);
-    made[i] = estimate_frame(given.frames[i], file == given.files.end() ? nullptr : file->second.get(),
-                             given.base, run);
+    made[i] = estimate_frame(given.frames[i], file_of(given.frames[i], given), given.base, run);
     const std::lock_guard lock(guard);
     if (progress) progress(double(++done) / double(count));
   });
@@ -120,29 +123,95 @@ double noise_factor(const std::vector<FrameEstimate>& estimates) {
   return dof < enough_dof ? std::max(1.0, factor) : std::max(least, factor);
 }
 
-/// Calibrates each frame again with the run's noise, and refuses those whose residuals exceed it.
-void calibrate_with(double factor, const SweepCase& given, std::vector<FrameEstimate>& estimates,
-                    unsigned threads) {
+/// Calibrates a frame again with the run's noise, and refuses it if its residuals exceed that.
+void calibrate_with(double factor, const SweepCase& given, FrameEstimate& at, const std::string& view) {
   constexpr double largest_ratio = 4;  // of a frame's residuals to the run's noise
-  parallel_for(estimates.size(), threads, [&](std::size_t i) {
-    FrameEstimate& at = estimates[i];
-    if (at.failure) return;
-    for (fiducials::Fiducial& ball : at.fiducials.fiducials) ball.sigma_px *= factor;
-    at.fiducials.map_covariance_px2 *= factor * factor;
-    at.fiducials.start = at.alone->view;
-    auto again = calibrate_alone(at, given.base);
-    if (again) {
-      const double ratio = std::sqrt(at.alone->chi2 / std::max(1, at.alone->dof));
-      if (ratio > largest_ratio)
-        again =
-            fail(Reason::residual_too_large,
-                 fmt::format("residuals are {:.1f} times those of the other images, limit {:g}: labels are "
-                             "wrong, or a fiducial moved",
-                             ratio, largest_ratio),
-                 {{"ratio", ratio}, {"limit", largest_ratio}});
-    }
-    if (!again) refuse(at, again.error(), given.frames[i].view.name);
+  if (at.failure) return;
+  for (fiducials::Fiducial& ball : at.fiducials.fiducials) ball.sigma_px *= factor;
+  at.fiducials.map_covariance_px2 *= factor * factor;
+  at.fiducials.start = at.alone->view;
+  auto again = calibrate_alone(at, given.base);
+  if (again) {
+    const double ratio = std::sqrt(at.alone->chi2 / std::max(1, at.alone->dof));
+    if (ratio > largest_ratio)
+      again = fail(Reason::residual_too_large,
+                   fmt::format("residuals are {:.1f} times those of the other images, limit {:g}: labels are "
+                               "wrong, or a fiducial moved",
+                               ratio, largest_ratio),
+                   {{"ratio", ratio}, {"limit", largest_ratio}});
+  }
+  if (!again) refuse(at, again.error(), view);
+}
+
+/// The camera between two others, by the share of the way; nothing where the run turns by too much between
+/// them.
+std::optional<fiducials::ExpectedView> camera_between(const geometry::View& before,
+                                                      const geometry::View& after, double share) {
+  constexpr double most_deg = 15, least_within_deg = 2, of_the_way = 0.5;
+  const Eigen::Quaterniond first(before.camera_from_world.rotation), last(after.camera_from_world.rotation);
+  const double turned_deg = first.angularDistance(last) * 180 / EIGEN_PI;
+  if (turned_deg > most_deg) return {};
+  const auto mean = [&](const auto& a, const auto& b) { return ((1 - share) * a + share * b).eval(); };
+  geometry::View view = before;
+  view.camera_from_world.rotation = first.slerp(share, last).toRotationMatrix();
+  view.camera_from_world.translation =
+      -view.camera_from_world.rotation * mean(before.source_in_world(), after.source_in_world());
+  const geometry::Intrinsics &k = before.intrinsics, &l = after.intrinsics;
+  const Eigen::Vector4d inner =
+      mean(Eigen::Vector4d(k.fx, k.fy, k.u0, k.v0), Eigen::Vector4d(l.fx, l.fy, l.u0, l.v0));
+  view.intrinsics = {inner[0], inner[1], inner[2], inner[3]};
+  return fiducials::ExpectedView{view, std::max(least_within_deg, of_the_way * turned_deg)};
+}
+
+/// Labels again the frames that their image alone leaves ambiguous and whose camera the accepted frames on
+/// both sides tell. A phantom seen along its axis, or half out of the field, looks alike from two directions:
+/// a run does not jump.
+void label_by_neighbours(double factor, const SweepCase& given, std::vector<FrameEstimate>& estimates,
+                         unsigned threads) {
+  constexpr std::ptrdiff_t reach = 5;  // frames on either side
+  const std::vector<FrameEstimate> alone = estimates;
+  const auto accepted = [&](std::ptrdiff_t i) {
+    return i >= 0 && i < std::ssize(alone) && !alone[std::size_t(i)].failure;
+  };
+  parallel_for(estimates.size(), threads, [&](std::size_t index) {
+    const auto i = std::ptrdiff_t(index);
+    if (!alone[index].failure || alone[index].failure->reason != Reason::ambiguous_labels) return;
+    std::ptrdiff_t before = i - 1, after = i + 1;
+    while (before >= i - reach && !accepted(before)) --before;
+    while (after <= i + reach && !accepted(after)) ++after;
+    if (!accepted(before) || !accepted(after)) return;
+    const auto expected =
+        camera_between(alone[std::size_t(before)].alone->view, alone[std::size_t(after)].alone->view,
+                       double(i - before) / double(after - before));
+    if (!expected) return;
+    const Frame& frame = given.frames[index];
+    auto again = estimate_frame(frame, file_of(frame, given), given.base, {}, expected);
+    if (!again || again->failure) return;
+    calibrate_with(factor, given, *again, frame.view.name);
+    if (!again->failure) estimates[index] = *std::move(again);
   });
+}
+
+/// One run tells of its own noise and calibrator many times over: more of its frames would crowd out other
+/// days.
+std::vector<calibration::HistoryEntry> acquisitions_of(const std::vector<FrameEstimate>& estimates,
+                                                       const SweepCase& given) {
+  constexpr std::size_t most = 40;
+  std::vector<std::size_t> told;
+  for (std::size_t i = 0; i < estimates.size(); ++i)
+    if (!estimates[i].failure && estimates[i].variance_scale == 1) told.push_back(i);
+  std::vector<calibration::HistoryEntry> entries;
+  const calibration::CommonPrior common = pipeline::common_prior(given.base.calibrator);
+  const std::size_t count = std::min(most, told.size());
+  for (std::size_t k = 0; k < count; ++k) {
+    const FrameEstimate& at = estimates[told[k * told.size() / count]];
+    auto entry = calibration::history_entry_of(at.fiducials, at.image, common);
+    if (!entry) continue;
+    entry->primary_deg = at.primary_angle_deg;
+    entry->secondary_deg = at.secondary_angle_deg;
+    entries.push_back(*std::move(entry));
+  }
+  return entries;
 }
 
 bool is_one_run(const SweepCase& given) {
@@ -292,7 +361,10 @@ Sweep swept(const SweepCase& given, const SweepOptions& options,
   sweep.detector = detector_of(given, estimates, sweep.pixel_known);
   take_handedness(given, estimates, sweep.detector);
   sweep.noise_factor = noise_factor(estimates);
-  calibrate_with(sweep.noise_factor, given, estimates, options.threads);
+  parallel_for(estimates.size(), options.threads, [&](std::size_t i) {
+    calibrate_with(sweep.noise_factor, given, estimates[i], given.frames[i].view.name);
+  });
+  if (is_one_run(given)) label_by_neighbours(sweep.noise_factor, given, estimates, options.threads);
   const auto accepted =
       std::size_t(std::ranges::count_if(estimates, [](const auto& at) { return !at.failure; }));
   for (std::size_t i = 0; i < estimates.size(); ++i)
@@ -303,6 +375,7 @@ Sweep swept(const SweepCase& given, const SweepOptions& options,
   }
   const PathKind kind = options.path.value_or(accepted >= least_smooth && is_one_run(given) ? PathKind::smooth
                                                                                             : PathKind::free);
+  sweep.acquisitions = acquisitions_of(estimates, given);
   report_images(sweep, estimates);
   warn_of_unused_balls(sweep, estimates, given.base.calibrator);
   sweep.failure = estimate_path(sweep, given.base, estimates, kind);

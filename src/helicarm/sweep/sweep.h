@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "helicarm/calibration/c_arm_history.h"
 #include "helicarm/pipeline/result.h"
 #include "helicarm/sweep/path.h"
 #include "helicarm/sweep/sweep_case.h"
@@ -60,6 +61,8 @@ struct Sweep {
   bool pixel_known = false;
   std::vector<SweepFrame> frames;
   std::optional<SweepPath> path;
+  std::vector<calibration::HistoryEntry>
+      acquisitions;         ///< for the C-arm's record: of up to 40 frames, evenly spaced
   double noise_factor = 1;  ///< of the fiducials' standard deviations, by all frames' residuals
   double seconds = 0;
 };

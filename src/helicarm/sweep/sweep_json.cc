@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 
+#include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/pipeline/view_parameters.h"
 #include "helicarm/sweep/sweep.h"
@@ -106,6 +107,7 @@ Json to_json(const Sweep& sweep) {
   json["frames"] = Json::array();
   for (const SweepFrame& frame : sweep.frames) json["frames"].push_back(json_of(frame));
   json["path"] = sweep.path ? json_of(*sweep.path, sweep) : Json(nullptr);
+  json["acquisitions"] = calibration::acquisitions_json(sweep.acquisitions);
   json["seconds"] = sweep.seconds;
   json["version"] = HELICARM_VERSION;
   return json;

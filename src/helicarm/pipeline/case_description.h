@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <set>
+
+#include "helicarm/core/codec.h"
+#include "helicarm/pipeline/case_json.h"
+#include "helicarm/pipeline/poses_json.h"
+#include "helicarm/xray/dicom_acquisition.h"
+
+/// The keys of case.json, once for reader, writer and schema (core/codec.h). The help texts are the table in
+/// docs/formats.md.
+namespace helicarm::pipeline::description {
+
+inline constexpr std::size_t most_views = 50;
+inline constexpr std::size_t most_picks = 1000;
+inline constexpr Range pixel_range{-0.5, 65535};
+inline constexpr Range place_range{-10000, 10000};
+inline constexpr std::array<std::string_view, 2> snap_words{"none", "ball"};
+inline constexpr std::array<std::string_view, 2> side_words{"left", "right"};
+inline constexpr std::array<std::string_view, 2> samples_words{"shared", "independent"};
+
+template <class T, class Name>
+const T* find_named(const std::vector<T>& all, const std::string& name, Name name_of) {
+  const auto found = std::ranges::find(all, name, name_of);
+  return found == all.end() ? nullptr : &*found;
+}
+
+inline void take_name(const JsonReader& reader, std::set<std::string>& names, const std::string& name) {
+  if (!names.insert(name).second)
+    reader.refuse(Reason::name_clash, "name", fmt::format("\"{}\" is given twice", name));
+}
+
+inline bool has_reading(const guidance::Poses& poses) {
+  return poses.tracker_from_calibrator || poses.tracker_from_tool || !poses.tracker_from_bone.empty();
+}
+
+template <class Codec, class Poses>
+void describe_poses(Codec& codec, const char* key, Poses& poses, const std::vector<guidance::Bone>& bones,
+                    OtherMarker other, const char* help) {
+  codec.custom(
+      key, false, {{"type", "object"}}, help,
+      [&](JsonReader& reader) {
+        if constexpr (!std::is_const_v<Poses>)
+          if (!reader.raw(key).is_null()) poses = poses_from(reader.object(key), bones, other);
+      },
+      [&] { return has_reading(poses) ? std::optional(to_json(poses, other)) : std::nullopt; });
+}
+
+template <class Codec, class View>
+void describe_view(Codec& codec, View& view, const std::filesystem::path& folder,
+                   const std::vector<guidance::Bone>& bones) {
+  codec.text("name", view.name, "unique");
+  codec.file("image", view.image, folder, "path of an [image file](#images-and-sidecars)");
+  codec.integer("frame", view.frame, 1, 100000, "1-based; needed only if the file has several frames");
+  codec.custom(
+      "camera", false, {{"type", "string"}},
+      "of `helicarm register` and `helicarm track`: path of a [camera of another "
+      "program](#projections-of-other-programs), for all views or for none; the image is taken as free of "
+      "distortion. "
+      "Then `calibrator` and `plate` may be left out, and the world is the cameras'",
+      [](JsonReader& reader) {
+        if (!reader.raw("camera").is_null())
+          reader.refuse(Reason::unknown_key, "camera",
+                        "is for `helicarm register`, which uses cameras of other programs; here each view is "
+                        "calibrated");
+      },
+      [] { return std::optional<Json>(); });
+  codec.custom(
+      "frames", false, {{"type", "string"}},
+      "of `helicarm sweep` alone: `\"all\"` or `\"A-B[:STEP]\"`, frames of the file or of numbered files "
+      "(`{frame}` or "
+      "`{frame:04d}` in `image`); each is a view `NAME/12`, up to 1000",
+      [](JsonReader& reader) {
+        if (!reader.raw("frames").is_null())
+          reader.refuse(
+              Reason::bad_value, "frames",
+              "makes the view a run of images: calibrate it with `helicarm sweep`, or name one image by "
+              "\"frame\"");
+      },
+      [] { return std::optional<Json>(); });
+  codec.file("plate_image", view.plate_image, folder,
+             "image of the plate alone, acquired in the same C-arm position; needs a `plate`");
+  codec.file("map", view.map, folder, "path of a [map.json](#mapjson); not beside `plate_image`");
+  codec.check([&](JsonReader& reader) {
+    if (view.plate_image && view.map)
+      reader.refuse(Reason::bad_value, "map", "cannot be combined with \"plate_image\"");
+  });
+  codec.boolean(
+      "mirrored", view.mirrored,
+      "whether the C-arm stores mirrored images, if it is known: only labellings of that handedness are "
+      "tried. Absent: both");
+  codec.number(
+      "pixel_mm", view.pixel_mm, {xray::min_pixel_mm, xray::max_pixel_mm},
+      "pixel size in the receiver's plane of an image whose file does not state it; what the file or its "
+      "sidecar states must agree within 1 %. It holds for the `plate_image` too");
+  codec.number("source_detector_mm", view.source_detector_mm,
+               {xray::min_source_detector_mm, xray::max_source_detector_mm},
+               "distance of source and receiver, likewise");
+  describe_poses(
+      codec, "poses", view.poses, bones, OtherMarker::calibrator,
+      "at the acquisition: `tracker_from_calibrator`, `tracker_from_bone` (`{\"L4\": pose, ...}`). A "
+      "calibrator on the receiver turns with the C-arm and has another pose in each view; picks then state "
+      "`moves_with`");
+}
+
+template <class Codec, class Label>
+void describe_bone_label(Codec& codec, Label& label) {
+  codec.text("name", label.name, "free");
+  codec.choice("side", label.side, side_words, "of the patient");
+}
+
+template <class Codec, class PickValue>
+void describe_pick(Codec& codec, PickValue& pick, const std::vector<CaseView>& views,
+                   const std::vector<guidance::Bone>& bones) {
+  codec.text("name", pick.name, "one pick per name and view; not the name of a target");
+  codec.text("view", pick.view, "name of a view");
+  codec.check([&](JsonReader& reader) {
+    if (!find_named(views, pick.view, &CaseView::name))
+      reader.refuse(Reason::bad_value, "view", fmt::format("\"{}\" is not a view of the case", pick.view));
+  });
+  codec.vector("uv", pick.uv_raw, pixel_range, "raw pixel `[u, v]`, inside the image");
+  if (codec.wants(pick.snap != Snap::none))
+    codec.choice(
+        "snap", pick.snap, snap_words,
+        "`\"ball\"`: refine to the image of the centre of the ball near `uv`; `\"none\"`: use `uv` as it is");
+  if (codec.wants(pick.snap == Snap::ball))
+    codec.number_or_default("diameter_mm", pick.diameter_mm, {0.5, 30}, "of that ball");
+  codec.number("sigma_px", pick.sigma_px, {0, 100},
+               "per axis; 0 means exact. Default 0.5, for a ball the sigma of its fit");
+  codec.custom(
+      "moves_with", false, {{"type", "string"}},
+      "one of the case's `bones`, the same in all views: the rays are intersected in that bone's frame",
+      [&](JsonReader& reader) {
+        if constexpr (!std::is_const_v<PickValue>)
+          if (!reader.raw("moves_with").is_null()) pick.moves_with = bone_from(reader, "moves_with", bones);
+      },
+      [&] { return pick.moves_with ? std::optional(Json(*pick.moves_with)) : std::nullopt; });
+  codec.object("bone", pick.bone, "what the point lies on, for display",
+               [](auto& inner, auto& label) { describe_bone_label(inner, label); });
+}
+
+template <class Codec, class Plan>
+void describe_tunnel(Codec& codec, Plan& tunnel) {
+  codec.text("name", tunnel.name, "unique");
+  codec.text("start", tunnel.start, "name of a pick");
+  codec.text("end", tunnel.end, "name of a pick");
+}
+
+template <class Codec, class Line>
+void describe_tool_line(Codec& codec, Line& line) {
+  codec.text("name", line.name, "unique");
+  codec.text("tunnel", line.tunnel, "name of a tunnel");
+  codec.vector("p1_in_calibrator", line.p1_in_calibrator, place_range, "point on the instrument's axis");
+  codec.vector("p2_in_calibrator", line.p2_in_calibrator, place_range, "another, at least 1 mm apart");
+}
+
+template <class Codec, class Noise>
+void describe_tracker(Codec& codec, Noise& noise) {
+  codec.number("sigma_mm", noise.sigma_mm, {0, 100}, "of each reading, per axis");
+  codec.number("sigma_deg", noise.sigma_deg, {0, 90}, "likewise");
+  codec.choice("samples", noise.samples, samples_words,
+               "`\"shared\"` (one reading for all times) or `\"independent\"`");
+}
+
+template <class Codec, class Picks>
+void describe_picks(Codec& codec, Picks& picks, const std::vector<CaseView>& views,
+                    const std::vector<guidance::Bone>& bones,
+                    const std::vector<phantom::CalibratorTarget>& targets) {
+  std::set<std::pair<std::string, std::string>> clicks;
+  codec.list("picks", picks, false, most_picks,
+             "image points in one view each; picks with the same name in several views are one point",
+             [&](auto& entry, auto& pick) {
+               describe_pick(entry, pick, views, bones);
+               entry.check([&](JsonReader& reader) {
+                 if (!clicks.emplace(pick.name, pick.view).second)
+                   reader.refuse(Reason::name_clash, "name",
+                                 fmt::format("\"{}\" is given twice in {}", pick.name, pick.view));
+                 if (find_named(targets, pick.name, &phantom::CalibratorTarget::name))
+                   reader.refuse(Reason::name_clash, "name",
+                                 fmt::format("\"{}\" is a target of the calibrator", pick.name));
+                 const Pick* other = find_named(picks, pick.name, &Pick::name);
+                 if (other && other->moves_with != pick.moves_with)
+                   reader.refuse(Reason::bad_value, "moves_with",
+                                 fmt::format("of \"{}\" differs between views", pick.name));
+               });
+             });
+}
+
+template <class Codec, class CaseValue>
+void describe_views(Codec& codec, CaseValue& given, Purpose purpose) {
+  std::set<std::string> names;
+  codec.list("views", given.views, true, purpose == Purpose::sweep ? most_frames : most_views,
+             "at least one; one view is calibrated, points need two", [&](auto& entry, auto& view) {
+               describe_view(entry, view, given.folder, given.bones);
+               entry.check([&](JsonReader& reader) {
+                 take_name(reader, names, view.name);
+                 if (view.plate_image && !given.plate)
+                   reader.refuse(Reason::bad_value, "plate_image", "is given, but the case has no plate");
+               });
+             });
+  codec.check([&](JsonReader& reader) {
+    if (given.views.empty())
+      reader.refuse(Reason::bad_value, "views", "is empty: at least one view is required");
+  });
+}
+
+template <class Codec, class CaseValue>
+void describe_lines(Codec& codec, CaseValue& given) {
+  std::set<std::string> tunnels, lines;
+  codec.list(
+      "tunnels", given.tunnels, false, most_picks, "from pick to pick", [&](auto& entry, auto& tunnel) {
+        describe_tunnel(entry, tunnel);
+        entry.check([&](JsonReader& reader) {
+          take_name(reader, tunnels, tunnel.name);
+          for (const auto& [key, pick] : {std::pair{"start", &tunnel.start}, {"end", &tunnel.end}})
+            if (!find_named(given.picks, *pick, &Pick::name))
+              reader.refuse(Reason::bad_value, key, fmt::format("\"{}\" is not a pick of the case", *pick));
+        });
+      });
+  codec.list("tool_lines", given.tool_lines, false, most_picks, "the instrument's axis as it was measured",
+             [&](auto& entry, auto& line) {
+               describe_tool_line(entry, line);
+               entry.check([&](JsonReader& reader) {
+                 take_name(reader, lines, line.name);
+                 if (!find_named(given.tunnels, line.tunnel, &TunnelPlan::name))
+                   reader.refuse(Reason::bad_value, "tunnel",
+                                 fmt::format("\"{}\" is not a tunnel of the case", line.tunnel));
+                 if ((line.p2_in_calibrator - line.p1_in_calibrator).norm() < 1)
+                   reader.refuse(Reason::bad_value, "p2_in_calibrator",
+                                 "is less than 1 mm from \"p1_in_calibrator\"");
+               });
+             });
+}
+
+/// Sets calibrator and plate, read from their files.
+void read_calibrator(Case& read, JsonReader& reader, Purpose purpose);
+void read_plate(Case& read, JsonReader& reader);
+
+template <class Codec, class CaseValue>
+void describe_case(Codec& codec, CaseValue& given, Purpose purpose) {
+  constexpr bool reads = !std::is_const_v<CaseValue>;
+  const auto named = [](const auto& name) { return name.empty() ? Json() : Json(name); };
+  codec.custom(
+      "format", true, {{"enum", {"helicarm-case/2", "helicarm-case/1"}}},
+      "`\"helicarm-case/2\"`; `/1`, with poses in `tracker_from_femur` and `tracker_from_tibia`, is read too",
+      [](JsonReader& reader) {
+        reader.choice("format", {"helicarm-case/2", "helicarm-case/1"});
+      },
+      [] { return std::optional<Json>("helicarm-case/2"); });
+  codec.custom(
+      "calibrator", true, {{"type", {"string", "null"}}},
+      "`\"udcsc\"` or path of a [calibrator.json](#calibratorjson); may be `null` for `phantom measure "
+      "--from-scratch`",
+      [&](JsonReader& reader) {
+        if constexpr (reads) read_calibrator(given, reader, purpose);
+      },
+      [&] { return std::optional(named(given.calibrator_name)); });
+  codec.custom(
+      "plate", false, {{"type", "string"}},
+      "`\"plate48\"` or path of a [plate.json](#platejson); `null` or absent: flat panel",
+      [&](JsonReader& reader) {
+        if constexpr (reads) read_plate(given, reader);
+      },
+      [&] { return std::optional(given.plate_name ? Json(*given.plate_name) : Json()); });
+  codec.custom(
+      "bones", false, {{"type", "array"}, {"items", {{"type", "string"}}}, {"maxItems", most_bones}},
+      "names of the bones that carry markers, each 1 to 100 characters, none of them that of another frame "
+      "(`tool`, "
+      "`calibrator`, ...). Default `[\"femur\", \"tibia\"]`",
+      [&](JsonReader& reader) {
+        if constexpr (reads) given.bones = bones_from(reader);
+      },
+      [&] { return std::optional(Json(given.bones)); });
+  describe_views(codec, given, purpose);
+  describe_poses(
+      codec, "poses_now", given.poses_now, given.bones, OtherMarker::tool,
+      "current poses: `tracker_from_bone` (`{\"L4\": pose, ...}`, those of the case's bones that are seen), "
+      "`tracker_from_tool`");
+  if (codec.wants(given.tracker.sigma_mm > 0 || given.tracker.sigma_deg > 0))
+    codec.object("tracker", given.tracker, "noise of the tracker's readings",
+                 [](auto& inner, auto& noise) { describe_tracker(inner, noise); });
+  describe_picks(codec, given.picks, given.views, given.bones, given.calibrator.targets);
+  describe_lines(codec, given);
+  codec.numbers("diameters_mm", given.diameters_mm, 10, {0.5, 30},
+                "of the balls; required for `phantom measure --from-scratch`, also beside a `calibrator`");
+  if (codec.wants(!given.notes.empty())) codec.text_or_default("notes", given.notes, "ignored", {0, 100000});
+  codec.custom(
+      "models", false, {{"type", "array"}}, "to be registered, at most 20, see below",
+      [](JsonReader& reader) { reader.raw("models"); }, [] { return std::optional<Json>(); });
+}
+
+}  // namespace helicarm::pipeline::description
