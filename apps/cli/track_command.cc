@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <filesystem>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "command_line.h"
+#include "findings.h"
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+#include "helicarm/track/track.h"
+#include "progress_line.h"
+
+namespace helicarm::cli {
+
+struct TrackArguments {
+  std::filesystem::path folder;  ///< holds case.json
+  std::filesystem::path out = "helicarm-track";
+  std::string frames;  ///< A-B[:STEP]
+  bool resume = false;
+};
+namespace {
+
+std::string summary_of(const track::Sequence& sequence, const track::TrackCase& given) {
+  std::array<int, 4> counts{};
+  for (const auto& frame : sequence.markers)
+    for (const track::TrackedMarker& marker : frame) ++counts[std::size_t(marker.status)];
+  std::string text = fmt::format("  {} frames, {} with all {} markers tracked\n", sequence.frames.size(),
+                                 sequence.complete, given.markers.size());
+  text += fmt::format("  places: {} tracked, {} by one view, {} predicted, {} lost; {} exchanges repaired\n",
+                      counts[0], counts[1], counts[2], counts[3], sequence.repaired);
+  for (std::size_t k = 1; k < given.views.size(); ++k)
+    if (sequence.delays[k].is_known)
+      text += fmt::format("  delay of {}: {:.4f} frames, standard deviation {:.4f}\n",
+                          given.views[k].images.name, sequence.delays[k].frames, sequence.delays[k].sigma);
+  for (std::size_t b = 0; b < given.bodies.size(); ++b) {
+    int decisions[3] = {};
+    for (const track::TrackedBody& frame : sequence.bodies[b].frames) ++decisions[int(frame.decision)];
+    text += fmt::format("  {}: {} accepted, {} warned, {} refused; markers deviate by {:.3f} mm per axis\n",
+                        given.bodies[b].name, decisions[0], decisions[1], decisions[2],
+                        sequence.bodies[b].deviation_mm);
+  }
+  return text;
+}
+
+}  // namespace
+
+/// Follows markers and writes the tables, track.json and report.html. A refusal is written to track.json and
+/// then fails with its reason; unusable input leaves none.
+CommandResult track_command(const TrackArguments& arguments, Console& console) {
+  return guarded([&] {
+    if (!arguments.resume) track::forget_track(arguments.out);
+    const auto range = value_or_throw(case_registration::frame_range_from(arguments.frames));
+    const auto refuse = [&](const Failure& failure) {
+      if (exit_code(failure.reason) == 3) {
+        track::forget_track(arguments.out);
+        value_or_throw(
+            write_file(arguments.out / "track.json", to_text(track::refused_json(failure)) + "\n"));
+      }
+      throw BadInput(failure);
+    };
+    const auto given = track::read_track_case(arguments.folder, range);
+    if (!given) refuse(given.error());
+    ProgressLine progress(console);
+    const auto sequence = track::run_track(*given, range, {.out = arguments.out, .resume = arguments.resume},
+                                           [&](int done) { progress.notify(double(done) / range.count()); });
+    if (!sequence) refuse(sequence.error());
+    value_or_throw(track::write_track(*sequence, *given, arguments.out));
+    print_warnings(sequence->warnings, console);
+    if (console.json)
+      console.out << to_text(track::to_json(*sequence, *given)) << '\n';
+    else if (!console.quiet)
+      console.out << summary_of(*sequence, *given)
+                  << fmt::format("  {:.1f} s, {:.1f} frames/s\n\n  written to {}\n", sequence->seconds,
+                                 double(sequence->frames.size()) / sequence->seconds, arguments.out.string());
+  });
+}
+
+void add_track(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, group::motion, "track", "Follow markers and bodies through a sequence of two views or more",
+      "helicarm track my-sequence --frames 1-435 --out my-motion\n\n"
+      "case.json names the views, the markers' size, a pick of each marker in each view of the first frame, "
+      "and "
+      "the bodies:\n"
+      "  {\"format\": \"helicarm-case/2\",\n"
+      "   \"views\": [{\"name\": \"cam1\", \"image\": \"cam1_{frame:04d}.png\", \"camera\": "
+      "\"camera1.json\"},\n"
+      "             {\"name\": \"cam2\", \"image\": \"cam2_{frame:04d}.png\", \"camera\": \"camera2.json\", "
+      "\"frame_offset\": 0}],\n"
+      "   \"markers\": {\"diameter_mm\": 1.0},\n"
+      "   \"picks\": [{\"name\": \"J1\", \"view\": \"cam1\", \"frame\": 1, \"uv\": [653.9, 642.5]}, ...],\n"
+      "   \"bodies\": [{\"name\": \"jaw\", \"markers\": [\"J1\", \"J2\", \"J3\"], \"geometry\": null}]}\n\n"
+      "\"camera\" is what `helicarm import --json` prints (MayaCam, OpenCV, a matrix); or \"calibration\": "
+      "\"result.json\",\nor the case's calibrator in the first images. Picks are raw pixels, within 6 px of "
+      "the "
+      "marker.\n\n"
+      "Writes markers.csv, bodies.csv (poses against the first frame), smoothed.csv, relative.csv, "
+      "track.json, "
+      "report.html,\npoints2d.csv and points3d.csv for XMALab, NAME.tra for Autoscoper. Every place and pose "
+      "has "
+      "its standard\ndeviations; a marker that is hidden is placed by its body. An interrupted run goes on "
+      "with "
+      "--resume.\nExit code 3: the picks contradict each other. See docs/motion.md.");
+  auto& a = arguments_of(command, action, track_command);
+  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
+  command->add_option("--frames", a.frames, "Frames A-B[:STEP]; the markers are picked in frame A")
+      ->required();
+  command->add_option("--out", a.out, "Folder for the tables, track.json and report.html")
+      ->capture_default_str();
+  command->add_flag("--resume", a.resume, "Go on after the frames that an interrupted run left in --out");
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "helicarm/track/sequence.h"
+
+namespace helicarm::track {
+
+/// Headers and rows of the tables, with line ends.
+std::string markers_header();
+std::string marker_row(int frame, const std::string& name, const TrackedMarker& marker,
+                       const TrackCase& given);
+std::string bodies_header(bool relative = false);
+std::string body_row(int frame, const std::string& names, const TrackedBody& body);
+
+/// sights.csv: where each marker is seen in each view of a frame, to the last bit.
+std::string sights_header();
+std::string sights_rows(const FrameSights& sights, const TrackCase& given);
+/// The frames in the text that are complete, in order, up to the first that is not of `frames`.
+std::vector<FrameSights> sights_from(const std::string& text, const TrackCase& given,
+                                     const std::vector<int>& frames);
+
+}  // namespace helicarm::track

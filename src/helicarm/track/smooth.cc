@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/track/smooth.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm::track {
+namespace {
+
+using geometry::RigidTransform;
+constexpr int n = 18;  // errors: rotation, centre, their rates, their second derivatives
+using Vector = Eigen::Matrix<double, n, 1>;
+using Matrix = Eigen::Matrix<double, n, n>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+struct State {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 12, 1> rates = Eigen::Matrix<double, 12, 1>::Zero();  // turn, shift; twice
+};
+
+State moved(const State& state, const Vector& step) {
+  return {geometry::rotation_from_vector(step.head<3>()) * state.rotation, state.centre + step.segment<3>(3),
+          state.rates + step.tail<12>()};
+}
+
+Vector between(const State& from, const State& to) {
+  Vector step;
+  step << geometry::vector_from_rotation(to.rotation * from.rotation.transpose()), to.centre - from.centre,
+      to.rates - from.rates;
+  return step;
+}
+
+Eigen::Vector3d turn_over(const State& state, double dt) {
+  return dt * state.rates.head<3>() + dt * dt / 2 * state.rates.segment<3>(6);
+}
+
+State predicted(const State& state, double dt) {
+  State next = state;
+  next.rotation = geometry::rotation_from_vector(turn_over(state, dt)) * state.rotation;
+  next.centre += dt * state.rates.segment<3>(3) + dt * dt / 2 * state.rates.segment<3>(9);
+  next.rates.head<6>() += dt * state.rates.tail<6>();
+  return next;
+}
+
+Matrix transition(const State& state, double dt) {
+  Matrix f = Matrix::Identity();
+  f.block<6, 6>(0, 6).diagonal().setConstant(dt);
+  f.block<6, 6>(0, 12).diagonal().setConstant(dt * dt / 2);
+  f.block<6, 6>(6, 12).diagonal().setConstant(dt);
+  f.topLeftCorner<3, 3>() = geometry::rotation_from_vector(turn_over(state, dt));
+  return f;
+}
+
+/// Of white jerk.
+Matrix process(const MotionPrior& prior, double dt) {
+  const double powers[3][3] = {{std::pow(dt, 5) / 20, std::pow(dt, 4) / 8, std::pow(dt, 3) / 6},
+                               {std::pow(dt, 4) / 8, std::pow(dt, 3) / 3, dt * dt / 2},
+                               {std::pow(dt, 3) / 6, dt * dt / 2, dt}};
+  Matrix q = Matrix::Zero();
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k)
+      for (int axis = 0; axis < 6; ++axis)
+        q(6 * i + axis, 6 * k + axis) = powers[i][k] * (axis < 3 ? prior.turn : prior.shift);
+  return q;
+}
+
+struct Step {
+  State predicted, filtered;
+  Matrix predicted_covariance, covariance, transition;
+};
+
+struct Filtered {
+  std::vector<Step> steps;
+  double log_likelihood = 0;
+};
+
+struct Measured {
+  State at;
+  Matrix6 covariance;
+};
+
+Filtered filter(std::span<const double> times, std::span<const std::optional<Measured>> measured,
+                const MotionPrior& prior, bool turns, bool keep) {
+  constexpr double wide_turn = 0.3, wide_shift = 10;
+  Filtered result;
+  const auto first = std::ranges::find_if(measured, [](const auto& each) { return each.has_value(); });
+  State state = (*first)->at;
+  Matrix covariance = Matrix::Zero();
+  // Before the first measured frame the pose is that frame's, with the width of the rates until then.
+  const double before = times[std::size_t(first - measured.begin())] - times.front();
+  for (int axis = 0; axis < 6; ++axis) {
+    const double wide = axis < 3 ? (turns ? wide_turn : 1e-9) : wide_shift;
+    covariance(axis, axis) = std::pow(wide * (1 + before), 2);
+    covariance(6 + axis, 6 + axis) = covariance(12 + axis, 12 + axis) = wide * wide;
+  }
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    Step step;
+    step.transition.setIdentity();
+    if (i > 0) {
+      const double dt = times[i] - times[i - 1];
+      step.transition = transition(state, dt);
+      state = predicted(state, dt);
+      covariance = step.transition * covariance * step.transition.transpose() + process(prior, dt);
+    }
+    step.predicted = state;
+    step.predicted_covariance = covariance;
+    if (measured[i]) {
+      const Vector6 off = between(state, measured[i]->at).head<6>();
+      const Matrix6 spread =
+          covariance.topLeftCorner<6, 6>() + prior.noise * prior.noise * measured[i]->covariance;
+      const Eigen::LLT<Matrix6> factor(spread);
+      const Vector6 weighted = factor.solve(off);
+      const Eigen::Matrix<double, n, 6> gain = factor.solve(covariance.topRows<6>()).transpose();
+      const Matrix6 triangle = factor.matrixL();
+      result.log_likelihood -= 0.5 * off.dot(weighted) + triangle.diagonal().array().log().sum();
+      state = moved(state, gain * off);
+      covariance -= gain * covariance.topRows<6>();
+      covariance = (0.5 * (covariance + covariance.transpose())).eval();
+    }
+    step.filtered = state;
+    step.covariance = covariance;
+    if (keep) result.steps.push_back(step);
+  }
+  return result;
+}
+
+/// The prior of the largest likelihood, found on a grid of factors that is refined.
+MotionPrior likeliest(std::span<const double> times, std::span<const std::optional<Measured>> measured,
+                      bool turns) {
+  constexpr double least_factor = 1.3;
+  MotionPrior best{turns ? 1e-7 : 1e-12, 1e-2, 1};
+  double most = filter(times, measured, best, turns, false).log_likelihood;
+  for (double factor = 10; factor > least_factor; factor = std::sqrt(factor)) {
+    bool is_better = true;
+    for (int rounds = 0; is_better && rounds < 8; ++rounds) {
+      is_better = false;
+      for (double MotionPrior::*part : {&MotionPrior::turn, &MotionPrior::shift, &MotionPrior::noise}) {
+        if (part != &MotionPrior::shift && !turns) continue;
+        for (const double by : {factor, 1 / factor}) {
+          MotionPrior tried = best;
+          tried.*part *= part == &MotionPrior::noise ? std::pow(by, 0.25) : by;
+          if (tried.noise < 0.7 || tried.noise > 4) continue;
+          const double there = filter(times, measured, tried, turns, false).log_likelihood;
+          if (!(there > most + 1e-3)) continue;
+          most = there;
+          best = tried;
+          is_better = true;
+        }
+      }
+    }
+  }
+  return best;
+}
+
+struct Smoothed {
+  State state;
+  Matrix6 covariance;
+};
+
+std::vector<Smoothed> smoothed(const Filtered& filtered) {
+  const std::size_t count = filtered.steps.size();
+  std::vector<Smoothed> result(count);
+  State state = filtered.steps.back().filtered;
+  Matrix covariance = filtered.steps.back().covariance;
+  result.back() = {state, covariance.topLeftCorner<6, 6>()};
+  for (std::size_t i = count - 1; i-- > 0;) {
+    const Step &here = filtered.steps[i], &next = filtered.steps[i + 1];
+    const Matrix gain = next.predicted_covariance.ldlt().solve(next.transition * here.covariance).transpose();
+    state = moved(here.filtered, gain * between(next.predicted, state));
+    covariance = here.covariance + gain * (covariance - next.predicted_covariance) * gain.transpose();
+    covariance = (0.5 * (covariance + covariance.transpose())).eval();
+    result[i] = {state, covariance.topLeftCorner<6, 6>()};
+  }
+  return result;
+}
+
+bool is_enough(std::span<const std::optional<Measured>> measured) {
+  constexpr std::ptrdiff_t least = 3;
+  return std::ranges::count_if(measured, [](const auto& each) { return each.has_value(); }) >= least;
+}
+
+}  // namespace
+
+std::optional<SmoothMotion> smooth_poses(std::span<const double> times,
+                                         std::span<const std::optional<FramePose>> measured,
+                                         const Eigen::Vector3d& centre_in_body) {
+  std::vector<std::optional<Measured>> given;
+  for (const auto& frame : measured) {
+    auto& made = given.emplace_back();
+    if (!frame) continue;
+    State at;
+    at.rotation = frame->pose.rotation;
+    at.centre = frame->pose * centre_in_body;
+    made = Measured{at, frame->covariance};
+  }
+  if (!is_enough(given)) return std::nullopt;
+  SmoothMotion motion;
+  motion.prior = likeliest(times, given, true);
+  for (const Smoothed& frame : smoothed(filter(times, given, motion.prior, true, true)))
+    motion.frames.push_back(
+        {{frame.state.rotation, frame.state.centre - frame.state.rotation * centre_in_body},
+         frame.covariance});
+  return motion;
+}
+
+std::optional<std::vector<FramePlace>> smooth_places(std::span<const double> times,
+                                                     std::span<const std::optional<FramePlace>> measured) {
+  std::vector<std::optional<Measured>> given;
+  for (const auto& frame : measured) {
+    auto& made = given.emplace_back();
+    if (!frame) continue;
+    made = Measured{{}, Matrix6::Identity()};
+    made->at.centre = frame->place;
+    made->covariance.bottomRightCorner<3, 3>() = frame->covariance;
+  }
+  if (!is_enough(given)) return std::nullopt;
+  const MotionPrior prior = likeliest(times, given, false);
+  std::vector<FramePlace> places;
+  for (const Smoothed& frame : smoothed(filter(times, given, prior, false, true)))
+    places.push_back({frame.state.centre, frame.covariance.bottomRightCorner<3, 3>()});
+  return places;
+}
+
+}  // namespace helicarm::track

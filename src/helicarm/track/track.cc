@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/track/track.h"
+
+#include <chrono>
+#include <cstdint>
+#include <fstream>
+#include <future>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/csv.h"
+#include "helicarm/core/files.h"
+#include "helicarm/core/system_message.h"
+#include "helicarm/track/rows.h"
+#include "helicarm/track/sequence_images.h"
+
+namespace helicarm::track {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr std::uintmax_t most_bytes = std::uintmax_t(1) << 30;
+
+std::vector<int> numbers_of(const case_registration::FrameRange& frames) {
+  std::vector<int> numbers;
+  for (int i = 0; i < frames.count(); ++i) numbers.push_back(frames.first + i * frames.step);
+  return numbers;
+}
+
+/// A text that two cases share only if their sequences are the same.
+std::string identity_of(const TrackCase& given, const case_registration::FrameRange& frames) {
+  std::string text = fmt::format("{} {} {} {}", frames.first, frames.last, frames.step, given.diameter_mm);
+  for (const TrackView& view : given.views) {
+    text +=
+        fmt::format("\n{} {} {}", view.images.name, view.images.image.filename().string(), view.frame_offset);
+    const geometry::Projection projection = view.camera.projection();
+    for (const double value : projection.reshaped()) text += fmt::format(" {}", value);
+  }
+  for (const std::string& marker : given.markers) text += "\n" + marker;
+  for (const MarkerPick& pick : given.picks)
+    text += fmt::format("\n{} {} {} {}", pick.marker, pick.view, pick.uv_raw.x(), pick.uv_raw.y());
+  for (const BodyPlan& body : given.bodies) {
+    text += "\n" + body.name;
+    for (const std::size_t marker : body.markers) text += fmt::format(" {}", marker);
+    for (const Eigen::Vector3d& place : body.geometry)
+      text += fmt::format(" {} {} {}", place.x(), place.y(), place.z());
+  }
+  // FNV-1a.
+  std::uint64_t digest = 14695981039346656037u;
+  for (const char c : text) digest = (digest ^ static_cast<unsigned char>(c)) * 1099511628211u;
+  return fmt::format("{:016x}", digest);
+}
+
+/// A table that grows by rows, each of which is in the file when `add` returns.
+class GrowingTable {
+ public:
+  GrowingTable(const fs::path& path, const std::string& header) : path_(path), file_(path, std::ios::binary) {
+    add(header);
+  }
+  void add(const std::string& rows) {
+    file_ << rows << std::flush;
+    if (!file_)
+      throw BadInput(Reason::cannot_write, path_.string() + ": cannot be written: " + system_message(errno));
+  }
+
+ private:
+  fs::path path_;
+  std::ofstream file_;
+};
+
+/// Rows of the frames so far; those of the whole sequence replace them at its end.
+struct GrowingTables {
+  GrowingTable sights, markers, bodies;
+
+  explicit GrowingTables(const fs::path& folder)
+      : sights(folder / "sights.csv", sights_header()),
+        markers(folder / "markers.csv", markers_header()),
+        bodies(folder / "bodies.csv", bodies_header()) {}
+
+  void add(const FrameSights& seen, const Tracker& tracker, const TrackCase& given) {
+    std::string marker_rows, body_rows;
+    const Tracker::Snapshot now = tracker.snapshot(seen);
+    for (std::size_t m = 0; m < given.markers.size(); ++m)
+      marker_rows += marker_row(seen.frame, given.markers[m], now.markers[m], given);
+    for (std::size_t b = 0; b < given.bodies.size(); ++b)
+      body_rows += body_row(seen.frame, csv_field(given.bodies[b].name), now.bodies[b]);
+    markers.add(marker_rows);
+    bodies.add(body_rows);
+    sights.add(sights_rows(seen, given));
+  }
+};
+
+/// The frames that an interrupted run left in the folder.
+std::vector<FrameSights> kept_frames(const fs::path& folder, const TrackCase& given,
+                                     const std::string& identity, const std::vector<int>& numbers) {
+  std::error_code ignored;
+  if (!fs::exists(folder / "sights.csv", ignored)) return {};
+  const auto of = read_file(folder / "sights.id", 100);
+  if (!of || *of != identity)
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("--resume: {} holds rows of another sequence, case or range of frames: run without "
+                    "--resume, or with another --out",
+                    folder.string()));
+  return sights_from(value_or_throw(read_file(folder / "sights.csv", most_bytes)), given, numbers);
+}
+
+}  // namespace
+
+Expected<Sequence> run_track(const TrackCase& given, const case_registration::FrameRange& frames,
+                             const TrackOptions& options, const OnFrame& on_frame) {
+  return guarded([&] {
+    const auto begun = std::chrono::steady_clock::now();
+    const std::vector<int> numbers = numbers_of(frames);
+    const SequenceImages images = value_or_throw(SequenceImages::open(given, frames));
+    const std::string identity = identity_of(given, frames);
+    std::vector<FrameSights> kept;
+    if (options.out && options.resume) kept = kept_frames(*options.out, given, identity, numbers);
+    Tracker tracker =
+        value_or_throw(Tracker::begin(given, numbers.front(), value_or_throw(images.at(numbers.front()))));
+    std::optional<GrowingTables> tables;
+    if (options.out) {
+      std::error_code ignored;
+      fs::create_directories(*options.out, ignored);
+      value_or_throw(write_file(*options.out / "sights.id", identity));
+      tables.emplace(*options.out);
+    }
+    std::vector<FrameSights> sights{tracker.first()};
+    const auto done = [&] {
+      if (tables) tables->add(sights.back(), tracker, given);
+      if (on_frame) on_frame(int(sights.size()));
+    };
+    done();
+    // The next frame's images are read while this one's are searched.
+    std::future<Expected<std::vector<xray::XrayImage>>> ahead;
+    for (std::size_t i = 1; i < numbers.size(); ++i) {
+      if (i < kept.size()) {
+        sights.push_back(kept[i]);
+      } else {
+        auto now = ahead.valid() ? ahead.get() : images.at(numbers[i]);
+        if (i + 1 < numbers.size())
+          ahead =
+              std::async(std::launch::async, [&images, next = numbers[i + 1]] { return images.at(next); });
+        sights.push_back(tracker.look(numbers[i], value_or_throw(std::move(now))));
+      }
+      tracker.absorb(sights.back());
+      done();
+    }
+    Sequence sequence = estimate_sequence(given, sights);
+    sequence.warnings.insert(sequence.warnings.end(), tracker.warnings().begin(), tracker.warnings().end());
+    sequence.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    return sequence;
+  });
+}
+
+}  // namespace helicarm::track

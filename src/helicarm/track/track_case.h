@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/case_registration/follow_case.h"
+#include "helicarm/geometry/view.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/rectification/distortion_map.h"
+
+namespace helicarm::track {
+
+/// One camera of the sequence.
+struct TrackView {
+  pipeline::CaseView images;                        ///< "image" with {frame}, or a file with several frames
+  int frame_offset = 0;                             ///< the image's number is the sequence's frame plus this
+  geometry::View camera;                            ///< world, mm, to rectified pixels
+  std::optional<rectification::DistortionMap> map;  ///< raw to rectified; nothing: none
+  std::optional<Eigen::Vector2i> image_size;        ///< as the camera's file states it
+};
+
+/// A marker's place in one view of the first frame.
+struct MarkerPick {
+  std::size_t marker;
+  std::size_t view;
+  Eigen::Vector2d uv_raw;
+};
+
+/// A rigid set of markers.
+struct BodyPlan {
+  std::string name;
+  std::vector<std::size_t> markers;
+  std::vector<Eigen::Vector3d> geometry;  ///< mm, in a frame of its own, one per marker; empty: to be learnt
+};
+
+/// A case of markers through a sequence, with its cameras.
+struct TrackCase {
+  std::filesystem::path folder;
+  std::vector<TrackView> views;
+  Eigen::MatrixXd camera_covariance;  ///< 11 n x 11 n; empty: the cameras are taken as exact
+  double diameter_mm = 1;
+  std::optional<double> frame_rate_hz;
+  std::vector<std::string> markers;
+  std::vector<MarkerPick> picks;  ///< of the first frame
+  std::vector<BodyPlan> bodies;
+  std::vector<Warning> warnings;
+};
+
+/// Reads a case with "markers", picks of the range's first frame and "bodies". Views have "camera" or
+/// "calibration", or are calibrated by the case's calibrator in their first image. No later image is read.
+/// Fails as `read_case`, `import_matrix`, `saved_calibration_from_json` and `calibrate_case`; bad_value for
+/// picks of another frame and for bodies of unknown markers.
+Expected<TrackCase> read_track_case(const std::filesystem::path& path,
+                                    const case_registration::FrameRange& frames);
+
+}  // namespace helicarm::track

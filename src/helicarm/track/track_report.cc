@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/report/chart.h"
+#include "helicarm/report/markup.h"
+#include "helicarm/report/table.h"
+#include "helicarm/track/track.h"
+
+namespace helicarm::track {
+namespace {
+
+constexpr double degrees = 180 / EIGEN_PI, width_of_95 = 1.959964;
+constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+
+std::string card(const std::string& value, const std::string& what) {
+  return fmt::format("<div class=\"card\"><b>{}</b><span>{}</span></div>", report::escaped(value), what);
+}
+
+/// Three curves with their 95 % bands over the frames.
+report::Chart pose_chart(const Sequence& sequence, const std::vector<TrackedBody>& frames, std::string title,
+                         bool turns) {
+  report::Chart chart{std::move(title), "frame", turns ? "degrees" : "mm"};
+  constexpr std::array axes{"x", "y", "z"};
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();
+  bool is_started = false;
+  for (const TrackedBody& frame : frames)
+    if (frame.pose && !is_started) start = frame.centre, is_started = true;
+  for (int axis = 0; axis < 3; ++axis) {
+    report::ChartSeries curve{axes[std::size_t(axis)]}, band{""};
+    curve.joined = true;
+    for (std::size_t f = 0; f < frames.size(); ++f) {
+      const auto& pose = frames[f].pose;
+      if (!pose) {
+        curve.points.push_back({double(sequence.frames[f]), nothing});
+        curve.ranges.push_back({nothing, nothing});
+        continue;
+      }
+      const double value = turns ? degrees * geometry::vector_from_rotation(pose->pose.rotation)[axis]
+                                 : (frames[f].centre - start)[axis];
+      const int at = axis + (turns ? 0 : 3);
+      const double width =
+          width_of_95 * (turns ? degrees : 1) * std::sqrt(std::max(0.0, pose->covariance(at, at)));
+      curve.points.push_back({double(sequence.frames[f]), value});
+      curve.ranges.push_back({value - width, value + width});
+    }
+    chart.series.push_back(std::move(curve));
+  }
+  return chart;
+}
+
+std::string body_charts(const Sequence& sequence, const TrackCase& given) {
+  std::string html;
+  for (std::size_t b = 0; b < given.bodies.size(); ++b) {
+    const BodySequence& body = sequence.bodies[b];
+    const std::string& name = given.bodies[b].name;
+    std::vector<report::Chart> charts{
+        pose_chart(sequence, body.smoothed, "Centre from its place in the first frame", false),
+        pose_chart(sequence, body.smoothed, "Rotation vector against the first frame", true)};
+    report::Chart rms{"Markers from their places in the body", "frame", "rms, mm"};
+    report::ChartSeries residual{""};
+    for (std::size_t f = 0; f < body.frames.size(); ++f)
+      residual.points.push_back({double(sequence.frames[f]), body.frames[f].rms_mm.value_or(nothing)});
+    rms.series.push_back(std::move(residual));
+    rms.y_from_zero = true;
+    charts.push_back(std::move(rms));
+    html += fmt::format(
+        "<h2>{}</h2>\n<figure class=\"plain\">{}<figcaption>Smoothed; bars: 95 %.</figcaption></figure>\n",
+        report::escaped(name), report::chart_svg(charts));
+  }
+  for (std::size_t b = 0; b < sequence.relative.size(); ++b) {
+    const std::array charts{
+        pose_chart(sequence, sequence.relative[b], "Centre in the reference body", false),
+        pose_chart(sequence, sequence.relative[b], "Rotation vector in the reference body", true)};
+    html += fmt::format("<h2>{} against {}</h2>\n<figure class=\"plain\">{}</figure>\n",
+                        report::escaped(given.bodies[b + 1].name), report::escaped(given.bodies[0].name),
+                        report::chart_svg(charts));
+  }
+  return html;
+}
+
+std::string gap_chart(const Sequence& sequence, const TrackCase& given) {
+  report::Chart chart{"Ray gaps", "frame", "mm"};
+  chart.y_from_zero = true;
+  constexpr std::size_t most_named = 12;
+  for (std::size_t m = 0; m < given.markers.size(); ++m) {
+    report::ChartSeries dots{given.markers.size() <= most_named ? given.markers[m] : ""};
+    dots.scattered = true;
+    for (std::size_t f = 0; f < sequence.frames.size(); ++f)
+      if (const auto& gap = sequence.markers[f][m].ray_gap_mm)
+        dots.points.push_back({double(sequence.frames[f]), *gap});
+    if (!dots.points.empty()) chart.series.push_back(std::move(dots));
+  }
+  if (chart.series.empty()) return "";
+  return "<figure class=\"plain\">" + report::chart_svg({&chart, 1}) + "</figure>\n";
+}
+
+std::string marker_table(const Sequence& sequence, const TrackCase& given) {
+  struct Row {
+    std::string name;
+    std::array<int, 4> counts{};
+    double sigma = 0;
+    int placed = 0;
+  };
+  std::vector<Row> rows;
+  for (std::size_t m = 0; m < given.markers.size(); ++m) {
+    Row row{given.markers[m]};
+    for (const auto& frame : sequence.markers) {
+      ++row.counts[std::size_t(frame[m].status)];
+      if (frame[m].status == MarkerStatus::tracked)
+        row.sigma += frame[m].place->covariance.trace(), ++row.placed;
+    }
+    rows.push_back(row);
+  }
+  const auto count = [](const char* title, const char* what, std::size_t i) {
+    return report::ColumnOf<Row>{
+        {title, what, true}, [i](const Row& row) {
+          return report::Cell{std::to_string(row.counts[i]), i == 3 && row.counts[i] > 0};
+        }};
+  };
+  return html_of(report::table_of<Row>(
+      "Markers",
+      {{{"Marker", "Name of the pick"}, [](const Row& row) { return report::Cell{row.name}; }},
+       count("Tracked", "Frames in which two views or more show it", 0),
+       count("One view", "Frames in which one view shows it: placed with its body's help", 1),
+       count("Predicted", "Frames in which no view shows it", 2),
+       count("Lost", "Frames without a place", 3),
+       {{"Sigma, mm", "Standard deviation of a tracked place, rms over the axes", true},
+        [](const Row& row) {
+          return report::Cell{report::fixed(
+              row.placed ? std::optional(std::sqrt(row.sigma / (3 * row.placed))) : std::nullopt, 4)};
+        }}},
+      rows));
+}
+
+std::string distance_table(const Sequence& sequence, const TrackCase& given) {
+  if (sequence.distances.empty()) return "";
+  return html_of(report::table_of<MarkerDistance>(
+      "Distances between markers of a body",
+      {{{"Markers", "Names"},
+        [&](const MarkerDistance& d) {
+          return report::Cell{given.markers[d.first] + " – " + given.markers[d.second]};
+        }},
+       {{"Mean, mm", "Over the frames in which both are tracked", true},
+        [](const MarkerDistance& d) { return report::Cell{report::fixed(d.mean_mm, 3)}; }},
+       {{"Standard deviation, mm", "The precision that marker-based studies report", true},
+        [](const MarkerDistance& d) { return report::Cell{report::fixed(d.deviation_mm, 4)}; }},
+       {{"Frames", "Number", true},
+        [](const MarkerDistance& d) { return report::Cell{std::to_string(d.frames)}; }}},
+      sequence.distances));
+}
+
+std::string findings(const Sequence& sequence) {
+  std::string html;
+  for (const Warning& warning : sequence.warnings)
+    html += fmt::format("<li><b>{}</b> {}</li>", code(warning.reason), report::escaped(warning.message));
+  return html.empty() ? "" : "<h2>Warnings</h2>\n<ul>" + html + "</ul>\n";
+}
+
+}  // namespace
+
+std::string track_report(const Sequence& sequence, const TrackCase& given) {
+  std::array<int, 4> counts{};
+  for (const auto& frame : sequence.markers)
+    for (const TrackedMarker& marker : frame) ++counts[std::size_t(marker.status)];
+  const int all = counts[0] + counts[1] + counts[2] + counts[3];
+  std::string cards =
+      "<div class=\"cards\">" +
+      card(fmt::format("{} of {}", sequence.complete, sequence.frames.size()),
+           "frames with all markers tracked") +
+      card(fmt::format("{:.1f} %", 100.0 * counts[0] / std::max(1, all)), "of the places tracked") +
+      card(std::to_string(sequence.repaired), "exchanges repaired");
+  for (std::size_t k = 1; k < given.views.size(); ++k)
+    if (sequence.delays[k].is_known)
+      cards += card(fmt::format("{:.4f} frames", sequence.delays[k].frames),
+                    "delay of " + report::escaped(given.views[k].images.name));
+  return report::page_html("helicarm track", "Markers and bodies through a sequence",
+                           cards + "</div>\n" + findings(sequence) + body_charts(sequence, given) +
+                               "<h2>Markers</h2>\n" + gap_chart(sequence, given) +
+                               marker_table(sequence, given) + distance_table(sequence, given),
+                           ". Millimetres, degrees and pixels.");
+}
+
+}  // namespace helicarm::track
