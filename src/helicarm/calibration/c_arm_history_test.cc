@@ -125,7 +125,8 @@ TEST(CArmHistoryJson, AResultWithoutAcquisitionsSaysSo) {
   Json refused = result_with({});
   refused["status"] = "refused";
   EXPECT_EQ(acquisitions_of_result(refused, "result.json").error().reason, Reason::too_few_views);
-  EXPECT_EQ(acquisitions_of_result({{"format", "helicarm-case/2"}}, "case.json").error().reason, Reason::bad_value);
+  EXPECT_EQ(acquisitions_of_result({{"format", "helicarm-case/2"}}, "case.json").error().reason,
+            Reason::bad_value);
 }
 
 TEST(CArmHistoryFile, AdditionsAtTheSameTimeAreAllKept) {

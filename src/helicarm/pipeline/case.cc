@@ -106,6 +106,10 @@ void read_plate(Case& read, JsonReader& reader) {
 
 Case case_of(const Json& json, const std::string& origin, const fs::path& folder, Purpose purpose) {
   JsonReader reader(json, origin);
+  for (const char* key : {"markers", "bodies"})
+    if (reader.has(key))
+      reader.refuse(Reason::bad_value, key,
+                    "makes the case a sequence of markers: follow them with `helicarm track CASE --frames A-B`");
   Case read;
   read.folder = folder;
   FromJson codec(reader);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <set>
+#include <tuple>
 
 #include "helicarm/core/codec.h"
 #include "helicarm/pipeline/case_json.h"
@@ -67,6 +68,20 @@ void describe_view(Codec& codec, View& view, const std::filesystem::path& folder
                         "calibrated");
       },
       [] { return std::optional<Json>(); });
+  for (const auto& [key, kind, help] :
+       {std::tuple{
+            "calibration", "string",
+            "of [`helicarm track`](motion.md#run-it): path of a result.json that holds this view's camera"},
+        {"frame_offset", "integer",
+         "of `helicarm track`: the image's number is the sequence's frame plus this"}})
+    codec.custom(
+        key, false, {{"type", kind}}, help,
+        [key](JsonReader& reader) {
+          if (!reader.raw(key).is_null())
+            reader.refuse(Reason::unknown_key, key,
+                          "is for `helicarm track`, which follows markers through a sequence");
+        },
+        [] { return std::optional<Json>(); });
   codec.custom(
       "frames", false, {{"type", "string"}},
       "of `helicarm sweep` alone: `\"all\"` or `\"A-B[:STEP]\"`, frames of the file or of numbered files "

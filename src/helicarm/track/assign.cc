@@ -17,8 +17,9 @@ constexpr double log_density = -6.9;     // of discs that are no marker's: one i
 constexpr double detected = 0.95;        // chance that a marker is found in a view
 constexpr double least_sigma_px = 0.15;  // texture behind a marker displaces its fit
 constexpr double sigma_factor = 2;
-constexpr double contrast_spread = 0.35;  // of its logarithm, between frames
-constexpr double gate = 25;               // chi2 of one disc
+constexpr double vaguest = 0.18;       // standard deviation of a disc over its radius: texture beyond
+constexpr double usual_spread = 0.35;  // of a contrast's logarithm, between frames
+constexpr double gate = 25;            // chi2 of one disc
 constexpr std::size_t most_per_view = 6, beam = 100;
 constexpr double hopeless = 30;  // beyond what later markers could win back
 
@@ -37,8 +38,8 @@ double appearance_cost(const MarkerImage& image, const ExpectedImage& expected) 
   const double size = std::log(image.radius_px / expected.radius_px) / 0.3;
   double cost = 0.5 * size * size;
   if (expected.contrast > 0) {
-    const double contrast = std::log(std::abs(image.contrast) / expected.contrast) / contrast_spread;
-    cost += 0.5 * contrast * contrast;
+    const double contrast = std::log(std::abs(image.contrast) / expected.contrast) / expected.spread;
+    cost += 0.5 * contrast * contrast + std::log(expected.spread / usual_spread);
   }
   return cost;
 }
@@ -62,7 +63,9 @@ std::vector<Hypothesis> hypotheses_of(std::span<const geometry::View> views, con
     const Eigen::Matrix2d spread = slopes[k] * marker.covariance * slopes[k].transpose();
     for (std::size_t c = 0; c < discs[k].size(); ++c) {
       const Candidate& disc = discs[k][c];
-      if (!has_marker_size(disc.image, marker.images[k].radius_px)) continue;
+      if (!has_marker_size(disc.image, marker.images[k].radius_px) ||
+          disc.image.sigma_px > vaguest * marker.images[k].radius_px)
+        continue;
       Eigen::Matrix2d covariance = spread;
       covariance.diagonal().array() += variance_of(disc.image, marker.images[k]);
       const Eigen::Vector2d off = disc.uv - places[k];

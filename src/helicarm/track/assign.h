@@ -15,6 +15,7 @@ namespace helicarm::track {
 struct ExpectedImage {
   double radius_px = 0;
   double contrast = 0;                                 ///< absolute; 0: unknown
+  double spread = 0.35;                                ///< of the contrast's logarithm
   Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();  ///< by the camera's delay
   double shift_sigma = 0;                              ///< of it, px
 };

@@ -165,6 +165,33 @@ std::vector<double> sigma_factors(Work& work) {
   return factors;
 }
 
+/// Correlation of the images' errors between neighbouring frames, by the signed ray gaps: the texture behind
+/// a marker moves with it. In units of each gap's standard deviation.
+double correlation_of(const Work& work) {
+  constexpr double most = 0.8, least_pairs = 50, cut = 4;
+  double products = 0, squares = 0, pairs = 0;
+  for (std::size_t m = 0; m < work.markers; ++m) {
+    std::optional<double> before;
+    for (std::size_t f = 0; f < work.frames; ++f) {
+      std::optional<double> now;
+      const auto &first = work.sights[f][m][0], &other = work.sights[f][m][1];
+      if (work.points[f][m] && first && other) {
+        const geometry::Ray from = geometry::ray_through(*first->view, first->uv),
+                            to = geometry::ray_through(*other->view, other->uv);
+        const double sign = (to.origin - from.origin).dot(from.direction.cross(to.direction)) > 0 ? 1 : -1;
+        now = std::clamp(sign * std::sqrt(work.points[f][m]->chi2), -cut, cut);
+      }
+      if (now && before) {
+        products += *now * *before;
+        squares += 0.5 * (*now * *now + *before * *before);
+        ++pairs;
+      }
+      before = now;
+    }
+  }
+  return pairs < least_pairs ? 0.3 : std::clamp(products / squares, 0.0, most);
+}
+
 /// A body's geometry and its poses by least squares over the markers that count.
 struct Shape {
   std::vector<OptionalPlace> in_body;
@@ -638,6 +665,7 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
   }
   sequence.sigma_factor = sigma_factors(work);
   locate_all(work);
+  sequence.correlation = correlation_of(work);
   sequence.distances = distances_of(work);
 
   std::vector<Estimated> bodies;
@@ -703,7 +731,12 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
            {},
            {{"condition_per_m", body.condition_per_m}, {"sigma_deg", turn}}});
     const Eigen::Vector3d centre = mean_of(points);
-    auto& motion = motions.emplace_back(smooth_poses(work.times, at.poses, centre));
+    // Of correlated errors, as many independent ones as their means' variance shows.
+    const double fewer = (1 + sequence.correlation) / (1 - sequence.correlation);
+    std::vector<std::optional<FramePose>> measured = at.poses;
+    for (auto& pose : measured)
+      if (pose) pose->covariance *= fewer;
+    auto& motion = motions.emplace_back(smooth_poses(work.times, measured, centre));
     if (motion) {
       body.prior = motion->prior;
       std::vector<std::optional<FramePose>> smooth;

@@ -48,6 +48,7 @@ struct Sequence {
   std::vector<BodySequence> bodies;
   std::vector<std::vector<TrackedBody>> relative;  ///< [body - 1][frame], to the first body
   std::vector<ViewDelay> delays;                   ///< per view
+  double correlation = 0;                          ///< of the images' errors between neighbouring frames
   std::vector<double> sigma_factor;                ///< per marker, of the fits' standard deviations
   std::vector<MarkerDistance> distances;
   int repaired = 0, complete = 0;

@@ -112,8 +112,7 @@ Filtered filter(std::span<const double> times, std::span<const std::optional<Mea
     step.predicted_covariance = covariance;
     if (measured[i]) {
       const Vector6 off = between(state, measured[i]->at).head<6>();
-      const Matrix6 spread =
-          covariance.topLeftCorner<6, 6>() + prior.noise * prior.noise * measured[i]->covariance;
+      const Matrix6 spread = covariance.topLeftCorner<6, 6>() + measured[i]->covariance;
       const Eigen::LLT<Matrix6> factor(spread);
       const Vector6 weighted = factor.solve(off);
       const Eigen::Matrix<double, n, 6> gain = factor.solve(covariance.topRows<6>()).transpose();
@@ -134,18 +133,17 @@ Filtered filter(std::span<const double> times, std::span<const std::optional<Mea
 MotionPrior likeliest(std::span<const double> times, std::span<const std::optional<Measured>> measured,
                       bool turns) {
   constexpr double least_factor = 1.3;
-  MotionPrior best{turns ? 1e-7 : 1e-12, 1e-2, 1};
+  MotionPrior best{turns ? 1e-7 : 1e-12, 1e-2};
   double most = filter(times, measured, best, turns, false).log_likelihood;
   for (double factor = 10; factor > least_factor; factor = std::sqrt(factor)) {
     bool is_better = true;
     for (int rounds = 0; is_better && rounds < 8; ++rounds) {
       is_better = false;
-      for (double MotionPrior::*part : {&MotionPrior::turn, &MotionPrior::shift, &MotionPrior::noise}) {
-        if (part != &MotionPrior::shift && !turns) continue;
+      for (double MotionPrior::*part : {&MotionPrior::turn, &MotionPrior::shift}) {
+        if (part == &MotionPrior::turn && !turns) continue;
         for (const double by : {factor, 1 / factor}) {
           MotionPrior tried = best;
-          tried.*part *= part == &MotionPrior::noise ? std::pow(by, 0.25) : by;
-          if (tried.noise < 0.7 || tried.noise > 4) continue;
+          tried.*part *= by;
           const double there = filter(times, measured, tried, turns, false).log_likelihood;
           if (!(there > most + 1e-3)) continue;
           most = there;

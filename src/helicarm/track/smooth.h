@@ -19,12 +19,10 @@ struct FramePose {
   registration::RigidCovariance covariance = registration::RigidCovariance::Zero();
 };
 
-/// Power of the white jerk, per frame: mm^2 and rad^2 per frame^5, and the factor of the measured poses'
-/// standard deviations.
+/// Power of the white jerk: rad^2 and mm^2 per frame^5.
 struct MotionPrior {
   double turn = 1e-8;
   double shift = 1e-2;
-  double noise = 1;
 };
 
 struct SmoothMotion {

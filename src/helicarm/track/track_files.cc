@@ -63,8 +63,7 @@ Json json_of(const BodySequence& body, const BodyPlan& plan, const TrackCase& gi
   json["rms_mm"] = count > 0 ? Json(std::sqrt(squares / count)) : Json(nullptr);
   json["decisions"] = decisions_json(body.frames);
   json["prior"] = body.prior ? Json{{"turn_rad2_per_frame5", body.prior->turn},
-                                    {"shift_mm2_per_frame5", body.prior->shift},
-                                    {"noise_factor", body.prior->noise}}
+                                    {"shift_mm2_per_frame5", body.prior->shift}}
                              : Json(nullptr);
   return json;
 }
@@ -102,6 +101,7 @@ Json to_json(const Sequence& sequence, const TrackCase& given) {
                {"last_frame", sequence.frames.back()},
                {"complete_frames", sequence.complete},
                {"swaps_repaired", sequence.repaired},
+               {"error_correlation", sequence.correlation},
                {"views", Json::array()},
                {"markers", Json::array()},
                {"bodies", Json::array()},

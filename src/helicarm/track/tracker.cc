@@ -97,6 +97,7 @@ void Tracker::expect_images(ExpectedMarker& marker, std::size_t index,
     ExpectedImage image;
     image.radius_px = radius_px(k, marker.place);
     image.contrast = markers_[index].contrast[k];
+    image.spread = std::min(1.2, 0.35 * (1 + 0.25 * markers_[index].age[k]));
     if (k > 0 && cameras_[k].depth(marker.place) > 1) {
       const Eigen::Vector2d speed = geometry::projection_jacobian(cameras_[k], marker.place) * velocity;
       image.shift_px = delays_[k].mean() * speed;
@@ -146,7 +147,7 @@ std::vector<std::vector<Candidate>> Tracker::search(const std::vector<xray::Xray
       const Eigen::Vector2d at = raw(k, cameras_[k].project(marker.place) + marker.images[k].shift_px);
       if (!at.allFinite()) continue;
       windows.push_back({at, reach_px.value_or(window_reach(sigma)), marker.images[k].radius_px,
-                         marker.images[k].contrast});
+                         marker.images[k].contrast * std::exp(1.5 * (0.35 - marker.images[k].spread))});
     }
     for (const MarkerImage& image : find_markers(images[k], windows, appearance_[k]))
       discs[k].push_back({image, rectified(k, image.uv_raw)});
@@ -264,10 +265,19 @@ FrameSights Tracker::look(int frame, const std::vector<xray::XrayImage>& images)
       });
     });
   const auto found = assign(cameras_, alone, left);
-  for (std::size_t i = 0; i < lost.size(); ++i)
-    if (cameras_.size() - std::size_t(std::ranges::count(found[i], not_seen)) >= 2)
-      for (std::size_t k = 0; k < cameras_.size(); ++k)
-        if (found[i][k] != not_seen) sights.of[lost[i]][k] = left[k][std::size_t(found[i][k])].image;
+  for (std::size_t i = 0; i < lost.size(); ++i) {
+    constexpr double most_moved_mm = 3, clear_px = 0.12;
+    std::vector<Sight> seen;
+    for (std::size_t k = 0; k < cameras_.size(); ++k)
+      if (found[i][k] != not_seen) {
+        const Candidate& disc = left[k][std::size_t(found[i][k])];
+        if (disc.image.sigma_px < clear_px) seen.push_back({&cameras_[k], disc.uv, disc.image.sigma_px});
+      }
+    const auto met = seen.size() >= 2 ? sighted_point(seen) : std::nullopt;
+    if (!met || (met->place - again[lost[i]].place).norm() > most_moved_mm) continue;
+    for (std::size_t k = 0; k < cameras_.size(); ++k)
+      if (found[i][k] != not_seen) sights.of[lost[i]][k] = left[k][std::size_t(found[i][k])].image;
+  }
   return sights;
 }
 
@@ -315,12 +325,15 @@ void Tracker::absorb(const FrameSights& sights) {
       now[m].place += guess.covariance * slope.transpose() * covariance.inverse() *
                       (seen[0].uv - seen[0].view->project(guess.place));
     }
-    for (std::size_t k = 0; k < cameras_.size(); ++k)
+    for (std::size_t k = 0; k < cameras_.size(); ++k) {
+      ++markers_[m].age[k];
       if (const auto& image = sights.of[m][k]) {
+        markers_[m].age[k] = 0;
         double& contrast = markers_[m].contrast[k];
         contrast =
             contrast > 0 ? 0.7 * contrast + 0.3 * std::abs(image->contrast) : std::abs(image->contrast);
       }
+    }
   }
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     BodyState& body = bodies_[b];
@@ -343,6 +356,8 @@ void Tracker::absorb(const FrameSights& sights) {
           body.in_body[i] = plan.geometry[i], body.seen[i] = geometry_frames;
         else if (now[plan.markers[i]].located)
           body.in_body[i] = now[plan.markers[i]].place, body.seen[i] = 1;
+        else if (markers_[plan.markers[i]].known)  // by its picks
+          body.in_body[i] = markers_[plan.markers[i]].place, body.seen[i] = 0.5;
       }
       continue;
     }
@@ -375,6 +390,8 @@ void Tracker::absorb(const FrameSights& sights) {
           squares += (in_body - body.in_body[i]).squaredNorm();
           residuals += 3;
         }
+        const bool is_off = body.seen[i] > 0 && (in_body - body.in_body[i]).norm() > 3;
+        if (is_off) continue;  // another disc, rather than a marker that moved in its bone
         body.seen[i] = std::min(body.seen[i] + 1, geometry_frames);
         if (plan.geometry.empty()) body.in_body[i] += (in_body - body.in_body[i]) / body.seen[i];
       } else if (!now[m].located && body.seen[i] > 0 && body.hidden < 3) {
@@ -440,7 +457,10 @@ Expected<Tracker> Tracker::begin(const TrackCase& given, int frame,
     Tracker tracker(given);
     for (const TrackView& view : given.views) tracker.cameras_.push_back(view.camera);
     tracker.markers_.resize(given.markers.size());
-    for (MarkerState& marker : tracker.markers_) marker.contrast.assign(given.views.size(), 0);
+    for (MarkerState& marker : tracker.markers_) {
+      marker.contrast.assign(given.views.size(), 0);
+      marker.age.assign(given.views.size(), 0);
+    }
     tracker.delays_.assign(given.views.size(), {1 / (delay_spread * delay_spread), 0});
     tracker.body_of_.resize(given.markers.size());
     for (std::size_t b = 0; b < given.bodies.size(); ++b) {

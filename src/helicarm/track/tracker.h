@@ -49,6 +49,7 @@ class Tracker {
     int hidden = 0;              // frames since it was seen in two views
     bool known = false;
     std::vector<double> contrast;  // absolute, per view; 0: unknown
+    std::vector<int> age;          // frames since it was seen, per view
   };
   struct BodyState {
     std::vector<Eigen::Vector3d> in_body;  // of each marker

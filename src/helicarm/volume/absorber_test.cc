@@ -90,8 +90,7 @@ TEST(Absorber, AgreesWithReferenceSumInAnyDirection) {
   Volume volume = noise_volume();
   RandomStream random(2, 900);
   for (int turn = 0; turn < 20; ++turn) {
-    volume.patient_from_voxel = turned(random) *
-                                Vector3d(0.7, turn % 2 ? -1.1 : 1.1, 2).asDiagonal() *
+    volume.patient_from_voxel = turned(random) * Vector3d(0.7, turn % 2 ? -1.1 : 1.1, 2).asDiagonal() *
                                 Eigen::Translation3d(-5, -4, -7);
     const Absorber absorber(volume, {});
     const Vector3d source = 60 * turned(random).col(0);

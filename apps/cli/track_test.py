@@ -1,0 +1,237 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of `track` with discs of two bodies, drawn here by area sampling. Usage: track_test.py PROGRAM"""
+
+import csv
+import json
+import math
+import pathlib
+import shutil
+import struct
+import tempfile
+import unittest
+import zlib
+
+from program import run
+
+SIZE, FOCUS, DISTANCE, RADIUS, FRAMES = 160, 1600, 800, 1.0, 12
+# Rows: camera axes in the world.
+CAMERAS = {"A": ((1, 0, 0), (0, 0, -1), (0, 1, 0)), "B": ((0, -1, 0), (0, 0, -1), (1, 0, 0))}
+BODIES = {"jaw": {"J1": (-14, 3, 5), "J2": (8, -12, -9), "J3": (3, 11, 14), "J4": (-6, -7, -16)},
+          "skull": {"S1": (15, 6, 22), "S2": (-20, -14, 24), "S3": (22, 18, -2)}}
+
+
+def place(body, xyz, frame):
+    x, y, z = xyz
+    if body == "skull":
+        return x + 0.3 * frame, y, z
+    angle = 0.02 * frame
+    return (x * math.cos(angle) - z * math.sin(angle), y + 0.5 * frame, x * math.sin(angle) + z * math.cos(angle))
+
+
+def project(axes, point):
+    arm = [p + DISTANCE * a for p, a in zip(point, axes[2])]
+    x, y, z = (sum(a * b for a, b in zip(axis, arm)) for axis in axes)
+    return FOCUS * x / z + (SIZE - 1) / 2, FOCUS * y / z + (SIZE - 1) / 2
+
+
+def image(axes, frame, bright, hidden=()):
+    grey = [[120.0] * SIZE for _ in range(SIZE)]
+    for body, markers in BODIES.items():
+        for name, xyz in markers.items():
+            if name in hidden:
+                continue
+            u, v = project(axes, place(body, xyz, frame))
+            radius = RADIUS * FOCUS / DISTANCE
+            for row in range(int(v - radius - 1), int(v + radius + 3)):
+                for column in range(int(u - radius - 1), int(u + radius + 3)):
+                    if 0 <= row < SIZE and 0 <= column < SIZE:
+                        inside = sum((column + (i - 3.5) / 8 - u) ** 2 + (row + (k - 3.5) / 8 - v) ** 2 < radius ** 2
+                                     for i in range(8) for k in range(8)) / 64
+                        grey[row][column] += (80 if bright else -80) * inside
+    rows = []
+    for v in range(SIZE):
+        noise = [((u * 7919 + v * 104729 + frame * 1299709) % 1009) / 1009 * 6 - 3 for u in range(SIZE)]
+        rows.append(b"\0" + bytes(min(255, max(0, round(g + n))) for g, n in zip(grey[v], noise)))
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", SIZE, SIZE, 8, 0, 0, 0, 0)) +
+            chunk(b"IDAT", zlib.compress(b"".join(rows))) + chunk(b"IEND", b""))
+
+
+def make_case(folder, bright=False, hidden=lambda view, frame: ()):
+    folder.mkdir()
+    views, picks = [], []
+    for name, axes in CAMERAS.items():
+        middle = (SIZE - 1) / 2
+        (folder / f"{name}.json").write_text(json.dumps({
+            "K": [[FOCUS, 0, middle], [0, FOCUS, middle], [0, 0, 1]], "R": axes,
+            "t": [sum(a * DISTANCE * b for a, b in zip(axis, axes[2])) for axis in axes], "image_size": [SIZE, SIZE]}))
+        offset = 100 if name == "B" else 0
+        for frame in range(1, FRAMES + 1):
+            (folder / f"{name}_{frame + offset:04d}.png").write_bytes(
+                image(axes, frame, bright, hidden(name, frame)))
+        views.append({"name": name, "image": name + "_{frame:04d}.png", "camera": f"{name}.json",
+                      "frame_offset": offset})
+        for body, markers in BODIES.items():
+            for marker, xyz in markers.items():
+                u, v = project(axes, place(body, xyz, 1))
+                picks.append({"name": marker, "view": name, "frame": 1, "uv": [round(u + 0.7), round(v - 0.6)]})
+    case = {"format": "helicarm-case/2", "views": views, "markers": {"diameter_mm": 2 * RADIUS}, "picks": picks,
+            "bodies": [{"name": body, "markers": list(markers)} for body, markers in BODIES.items()]}
+    (folder / "case.json").write_text(json.dumps(case))
+    return case
+
+
+def table(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+class Track(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.root = pathlib.Path(cls.folder.name)
+        cls.case = make_case(cls.root / "case", hidden=lambda view, frame: ("J1",) if view == "B" and 5 <= frame <= 7
+                             else ())
+        cls.done = run("track", cls.root / "case", "--frames", f"1-{FRAMES}", "--out", cls.root / "out", "--json")
+        assert cls.done.returncode == 0, cls.done.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def changed(self, name, change):
+        folder = self.root / name
+        shutil.copytree(self.root / "case", folder)
+        case = json.loads(json.dumps(self.case))
+        change(case, folder)
+        (folder / "case.json").write_text(json.dumps(case))
+        return folder
+
+    def track(self, folder, out="refused", frames=f"1-{FRAMES}", *options):
+        return run("track", folder, "--frames", frames, "--out", self.root / out, *options)
+
+    def check_places(self, out):
+        for row in table(out / "markers.csv"):
+            body = "jaw" if row["name"][0] == "J" else "skull"
+            truth = place(body, BODIES[body][row["name"]], int(row["frame"]))
+            off = math.dist([float(row[f"{axis}_mm"]) for axis in "xyz"], truth)
+            self.assertLess(off, 0.15, row)
+
+    def test_places_and_poses_are_those_of_the_drawing(self):
+        out = self.root / "out"
+        self.check_places(out)
+        rows = {(int(row["frame"]), row["name"]): row for row in table(out / "markers.csv")}
+        self.assertEqual([rows[frame, "J1"]["status"] for frame in (4, 5, 7, 8)],
+                         ["tracked", "one_view", "one_view", "tracked"])
+        self.assertEqual(rows[5, "J1"]["views"], "A")
+        for name in ("bodies.csv", "smoothed.csv"):
+            last = [row for row in table(out / name) if row["body"] == "jaw"][-1]
+            angle = 0.02 * (FRAMES - 1)
+            self.assertAlmostEqual(float(last["m11"]), math.cos(angle), delta=0.002)
+            self.assertAlmostEqual(float(last["m31"]), math.sin(angle), delta=0.006)
+            self.assertEqual(last["decision"], "accept")
+        answer = json.loads(self.done.stdout)
+        self.assertEqual((answer["format"], answer["status"], answer["frames"]), ("helicarm-track/1", "ok", FRAMES))
+        self.assertEqual(answer["complete_frames"], FRAMES - 3)
+        self.assertEqual(answer["swaps_repaired"], 0)
+
+    def test_files_of_other_programs_have_their_conventions(self):
+        out = self.root / "out"
+        lines = (out / "points2d.csv").read_text().splitlines()
+        self.assertTrue(lines[0].startswith("J1_cam1_X,J1_cam1_Y,J1_cam2_X,J1_cam2_Y,J2_cam1_X"), lines[0])
+        self.assertEqual(len(lines), 1 + FRAMES)
+        u, v = project(CAMERAS["A"], place("jaw", BODIES["jaw"]["J1"], 1))
+        self.assertAlmostEqual(float(lines[1].split(",")[0]), u, delta=0.2)
+        self.assertAlmostEqual(float(lines[1].split(",")[1]), v, delta=0.2)
+        self.assertEqual(lines[6].split(",")[2:4], ["NaN", "NaN"])
+        self.assertTrue((out / "points3d.csv").read_text().startswith("J1_X,J1_Y,J1_Z,J2_X"))
+        tra = (out / "jaw.tra").read_text().splitlines()
+        self.assertEqual([len(line.split(",")) for line in tra], FRAMES * [16])
+        self.assertEqual([float(x) for x in tra[0].split(",")], [float(i % 5 == 0) for i in range(16)])
+        self.assertEqual(len(table(out / "relative.csv")), FRAMES)
+
+    def test_interrupted_and_resumed_gives_the_same_bytes(self):
+        out = self.root / "resumed"
+        shutil.copytree(self.root / "out", out)
+        text = (out / "sights.csv").read_text()
+        (out / "sights.csv").write_text(text[:len(text) // 2])
+        for name in ("markers.csv", "bodies.csv", "smoothed.csv", "report.html", "track.json"):
+            (out / name).unlink()
+        done = self.track(self.root / "case", "resumed", f"1-{FRAMES}", "--resume")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for name in ("sights.csv", "markers.csv", "bodies.csv", "smoothed.csv", "relative.csv", "points2d.csv",
+                     "points3d.csv", "jaw.tra", "report.html"):
+            self.assertEqual((out / name).read_bytes(), (self.root / "out" / name).read_bytes(), name)
+        done = self.track(self.root / "case", "resumed", "1-5", "--resume")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("another sequence", done.stderr)
+
+    def test_bright_markers_are_followed(self):
+        make_case(self.root / "bright", bright=True)
+        done = self.track(self.root / "bright", "bright-out")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.check_places(self.root / "bright-out")
+
+    def test_exchanged_picks_are_refused_by_name(self):
+        def exchange(case, folder):
+            picks = {(p["name"], p["view"]): p for p in case["picks"]}
+            a, b = picks["J1", "B"], picks["J3", "B"]
+            a["uv"], b["uv"] = b["uv"], a["uv"]
+        done = self.track(self.changed("exchanged", exchange))
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("markers_swapped", done.stderr)
+        self.assertIn('"J1" and "J3"', done.stderr)
+        refused = json.loads((self.root / "refused/track.json").read_text())
+        self.assertEqual((refused["status"], refused["failure"]["code"]), ("refused", "markers_swapped"))
+
+    def test_geometry_of_the_other_body_is_refused(self):
+        def give(case, folder):
+            for body, other in (("jaw", "skull"), ("skull", "jaw")):
+                lines = ["name,x_mm,y_mm,z_mm"]
+                places = list(BODIES[other].values())[:3]
+                lines += [f"{name},{x},{y},{z}" for name, (x, y, z) in zip(list(BODIES[body])[:3], places)]
+                (folder / f"{body}.csv").write_text("\n".join(lines) + "\n")
+            for body in case["bodies"]:
+                body["markers"] = body["markers"][:3]
+                body["geometry"] = body["name"] + ".csv"
+        done = self.track(self.changed("other-body", give))
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("bodies_exchanged", done.stderr)
+
+    def test_wrong_input_is_named(self):
+        def remove(case, folder):
+            (folder / "B_0107.png").unlink()
+
+        def shrink(case, folder):
+            (folder / "A_0009.png").write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 80, 80) +
+                                                b"\x08\0\0\0\0\0\0\0\0")
+
+        def unknown(case, folder):
+            case["bodies"][0]["markers"].append("J9")
+
+        def no_size(case, folder):
+            del case["markers"]
+        for name, change, word in (("gap", remove, "1 of 24 images do not exist, the first: B_0107.png"),
+                                   ("size", shrink, "image 9 has 80 x 80 pixels"), ("name", unknown, '"J9" has no pick'),
+                                   ("no-size", no_size, '"markers" is missing')):
+            done = self.track(self.changed(name, change), "wrong")
+            self.assertEqual(done.returncode, 2, name + done.stderr)
+            self.assertIn(word, done.stderr)
+            self.assertFalse((self.root / "wrong/track.json").exists())
+        done = self.track(self.root / "case", "wrong", "3-6")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("none is of the first frame, 3", done.stderr)
+
+    def test_other_commands_name_this_one(self):
+        for command in ("run", "register"):
+            done = run(command, self.root / "case", "--out", self.root / command)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn("helicarm track", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

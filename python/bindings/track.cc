@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/track/track.h"
+
+#include <limits>
+#include <memory>
+
+#include "arrays.h"
+#include "module.h"
+#include "signals.h"
+
+namespace helicarm::python {
+namespace {
+
+constexpr double unplaced = std::numeric_limits<double>::quiet_NaN();
+
+/// A sequence with the case that it is of.
+struct Tracked {
+  track::TrackCase given;
+  track::Sequence sequence;
+};
+
+std::unique_ptr<Tracked> tracked(const std::filesystem::path& folder, const std::string& frames,
+                                 const std::optional<std::filesystem::path>& out, bool resume,
+                                 const py::object& progress) {
+  const py::object nothing = py::none();
+  const RunHooks hooks = run_hooks(nothing);
+  return value_or_raise(without_gil([&] {
+    return guarded([&] {
+      if (out && !resume) track::forget_track(*out);
+      const auto range = value_or_throw(case_registration::frame_range_from(frames));
+      auto made = std::make_unique<Tracked>();
+      made->given = value_or_throw(track::read_track_case(folder, range));
+      made->sequence =
+          value_or_throw(track::run_track(made->given, range, {.out = out, .resume = resume}, [&](int done) {
+            hooks.on_view();
+            if (progress.is_none()) return;
+            const py::gil_scoped_acquire acquire;
+            progress(double(done) / range.count());
+          }));
+      if (out) value_or_throw(track::write_track(made->sequence, made->given, *out));
+      return made;
+    });
+  }));
+}
+
+/// (n, markers, ...) of the places, NaN where a marker is lost.
+template <class Write>
+py::array places_array(const Tracked& t, std::vector<py::ssize_t> rest, Write write) {
+  std::vector<py::ssize_t> shape{py::ssize_t(t.sequence.frames.size()), py::ssize_t(t.given.markers.size())};
+  py::ssize_t each = 1;
+  for (const py::ssize_t size : rest) shape.push_back(size), each *= size;
+  py::array_t<double> array(shape);
+  double* at = array.mutable_data();
+  for (const auto& frame : t.sequence.markers)
+    for (const track::TrackedMarker& marker : frame) {
+      std::fill(at, at + each, unplaced);
+      if (marker.place) write(*marker.place, at);
+      at += each;
+    }
+  return read_only(array);
+}
+
+/// (n, size, size) of each body by its name, NaN where a frame has no pose.
+template <class Value>
+py::dict bodies_dict(const Tracked& t, std::vector<track::TrackedBody> track::BodySequence::*frames, int size,
+                     Value value) {
+  py::dict dict;
+  for (std::size_t b = 0; b < t.given.bodies.size(); ++b) {
+    const auto& of = t.sequence.bodies[b].*frames;
+    py::array_t<double> array({py::ssize_t(of.size()), py::ssize_t(size), py::ssize_t(size)});
+    double* at = array.mutable_data();
+    for (const track::TrackedBody& frame : of) {
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> block(at, size,
+                                                                                               size);
+      if (frame.pose)
+        block = value(*frame.pose);
+      else
+        block.setConstant(unplaced);
+      at += size * size;
+    }
+    dict[py::str(t.given.bodies[b].name)] = read_only(array);
+  }
+  return dict;
+}
+
+Eigen::MatrixXd matrix_of(const track::FramePose& pose) { return pose.pose.matrix(); }
+Eigen::MatrixXd covariance_of_pose(const track::FramePose& pose) { return pose.covariance; }
+
+}  // namespace
+
+void add_track(py::module_& module) {
+  py::class_<Tracked>(
+      module, "Track",
+      "The answer of track; to_dict() is track.json. n is the number of frames, m of markers.")
+      .def_property_readonly(
+          "frames", [](const Tracked& t) { return t.sequence.frames; }, "Number of each frame.")
+      .def_property_readonly(
+          "markers", [](const Tracked& t) { return t.given.markers; }, "Names, in the arrays' order.")
+      .def_property_readonly(
+          "places",
+          [](const Tracked& t) {
+            return places_array(t, {3}, [](const track::FramePlace& place, double* at) {
+              Eigen::Map<Eigen::Vector3d>{at} = place.place;
+            });
+          },
+          "(n, m, 3): mm, NaN where a marker is lost.")
+      .def_property_readonly(
+          "covariances",
+          [](const Tracked& t) {
+            return places_array(t, {3, 3}, [](const track::FramePlace& place, double* at) {
+              Eigen::Map<Eigen::Matrix3d>{at} = place.covariance;
+            });
+          },
+          "(n, m, 3, 3): mm^2.")
+      .def_property_readonly(
+          "status",
+          [](const Tracked& t) {
+            std::vector<std::vector<std::string>> words;
+            for (const auto& frame : t.sequence.markers) {
+              auto& row = words.emplace_back();
+              for (const track::TrackedMarker& marker : frame)
+                row.emplace_back(track::status_words[std::size_t(marker.status)]);
+            }
+            return words;
+          },
+          "n lists of m words: tracked, one_view, predicted, lost.")
+      .def_property_readonly(
+          "bodies",
+          [](const Tracked& t) { return bodies_dict(t, &track::BodySequence::frames, 4, matrix_of); },
+          "{name: (n, 4, 4)}: world_from_body of each frame against the first, NaN where it has no pose.")
+      .def_property_readonly(
+          "body_covariances",
+          [](const Tracked& t) {
+            return bodies_dict(t, &track::BodySequence::frames, 6, covariance_of_pose);
+          },
+          "{name: (n, 6, 6)}: rotation vector in rad, then mm, in world axes about the body's centroid.")
+      .def_property_readonly(
+          "smoothed",
+          [](const Tracked& t) { return bodies_dict(t, &track::BodySequence::smoothed, 4, matrix_of); },
+          "{name: (n, 4, 4)}: likewise, of one estimate over all frames, gaps filled.")
+      .def_property_readonly(
+          "smoothed_covariances",
+          [](const Tracked& t) {
+            return bodies_dict(t, &track::BodySequence::smoothed, 6, covariance_of_pose);
+          },
+          "{name: (n, 6, 6)}.")
+      .def_property_readonly("warnings", [](const Tracked& t) { return warning_list(t.sequence.warnings); })
+      .def(
+          "to_dict", [](const Tracked& t) { return python_from(track::to_json(t.sequence, t.given)); },
+          "The content of track.json.")
+      .def(
+          "write",
+          [](const Tracked& t, const std::filesystem::path& folder) {
+            value_or_raise(without_gil([&] { return track::write_track(t.sequence, t.given, folder); }));
+          },
+          py::arg("folder"), "All files of `helicarm track`. Raises InputError: cannot_write.")
+      .def("__repr__", [](const Tracked& t) {
+        return fmt::format("<Track: {} frames, {} markers, {} bodies>", t.sequence.frames.size(),
+                           t.given.markers.size(), t.given.bodies.size());
+      });
+  const track::TrackOptions usual;
+  module.def("track", &tracked, py::arg("case"), py::kw_only(), py::arg("frames"),
+             py::arg("out") = py::none(), py::arg("resume") = usual.resume, py::arg("progress") = py::none(),
+             R"(Follows markers and bodies through a sequence, as `helicarm track` does.
+
+case: folder that holds case.json. frames: "A-B" or "A-B:STEP"; the markers are picked in frame A. out: folder for all
+files, whose rows are written as they are computed. resume: go on after the frames of an interrupted run in `out`.
+progress: called with the share of the frames that are done; an exception from it ends the run, and Ctrl-C does.
+Releases the GIL. Returns a Track.
+Raises InputError; RefusedError if the picks contradict each other or the geometry given.)");
+}
+
+}  // namespace helicarm::python
