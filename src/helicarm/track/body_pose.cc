@@ -92,8 +92,6 @@ std::optional<PoseFit> fit_pose(const geometry::RigidTransform& start, std::span
       gradient += moves.transpose() * weight * left;
     }
     fit.determining = 0;
-    // The threshold falls to its value, so that a start far off keeps its markers.
-    const double widened = options.robust ? cut * std::max(1.0, 8 * std::pow(0.5, i)) : 0;
     for (std::size_t k = 0; k < markers.size(); ++k) {
       if (markers[k].sights.empty()) {
         fit.weight[k] = 0;
@@ -106,7 +104,7 @@ std::optional<PoseFit> fit_pose(const geometry::RigidTransform& start, std::span
       const Eigen::VectorXd weighted = factor.solve(rows->residual);
       fit.chi2[k] = rows->residual.dot(weighted);
       if (options.robust) {
-        const double t = fit.chi2[k] / (double(rows->residual.size()) * widened * widened);
+        const double t = fit.chi2[k] / (double(rows->residual.size()) * cut * cut);
         fit.weight[k] = t < 1 ? (1 - t) * (1 - t) : 0;
       }
       const Eigen::MatrixXd slope = rows->by_point * point_by_step(point, centre);

