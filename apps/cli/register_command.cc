@@ -9,6 +9,7 @@
 #include "findings.h"
 #include "helicarm/case_registration/follow_case.h"
 #include "helicarm/case_registration/register_fields.h"
+#include "helicarm/case_registration/registration_tables.h"
 #include "helicarm/core/json.h"
 #include "helicarm/pipeline/registration_case.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -51,6 +52,8 @@ void print(const RegisteredModel& model, std::ostream& out) {
                        point.place.in_calibrator.x(), point.place.in_calibrator.y(),
                        point.place.in_calibrator.z(),
                        localization::length_at_95(point.place.covariance_in_calibrator));
+  if (const report::Table in_bone = case_registration::tunnels_in_bone_table({model}); !in_bone.rows.empty())
+    out << report::text_of(report::without_empty_columns(in_bone));
 }
 
 /// Every model through a sequence of images.

@@ -20,9 +20,10 @@ void print_advice(const pipeline::Result& result, const std::string& report, std
 
 std::string summary_of(const pipeline::Result& result) {
   std::string text;
-  for (const report::Table& table : {report::statistics_table(result.accuracy),
-                                     report::points_table(result.points), report::tunnels_table(result),
-                                     report::verification_table(report::tools_at_ends(result.verifications))})
+  for (const report::Table& table :
+       {report::statistics_table(result.accuracy), report::points_table(result.points),
+        report::tunnels_table(result), report::bone_table(result),
+        report::verification_table(report::tools_at_ends(result.verifications))})
     if (!table.rows.empty())
       text += fmt::format("{}{}\n{}", text.empty() ? "" : "\n", table.heading,
                           report::text_of(report::without_empty_columns(table)));

@@ -40,6 +40,33 @@ void check_points(const Plan& plan, const pipeline::RegistrationCase& given,
                   "another point, of the picks");
 }
 
+/// Gives the lines that the case's tunnels name their names and sizes.
+void name_lines(const pipeline::RegistrationCase& given, const pipeline::CaseModel& model, Plan& plan) {
+  const std::vector<PlanTunnel> lines = plan.tunnels;
+  std::vector<std::string> taken;
+  for (const pipeline::ModelTunnelPlan& tunnel : given.tunnels) {
+    if (tunnel.model != model.name) continue;
+    const auto refuse = [&](const std::string& problem) {
+      throw BadInput(Reason::bad_value,
+                     fmt::format("tunnels: \"{}\": \"line\": \"{}\" {}", tunnel.name, tunnel.line, problem));
+    };
+    const auto line = std::ranges::find(lines, tunnel.line, &PlanTunnel::name);
+    if (line == lines.end()) {
+      std::string names;
+      for (const PlanTunnel& other : lines) names += (names.empty() ? "" : ", ") + other.name;
+      refuse(fmt::format("is not a line of {}, which has: {}", model.plan->filename().string(),
+                         names.empty() ? "none" : names));
+    }
+    if (std::ranges::find(taken, tunnel.line) != taken.end()) refuse("is a line of two tunnels");
+    taken.push_back(tunnel.line);
+    PlanTunnel& named = plan.tunnels[std::size_t(line - lines.begin())];
+    named.name = tunnel.name;
+    named.diameter_mm = tunnel.diameter_mm;
+    named.bridge_mm = tunnel.bridge_mm;
+    named.enters_at_end = tunnel.enters_at_end;
+  }
+}
+
 }  // namespace
 
 std::vector<std::optional<Plan>> read_plans(const pipeline::RegistrationCase& given) {
@@ -51,6 +78,7 @@ std::vector<std::optional<Plan>> read_plans(const pipeline::RegistrationCase& gi
     plans.emplace_back();
     if (!model.plan) continue;
     plans.back() = value_or_throw(read_plan(*model.plan));
+    name_lines(given, model, *plans.back());
     for (const PlanTunnel& tunnel : plans.back()->tunnels) {
       const std::string owner =
           fmt::format("a tunnel of \"{}\"'s plan {}", model.name, model.plan->filename().string());

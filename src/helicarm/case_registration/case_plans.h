@@ -9,9 +9,10 @@
 
 namespace helicarm::case_registration {
 
-/// The models' plans, nothing for a model without. Throws BadInput: as `read_plan`, and name_clash for two
-/// tunnels of one name, of plans or of the case, and for a planned point named like a pick that is not the
-/// model's landmark there.
+/// The models' plans, nothing for a model without; lines that the case's tunnels name have those names,
+/// diameters and bridges. Throws BadInput: as `read_plan`, bad_value for a tunnel of a line that the plan
+/// lacks or that another tunnel has, and name_clash for two tunnels of one name, of plans or of the case, and
+/// for a planned point named like a pick that is not the model's landmark there.
 std::vector<std::optional<Plan>> read_plans(const pipeline::RegistrationCase& given);
 
 }  // namespace helicarm::case_registration

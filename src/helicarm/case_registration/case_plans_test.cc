@@ -85,5 +85,25 @@ TEST_F(CasePlans, APickedLandmarkMayBePlanned) {
   EXPECT_EQ(plans().error().reason, Reason::name_clash);
 }
 
+TEST_F(CasePlans, ATunnelOfTheCaseNamesALineAndGivesItsDiameter) {
+  add_model("femur", "one", "F-1");
+  given_.tunnels.push_back({"ACL", "femur", "one", 8.0, 3});
+  const auto read = plans();
+  ASSERT_TRUE(read) << read.error().message;
+  const PlanTunnel& tunnel = (*read)[0]->tunnels.at(0);
+  EXPECT_EQ(tunnel.name, "ACL");
+  EXPECT_EQ(tunnel.diameter_mm, 8);
+  EXPECT_EQ(tunnel.bridge_mm, 3);
+}
+
+TEST_F(CasePlans, ATunnelOfNoLineOrOfALineOfAnotherIsRefused) {
+  add_model("femur", "one", "F-1");
+  given_.tunnels.push_back({"ACL", "femur", "two", 8.0});
+  EXPECT_EQ(plans().error().reason, Reason::bad_value);
+  EXPECT_THAT(plans().error().message, HasSubstr("is not a line of femur.mrk.json, which has: one"));
+  given_.tunnels = {{"ACL", "femur", "one", 8.0}, {"PCL", "femur", "one", 7.0}};
+  EXPECT_THAT(plans().error().message, HasSubstr("is a line of two tunnels"));
+}
+
 }  // namespace
 }  // namespace helicarm::case_registration

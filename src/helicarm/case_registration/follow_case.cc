@@ -55,7 +55,7 @@ std::vector<std::unique_ptr<Followed>> followed_models(const pipeline::Registrat
   std::vector<std::optional<Plan>> plans = read_plans(given);
   for (std::size_t i = 0; i < given.models.size(); ++i) {
     const pipeline::CaseModel& asked = given.models[i];
-    auto model = value_or_throw(load_model(asked));
+    auto model = value_or_throw(load_model(asked)).model;
     if (!model)
       throw BadInput(Reason::bad_value,
                      fmt::format("models: \"{}\": a sequence needs a volume or a surface", asked.name));

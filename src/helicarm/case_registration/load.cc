@@ -198,15 +198,16 @@ Expected<std::vector<RegistrationView>> with_images(const LoadedViews& loaded,
   });
 }
 
-Expected<std::optional<registration::Model>> load_model(const pipeline::CaseModel& given) {
-  return guarded([&]() -> std::optional<registration::Model> {
+Expected<LoadedModel> load_model(const pipeline::CaseModel& given, bool with_bone) {
+  return guarded([&]() -> LoadedModel {
     if (given.surface) {
       registration::SurfaceMesh surface = value_or_throw(registration::read_surface(*given.surface));
       registration::Model model = value_or_throw(registration::model_from(given.name, surface));
       model.warnings = std::move(surface.warnings);
-      return model;
+      auto bone = with_bone ? registration::bone_surface(*model.surface, model.voxel_mm) : nullptr;
+      return {std::move(model), std::move(bone)};
     }
-    if (!given.volume) return std::nullopt;
+    if (!given.volume) return {};
     if (given.voxel_mm && !is_stack(*given.volume))
       throw BadInput(Reason::bad_value,
                      fmt::format("models: \"{}\": \"voxel_mm\" is for TIFF stacks only; {} states its own",
@@ -222,7 +223,9 @@ Expected<std::optional<registration::Model>> load_model(const pipeline::CaseMode
     registration::Model model = value_or_throw(registration::model_from(given.name, volume, mask, window));
     model.warnings = volume.warnings;
     if (mask) model.warnings.insert(model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
-    return model;
+    const bool outlined = mask || window;
+    return {std::move(model),
+            with_bone && outlined ? registration::bone_surface(volume, mask, window) : nullptr};
   });
 }
 

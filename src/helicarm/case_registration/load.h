@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -9,6 +10,7 @@
 
 #include "helicarm/pipeline/calibrate_case.h"
 #include "helicarm/pipeline/registration_case.h"
+#include "helicarm/registration/bone_surface.h"
 #include "helicarm/registration/model.h"
 #include "helicarm/registration/raster.h"
 
@@ -40,7 +42,13 @@ LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
 Expected<std::vector<registration::RegistrationView>> with_images(const LoadedViews& loaded,
                                                                   const pipeline::RegistrationCase& given);
 
-/// The model's files; nothing for a model of landmarks alone.
-Expected<std::optional<registration::Model>> load_model(const pipeline::CaseModel& given);
+/// What a model's files hold.
+struct LoadedModel {
+  std::optional<registration::Model> model;               ///< nothing: landmarks alone
+  std::shared_ptr<const registration::BoneSurface> bone;  ///< if asked for; null without an outline
+};
+
+/// The model's files; `with_bone`: also the bone's surface.
+Expected<LoadedModel> load_model(const pipeline::CaseModel& given, bool with_bone = false);
 
 }  // namespace helicarm::case_registration

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/case_registration/measure_case.h"
 
+#include "helicarm/case_registration/carry_plan.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/measure.h"
@@ -21,7 +22,11 @@ void add_plan(const RegisteredModel& model, pipeline::Result& result) {
     result.model_points.push_back({name, point.name, point.place});
   for (std::size_t i = 0; i < model.tunnels.size(); ++i) {
     const pipeline::TunnelEnds& ends = model.tunnel_ends[i];
-    result.model_tunnels.push_back({name, model.tunnels[i], {first + ends.start, first + ends.end}});
+    result.model_tunnels.push_back({name,
+                                    model.tunnels[i],
+                                    {first + ends.start, first + ends.end},
+                                    shared_covariance(model.registration),
+                                    i < model.bone_checks.size() ? model.bone_checks[i] : std::nullopt});
   }
 }
 
@@ -32,10 +37,9 @@ pipeline::Result with_models(pipeline::Result result, const CaseRegistration& re
     const registration::Registration& found = model.registration;
     append(result.warnings, found.warnings);
     append(result.notes, found.notes);
-    if (!found.failure)
-      add_plan(model, result);
-    else if (!result.failure)
-      result.failure = found.failure;
+    // A breach is of the plan: its tunnels are shown at their places.
+    if (!found.failure || found.failure->reason == Reason::tunnel_breach) add_plan(model, result);
+    if (found.failure && !result.failure) result.failure = found.failure;
   }
   return result;
 }

@@ -22,7 +22,8 @@ struct Measurement {
 Expected<Measurement> measure_case(const pipeline::RegistrationCase& given, const RegisterOptions& options,
                                    const Progress& progress = {});
 
-/// The result with the plans' points and tunnels of the models that were not refused, and with the
+/// The result with the plans' points and tunnels of the models that were not refused (or for a tunnel_breach
+/// alone), and with the
 /// registration's findings; refused if a model is.
 pipeline::Result with_models(pipeline::Result result, const CaseRegistration& registration);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,9 @@ struct PlanPoint {
 struct PlanTunnel {
   std::string name;
   std::size_t start = 0, end = 0;  ///< among the points
+  // Of the case's tunnel of this line.
+  std::optional<double> diameter_mm = {}, bridge_mm = {};
+  bool enters_at_end = false;
 };
 
 struct Plan {

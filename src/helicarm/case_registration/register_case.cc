@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/case_registration/bone_checks.h"
+#include "helicarm/case_registration/carry_plan.h"
 #include "helicarm/case_registration/case_plans.h"
 #include "helicarm/case_registration/landmarks_alone.h"
 #include "helicarm/case_registration/plan_errors.h"
@@ -16,18 +18,10 @@
 namespace helicarm::case_registration {
 namespace {
 
-using Eigen::Vector3d;
 using geometry::RigidTransform;
 using registration::RegistrationView;
 
 constexpr double outline_step_px = 2;
-
-/// Poses at each acquisition by which a bone can be followed, or nothing.
-bool tracked(const pipeline::Case& given, const guidance::Bone& bone) {
-  return std::ranges::all_of(given.views, [&](const pipeline::CaseView& view) {
-    return guidance::calibrator_from(bone, view.poses).has_value();
-  });
-}
 
 /// The views as if the bone were where it was at the first one's acquisition.
 std::vector<RegistrationView> following(std::vector<RegistrationView> views, const pipeline::Case& given,
@@ -38,34 +32,6 @@ std::vector<RegistrationView> following(std::vector<RegistrationView> views, con
                                       *guidance::calibrator_from(bone, given.views[i].poses) *
                                       first.inverse();
   return views;
-}
-
-/// The tunnels and points of a plan at the registered pose.
-void carry_plan(const Plan& plan, const pipeline::Case& given, RegisteredModel& model) {
-  const auto& pose = model.registration;
-  const std::optional<guidance::Bone> anchor =
-      model.moves_with && tracked(given, *model.moves_with) ? model.moves_with : std::nullopt;
-  std::vector<guidance::DatedView> dated;
-  for (std::size_t i = 0; i < given.views.size(); ++i)
-    dated.push_back({model.views[i], given.views[i].poses, 1});
-  const RigidTransform anchor_from_world =
-      anchor ? guidance::calibrator_from(*anchor, given.views.front().poses)->inverse() : RigidTransform{};
-  for (const PlanPoint& point : plan.points) {
-    const Vector3d in_world = pose.world_from_model * point.in_model;
-    localization::LocatedPoint located;
-    located.name = point.name;
-    located.point_in_anchor = anchor_from_world * in_world;
-    located.covariance_in_anchor = anchor_from_world.rotation *
-                                   registration::point_covariance(pose, in_world) *
-                                   anchor_from_world.rotation.transpose();
-    model.points.push_back(
-        {point.name, guidance::guide(located, anchor, dated, given.poses_now, given.tracker)});
-  }
-  for (const PlanTunnel& tunnel : plan.tunnels) {
-    model.tunnels.push_back(value_or_throw(guidance::plan_tunnel(
-        tunnel.name, model.points[tunnel.start].place, model.points[tunnel.end].place, {}, given.tracker)));
-    model.tunnel_ends.push_back({tunnel.start, tunnel.end});
-  }
 }
 
 /// What no image shows of a body whose poses at the acquisitions are not known.
@@ -106,7 +72,8 @@ class Registrar {
     const bool follows = asked.moves_with && tracked(given_.base, *asked.moves_with);
     const auto views = follows ? following(loaded_.views, given_.base, *asked.moves_with) : loaded_.views;
     for (const RegistrationView& view : views) made.views.push_back(view.view);
-    auto model = value_or_throw(load_model(asked));
+    LoadedModel files = value_or_throw(load_model(asked, plan && !plan->tunnels.empty()));
+    std::optional<registration::Model>& model = files.model;
     const double motion_sigma_mm = follows ? 0 : options_.run.motion_sigma_mm;
     const auto start =
         guarded([&] { return start_poses(given_, loaded_, asked, model, views, motion_sigma_mm); });
@@ -138,6 +105,8 @@ class Registrar {
     if (plan && made.registration.is_determined()) {
       carry_plan(*plan, given_.base, made);
       limit_error(largest_error(made.points), options_.run.max_error_mm, made.registration);
+      made.bone_checks = bone_checks(*plan, files.bone.get());
+      judge_tunnels(*plan, made.bone_checks, made.registration);
     }
     if (made.model) add_warnings_of_files(*made.model, made.registration);
     return made;

@@ -61,7 +61,9 @@ struct RegisteredModel {
   std::vector<RegisteredPoint> points;
   std::vector<guidance::Tunnel> tunnels;
   std::vector<pipeline::TunnelEnds> tunnel_ends;  ///< of each tunnel, among the points
-  std::vector<geometry::View> views;              ///< as used: of a tracked bone at the first acquisition
+  /// Of each tunnel; nothing: the model has no outline.
+  std::vector<std::optional<registration::BoneCheck>> bone_checks = {};
+  std::vector<geometry::View> views;  ///< as used: of a tracked bone at the first acquisition
   /// For overlays, per view: outlines of the model at its pose, rectified px.
   std::vector<std::vector<Eigen::Vector2d>> outlines;
   /// For the report, per view: `drr_image` of the model at its pose.

@@ -68,7 +68,11 @@ Json json_of(const RegisteredModel& model, const std::vector<guidance::Bone>& bo
   for (const char* list : {"views", "points", "tunnels"}) json[list] = Json::array();
   for (const auto& view : r.views) json["views"].push_back(json_of(view));
   for (const RegisteredPoint& point : model.points) json["points"].push_back(json_of(point, bones));
-  for (const guidance::Tunnel& tunnel : model.tunnels) json["tunnels"].push_back(pipeline::to_json(tunnel));
+  for (std::size_t i = 0; i < model.tunnels.size(); ++i) {
+    json["tunnels"].push_back(pipeline::to_json(model.tunnels[i]));
+    const auto check = i < model.bone_checks.size() ? model.bone_checks[i] : std::nullopt;
+    json["tunnels"].back()["bone_check"] = check ? registration::to_json(*check) : Json();
+  }
   json["seconds"] = r.seconds;
   return json;
 }

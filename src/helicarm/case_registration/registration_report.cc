@@ -59,7 +59,9 @@ std::string model_section(const RegisteredModel& model) {
   if (model.landmarks)
     html += fmt::format("<p>Landmarks: FRE {:.2f} mm, FLE {:.2f} mm (rms).</p>\n", model.landmarks->fre_mm,
                         model.landmarks->fle_mm);
-  return model.points.empty() ? html : html + html_of(points_table({model}));
+  if (!model.points.empty()) html += html_of(points_table({model}));
+  const report::Table in_bone = report::without_empty_columns(tunnels_in_bone_table({model}));
+  return in_bone.rows.empty() ? html : html + html_of(in_bone);
 }
 
 }  // namespace

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/case_registration/registration_tables.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "helicarm/report/markup.h"
+#include "helicarm/report/tables.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -106,6 +109,15 @@ report::Table points_table(const std::vector<RegisteredModel>& models) {
        coordinate("y, mm", 1),
        coordinate("z, mm", 2)},
       rows);
+}
+
+report::Table tunnels_in_bone_table(const std::vector<RegisteredModel>& models) {
+  std::vector<report::TunnelInBoneRow> rows;
+  for (const RegisteredModel& model : models)
+    for (std::size_t i = 0; i < std::min(model.tunnels.size(), model.bone_checks.size()); ++i)
+      if (model.bone_checks[i])
+        rows.push_back({model.tunnels[i].name, model.registration.name, *model.bone_checks[i]});
+  return report::bone_table(rows);
 }
 
 }  // namespace helicarm::case_registration

@@ -20,4 +20,7 @@ report::Table views_table(const registration::Registration& registration);
 /// The plans' points of all models.
 report::Table points_table(const std::vector<RegisteredModel>& models);
 
+/// The plans' tunnels against the bones of all models.
+report::Table tunnels_in_bone_table(const std::vector<RegisteredModel>& models);
+
 }  // namespace helicarm::case_registration

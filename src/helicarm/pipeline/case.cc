@@ -104,12 +104,24 @@ void read_plate(Case& read, JsonReader& reader) {
 
 }  // namespace description
 
-Case case_of(const Json& json, const std::string& origin, const fs::path& folder, Purpose purpose) {
+Json take_model_tunnels(Json& json) {
+  Json taken = Json::array();
+  if (!json.is_object() || !json.contains("tunnels") || !json["tunnels"].is_array()) return taken;
+  Json others = Json::array();
+  for (const Json& tunnel : json["tunnels"])
+    (tunnel.is_object() && tunnel.contains("model") ? taken : others).push_back(tunnel);
+  json["tunnels"] = others;
+  return taken;
+}
+
+Case case_of(Json json, const std::string& origin, const fs::path& folder, Purpose purpose) {
+  if (json.is_object() && json.contains("models")) take_model_tunnels(json);
   JsonReader reader(json, origin);
   for (const char* key : {"markers", "bodies"})
     if (reader.has(key))
-      reader.refuse(Reason::bad_value, key,
-                    "makes the case a sequence of markers: follow them with `helicarm track CASE --frames A-B`");
+      reader.refuse(
+          Reason::bad_value, key,
+          "makes the case a sequence of markers: follow them with `helicarm track CASE --frames A-B`");
   Case read;
   read.folder = folder;
   FromJson codec(reader);

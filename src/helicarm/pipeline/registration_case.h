@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "helicarm/core/json.h"
 #include "helicarm/geometry/rigid_transform.h"
 #include "helicarm/pipeline/case.h"
 
@@ -28,12 +29,26 @@ struct CaseModel {
   std::optional<std::filesystem::path> plan;                 ///< Slicer markups
 };
 
+/// Bird et al. (2011): the least bridge of bone between a tunnel and the bone's surface, mm.
+inline constexpr double usual_bridge_mm = 2;
+
+/// An element of "tunnels" that names a model: a line of its plan as a tunnel with a diameter.
+struct ModelTunnelPlan {
+  std::string name;
+  std::string model;
+  std::string line;                    ///< in the model's plan; its name unless given
+  std::optional<double> diameter_mm;   ///< nothing: only the axis is compared with the bone
+  double bridge_mm = usual_bridge_mm;  ///< below it is warned
+  bool enters_at_end = false;          ///< the drill enters at the line's end
+};
+
 /// A case with models. Either all views have cameras of other programs, then the world is theirs and the
 /// calibrator may be missing, or none has.
 struct RegistrationCase {
   Case base;
   std::vector<std::filesystem::path> cameras;  ///< one per view, or empty
   std::vector<CaseModel> models;
+  std::vector<ModelTunnelPlan> tunnels = {};  ///< of the models' plans
 };
 
 /// Whether a case's file names models to be registered: "models" that is not empty, in whatever form, so that
@@ -45,6 +60,20 @@ Expected<RegistrationCase> read_registration_case(const std::filesystem::path& p
 
 /// Reads a case that is measured by its calibrator, and its models if it names any. Fails as `read_case`.
 Expected<RegistrationCase> read_measured_case(const std::filesystem::path& path);
+
+/// The list "models"; `folder`: of their files, which may not lie outside. Throws BadInput as
+/// `read_registration_case` fails.
+std::vector<CaseModel> models_from(JsonReader& reader, const std::filesystem::path& folder,
+                                   const std::vector<guidance::Bone>& bones);
+
+/// An element of "models"; its files relative to `folder`.
+Json to_json(const CaseModel& model, const std::filesystem::path& folder);
+
+/// An element of "tunnels" that names a model: model, line, diameter_mm, bridge_mm, enter_at, and bone, with
+/// which a model moves that names none. Throws BadInput: bad_value, also for another bone than the model's,
+/// and for a model without an outline where a diameter is given.
+ModelTunnelPlan model_tunnel_from(JsonReader& reader, const std::string& name, std::vector<CaseModel>& models,
+                                  const std::vector<guidance::Bone>& bones);
 
 /// Whether an image's name holds {frame}.
 bool is_sequence(const RegistrationCase& given);

@@ -31,5 +31,49 @@ TEST(RegistrationCase, WrongModelsAreRefusedWhereTheyAreRead) {
   }
 }
 
+/// The tunnel of a case with a model, or why it is refused.
+Expected<ModelTunnelPlan> tunnel_from(const char* tunnel, bool outlined = true) {
+  const Json json = Json::parse(tunnel);
+  CaseModel model;
+  model.name = "femur", model.volume = "ct.nrrd", model.plan = "plan.mrk.json", model.moves_with = "femur";
+  if (outlined) model.window_hu = Eigen::Vector2d(150, 3000);
+  return guarded([&] {
+    JsonReader reader(json, "tunnels[0]");
+    std::vector<CaseModel> models{model};
+    ModelTunnelPlan read = model_tunnel_from(reader, reader.text("name"), models, guidance::knee_bones());
+    reader.finish();
+    return read;
+  });
+}
+
+TEST(ModelTunnel, ALineOfAPlanBecomesATunnelWithADiameter) {
+  const auto tunnel = tunnel_from(
+      R"({"name": "ACL", "bone": "femur", "model": "femur", "line": "F", "diameter_mm": 8, "bridge_mm": 3,
+          "enter_at": "end"})");
+  ASSERT_TRUE(tunnel) << tunnel.error().message;
+  EXPECT_EQ(tunnel->line, "F");
+  EXPECT_EQ(tunnel->diameter_mm, 8);
+  EXPECT_EQ(tunnel->bridge_mm, 3);
+  EXPECT_TRUE(tunnel->enters_at_end);
+}
+
+TEST(ModelTunnel, TheUsualBridgeIsAskedForAndNoDiameterIsAssumed) {
+  const auto tunnel = tunnel_from(R"({"name": "F", "model": "femur", "bridge_mm": null})");
+  ASSERT_TRUE(tunnel) << tunnel.error().message;
+  EXPECT_EQ(tunnel->line, "F");
+  EXPECT_FALSE(tunnel->diameter_mm);
+  EXPECT_EQ(tunnel->bridge_mm, 2);
+}
+
+TEST(ModelTunnel, AnotherModelAnotherBoneAndABodyWithoutAnOutlineAreRefused) {
+  EXPECT_EQ(tunnel_from(R"({"name": "F", "model": "tibia"})").error().reason, Reason::bad_value);
+  EXPECT_EQ(tunnel_from(R"({"name": "F", "model": "femur", "bone": "tibia"})").error().reason,
+            Reason::bad_value);
+  EXPECT_EQ(tunnel_from(R"({"name": "F", "model": "femur", "diameter_mm": 8})", false).error().reason,
+            Reason::bad_value);
+  EXPECT_EQ(tunnel_from(R"({"name": "F", "model": "femur", "diameter": 8})").error().reason,
+            Reason::unknown_key);
+}
+
 }  // namespace
 }  // namespace helicarm::pipeline

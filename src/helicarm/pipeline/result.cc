@@ -370,6 +370,8 @@ Json to_json(const Result& result) {
   for (const ModelTunnel& planned : result.model_tunnels) {
     json["tunnels"].push_back(to_json(planned.tunnel));
     json["tunnels"].back()["model"] = planned.model;
+    json["tunnels"].back()["bone_check"] =
+        planned.bone_check ? registration::to_json(*planned.bone_check) : Json();
   }
   json["verification"] = list_of(result.verifications, result.views);
   json["timing_ms"] = json_of(result.timing_ms);

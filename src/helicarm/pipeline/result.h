@@ -22,6 +22,7 @@
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/rectification/rectify.h"
+#include "helicarm/registration/bone_check.h"
 #include "helicarm/xray/xray_image.h"
 
 namespace helicarm::pipeline {
@@ -88,7 +89,10 @@ struct ModelPoint {
 struct ModelTunnel {
   std::string model;
   guidance::Tunnel tunnel;
-  TunnelEnds ends;  ///< among the model points
+  TunnelEnds ends;                                         ///< among the model points
+  /// Of the model's pose, to which its ends' `by_calibration` refers; empty: none.
+  Eigen::MatrixXd shared_covariance = {};
+  std::optional<registration::BoneCheck> bone_check = {};  ///< nothing: the model has no outline
 };
 
 /// Wall-clock time of each stage, ms; nothing if not reached.

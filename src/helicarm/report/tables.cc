@@ -253,6 +253,43 @@ Table tunnels_table(const pipeline::Result& result) {
       tunnel_rows(result));
 }
 
+Table bone_table(const std::vector<TunnelInBoneRow>& tunnels) {
+  using Row = TunnelInBoneRow;
+  const auto figure = [](std::optional<double> registration::BoneCheck::*member, int digits) {
+    return [=](const Row& r) { return Cell{fixed(r.check.*member, digits)}; };
+  };
+  using registration::BoneCheck;
+  return table_of<Row>(
+      "Tunnels in the bone",
+      {{words("Tunnel", "Name of the tunnel"), [](const Row& r) { return Cell{r.tunnel}; }},
+       {words("Model", "Registered model whose plan names the tunnel"),
+        [](const Row& r) { return Cell{r.model}; }},
+       {number("Diameter, mm", "Diameter of the tunnel, mm"), figure(&BoneCheck::diameter_mm, 1)},
+       {number("Bridge, mm",
+               "Least distance of the tunnel's wall from the bone's surface, mm; negative: outside the bone"),
+        [](const Row& r) {
+          return Cell{fixed(r.check.bridge_mm, 2), r.check.is_breach() || r.check.is_thin()};
+        }},
+       {number("σ, mm", "Standard deviation of the bridge as drilled, with the registration, mm"),
+        figure(&BoneCheck::drilled_sigma_mm, 2)},
+       {number("At, mm", "Depth of that place behind the entry, mm"), figure(&BoneCheck::at_mm, 1)},
+       {number("In bone, mm", "Length of the axis in the bone, mm"),
+        [](const Row& r) { return Cell{fixed(r.check.length_in_bone_mm, 1)}; }},
+       {number("Entry, °", "Angle between axis and bone surface at the entry, degrees"),
+        figure(&BoneCheck::entry_angle_deg, 0)},
+       {number("Exit, °", "Angle between axis and bone surface at the exit, degrees"),
+        figure(&BoneCheck::exit_angle_deg, 0)},
+       {number("Ahead, mm", "Bone ahead of a blind tunnel's end, mm"), figure(&BoneCheck::end_mm, 2)}},
+      tunnels);
+}
+
+Table bone_table(const pipeline::Result& result) {
+  std::vector<TunnelInBoneRow> rows;
+  for (const pipeline::ModelTunnel& planned : result.model_tunnels)
+    if (planned.bone_check) rows.push_back({planned.tunnel.name, planned.model, *planned.bone_check});
+  return bone_table(rows);
+}
+
 Table verification_table(const std::vector<ToolAtEnd>& tools) {
   const auto in_images = [](double guidance::LineError::*member) {
     return [member](const ToolAtEnd& t) {
@@ -382,7 +419,7 @@ std::vector<Table> tables_of(const pipeline::Result& result) {
   std::vector<Table> tables;
   for (const Table& table :
        {statistics_table(result.accuracy), targets_table(result.accuracy), points_table(result.points),
-        tunnels_table(result), verification_table(tools_at_ends(result.verifications)),
+        tunnels_table(result), bone_table(result), verification_table(tools_at_ends(result.verifications)),
         calibration_table(result.views), fiducials_table(result.views), rectification_table(result.views),
         timing_table(result.timing_ms)})
     if (!table.rows.empty()) tables.push_back(without_empty_columns(table));

@@ -34,6 +34,15 @@ struct ToolAtEnd {
 /// "start" and "end" of each tool line, where located.
 std::vector<ToolAtEnd> tools_at_ends(const std::vector<guidance::Verification>& lines);
 
+/// A planned tunnel against the bone of its model.
+struct TunnelInBoneRow {
+  std::string tunnel, model;
+  registration::BoneCheck check;
+};
+Table bone_table(const std::vector<TunnelInBoneRow>& tunnels);
+/// Of the result's models.
+Table bone_table(const pipeline::Result& result);
+
 Table statistics_table(const localization::Accuracy& accuracy);
 Table targets_table(const localization::Accuracy& accuracy);
 Table points_table(const std::vector<pipeline::PointResult>& points);

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/bone_check.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Geometry>
+
+#include "helicarm/geometry/view_json.h"
+#include "helicarm/registration/bone_surface.h"
+
+namespace helicarm::registration {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double step_mm = 0.5;
+constexpr int sectors = 72;
+constexpr double reach_mm = 60;    // of the wall's surroundings
+constexpr double beyond_mm = 300;  // the line is followed behind its ends
+constexpr double open_start_mm = 5, open_end_mm = 1;
+constexpr double interruption_mm = 1.5;  // of an opening's face, by steps of a mask
+const double same_face_cosine = std::cos(60 * std::numbers::pi / 180);
+const double least_slope_sine = std::sin(2 * std::numbers::pi / 180);
+constexpr double one_sided_95 = 1.645;
+constexpr double deg = 180 / std::numbers::pi;
+
+struct Frame {
+  Vector3d axis, across, up;
+
+  Vector3d spoke(int sector, int of = sectors) const {
+    const double angle = 2 * std::numbers::pi * sector / of;
+    return std::cos(angle) * across + std::sin(angle) * up;
+  }
+};
+
+Frame frame_of(const Vector3d& axis) {
+  const Vector3d across = axis.unitOrthogonal();
+  return {axis, across, axis.cross(across)};
+}
+
+/// Surface beside the tunnel, along a spoke from its axis.
+struct Beside {
+  double radius_mm = 0;
+  std::optional<Vector3d> normal;  ///< nothing: the axis is outside the bone there
+};
+
+/// Where the tunnel crosses the surface.
+struct Opening {
+  double at_mm;     ///< along the line from its start
+  Vector3d normal;  ///< outward, mean over the tunnel's section
+};
+
+class Check {
+ public:
+  Check(const BoneSurface& bone, const BoneTunnel& tunnel)
+      : bone_(bone),
+        start_(tunnel.start),
+        length_((tunnel.end - tunnel.start).norm()),
+        frame_(frame_of((tunnel.end - tunnel.start) / length_)),
+        diameter_(tunnel.diameter_mm) {}
+
+  /// Nothing: only the line's end opens.
+  std::optional<BoneCheck> made() {
+    BoneCheck check;
+    check.diameter_mm = diameter_;
+    if (!find_openings()) return std::nullopt;
+    if (!entry_) return check;
+    const double to = exit_ ? exit_->at_mm : length_;
+    check.entry = at(entry_->at_mm);
+    check.end = at(to);
+    check.length_in_bone_mm = length_in_bone(to);
+    check.entry_angle_deg = angle_deg(*entry_);
+    if (exit_) check.exit = check.end, check.exit_angle_deg = angle_deg(*exit_);
+    if (diameter_) measure_wall(to, check);
+    if (diameter_ && !exit_) measure_end(to, check);
+    return check;
+  }
+
+ private:
+  Vector3d at(double along) const { return start_ + along * frame_.axis; }
+  double radius() const { return diameter_.value_or(0) / 2; }
+  double angle_deg(const Opening& opening) const {
+    return std::asin(std::min(1.0, std::abs(opening.normal.dot(frame_.axis)))) * deg;
+  }
+
+  /// False: only the end opens.
+  bool find_openings() {
+    crossings_ = bone_.crossings(at(-beyond_mm), frame_.axis, length_ + 2 * beyond_mm);
+    for (Crossing& crossing : crossings_) crossing.at_mm -= beyond_mm;
+    const bool end_inside = bone_.holds(at(length_));
+    std::optional<Crossing> into, out;
+    for (const Crossing& crossing : crossings_) {
+      if (crossing.at_mm < 0 && !crossing.leaves) into = crossing;
+      if (crossing.at_mm < 0 && crossing.leaves) into.reset();
+    }
+    const bool start_inside = into.has_value();
+    for (const Crossing& crossing : crossings_) {
+      if (!into && !crossing.leaves && crossing.at_mm >= 0 && crossing.at_mm <= length_) into = crossing;
+      const bool ends_it =
+          end_inside ? crossing.at_mm > length_ && !out : crossing.at_mm >= 0 && crossing.at_mm <= length_;
+      if (crossing.leaves && ends_it) out = crossing;
+    }
+    if (end_inside && out && out->at_mm > length_ + open_end_mm) out.reset();
+    if (start_inside && -into->at_mm > open_start_mm && out) return false;
+    if (!into) return true;
+    entry_ = Opening{into->at_mm, mean_normal(*into)};
+    if (out) exit_ = Opening{out->at_mm, mean_normal(*out)};
+    return true;
+  }
+
+  /// Over the tunnel's section.
+  Vector3d mean_normal(const Crossing& middle) const {
+    Vector3d sum = middle.normal;
+    const double reach = 2 * radius() + 2;
+    for (int i = 0; i < 8; ++i) {
+      const Vector3d from = at(middle.at_mm - reach) + radius() * frame_.spoke(i, 8);
+      for (const Crossing& crossing : bone_.crossings(from, frame_.axis, 2 * reach))
+        if (crossing.leaves == middle.leaves) {
+          sum += crossing.normal;
+          break;
+        }
+    }
+    return sum.norm() > 0 ? Vector3d(sum.normalized()) : middle.normal;
+  }
+
+  double length_in_bone(double to) const {
+    double sum = 0, from = entry_->at_mm;
+    bool inside = true;
+    for (const Crossing& crossing : crossings_) {
+      if (crossing.at_mm <= entry_->at_mm || crossing.at_mm > to) continue;
+      if (inside && crossing.leaves) sum += crossing.at_mm - from;
+      inside = !crossing.leaves;
+      from = crossing.at_mm;
+    }
+    return inside ? sum + to - from : sum;
+  }
+
+  std::optional<Beside> beside(const Vector3d& from, const Vector3d& spoke) const {
+    const auto found = bone_.crossings(from, spoke, radius() + reach_mm, 1);
+    if (found.empty()) return std::nullopt;
+    if (!found.front().leaves) return Beside{0, std::nullopt};
+    return Beside{found.front().at_mm, found.front().normal};
+  }
+
+  /// `inward`: along the axis into the bone.
+  bool is_face(const std::optional<Beside>& hit, const Opening& opening, const Vector3d& inward) const {
+    return hit && hit->normal && hit->normal->dot(opening.normal) > same_face_cosine &&
+           -hit->normal->dot(inward) > least_slope_sine;
+  }
+
+  void measure_wall(double to, BoneCheck& check) const {
+    const double from = entry_->at_mm, span = to - from;
+    const int n = std::max(2, int(std::ceil(span / step_mm)));
+    const auto depth = [&](int i) { return span * (i + 0.5) / n; };
+    const int interruption = int(interruption_mm / (span / n));
+    for (int sector = 0; sector < sectors; ++sector) {
+      std::vector<std::optional<Beside>> hits;
+      for (int i = 0; i < n; ++i) hits.push_back(beside(at(from + depth(i)), frame_.spoke(sector)));
+      int first = 0, last = n - 1;
+      for (int i = 0; i < n && i - first <= interruption; ++i)
+        if (is_face(hits[std::size_t(i)], *entry_, frame_.axis)) first = i + 1;
+      for (int i = n - 1; exit_ && i >= 0 && last - i <= interruption; --i)
+        if (is_face(hits[std::size_t(i)], *exit_, -frame_.axis)) last = i - 1;
+      for (int i = first; i <= last; ++i)
+        if (const auto& hit = hits[std::size_t(i)])
+          take(check, hit->radius_mm - radius(), depth(i), hit->normal.value_or(frame_.spoke(sector)));
+    }
+  }
+
+  void take(BoneCheck& check, double bridge, double depth, const Vector3d& normal) const {
+    if (check.bridge_mm && bridge >= *check.bridge_mm) return;
+    check.bridge_mm = bridge;
+    check.sigma_mm = check.drilled_sigma_mm = bone_.sigma_mm(normal);
+    check.at_mm = depth;
+    check.thinnest = at(entry_->at_mm + depth);
+    check.outward = normal;
+  }
+
+  /// Bone ahead of a blind end, and walls that close in beyond it.
+  void measure_end(double to, BoneCheck& check) const {
+    constexpr int around = 12;
+    for (const double share : {0.0, 0.5, 1.0})
+      for (int i = 0; i < (share > 0 ? around : 1); ++i) {
+        const Vector3d from = at(to) + share * radius() * frame_.spoke(i, around);
+        const auto found = bone_.crossings(from, frame_.axis, reach_mm, 1);
+        if (found.empty()) continue;
+        const double ahead = found.front().leaves ? found.front().at_mm : 0;
+        if (check.end_mm && ahead >= *check.end_mm) continue;
+        check.end_mm = ahead;
+        check.end_sigma_mm = bone_.sigma_mm(found.front().normal);
+      }
+    for (int sector = 0; sector < sectors; sector += 2)
+      for (double angle = 5; angle < 90; angle += 5) {
+        const Vector3d way =
+            std::sin(angle / deg) * frame_.spoke(sector) + std::cos(angle / deg) * frame_.axis;
+        const auto hit = beside(at(to), way);
+        if (!hit || !hit->normal || hit->normal->dot(frame_.axis) > std::numbers::sqrt2 / 2) continue;
+        const double across = hit->radius_mm * std::sin(angle / deg) - radius();
+        if (across > 0)
+          take(check, std::hypot(across, hit->radius_mm * std::cos(angle / deg)), to - entry_->at_mm,
+               *hit->normal);
+      }
+  }
+
+  const BoneSurface& bone_;
+  Vector3d start_;
+  double length_;
+  Frame frame_;
+  std::optional<double> diameter_;
+  std::vector<Crossing> crossings_;
+  std::optional<Opening> entry_, exit_;
+};
+
+}  // namespace
+
+bool BoneCheck::is_breach() const {
+  if (!diameter_mm) return false;
+  if (!entry) return true;
+  const double spread = drilled_sigma_mm.value_or(0);
+  return (bridge_mm && *bridge_mm < one_sided_95 * spread) ||
+         (end_mm && *end_mm < one_sided_95 * std::max(spread, end_sigma_mm.value_or(0)));
+}
+
+bool BoneCheck::is_thin() const {
+  return required_mm && ((bridge_mm && *bridge_mm < *required_mm) || (end_mm && *end_mm < *required_mm));
+}
+
+BoneCheck check_tunnel(const BoneSurface& bone, const BoneTunnel& tunnel) {
+  if (auto check = Check(bone, tunnel).made()) return *std::move(check);
+  // From its end, now a start at the surface.
+  auto turned = Check(bone, {tunnel.end, tunnel.start, tunnel.diameter_mm}).made();
+  return turned ? *std::move(turned) : BoneCheck{.diameter_mm = tunnel.diameter_mm};
+}
+
+double tunnel_distance_mm(const BoneCheck& a, const BoneCheck& b) {
+  if (!a.entry || !b.entry) return std::numeric_limits<double>::infinity();
+  // Of two segments (Ericson 2004, 5.1.9).
+  const Vector3d u = a.end - *a.entry, v = b.end - *b.entry, apart = *a.entry - *b.entry;
+  const double uu = u.squaredNorm(), vv = v.squaredNorm(), uv = u.dot(v);
+  const double spread = uu * vv - uv * uv;
+  double s = spread > 1e-9 ? std::clamp((uv * v.dot(apart) - u.dot(apart) * vv) / spread, 0.0, 1.0) : 0;
+  const double t = std::clamp(vv > 0 ? (uv * s + v.dot(apart)) / vv : 0, 0.0, 1.0);
+  s = std::clamp(uu > 0 ? (t * uv - u.dot(apart)) / uu : 0, 0.0, 1.0);
+  return (apart + s * u - t * v).norm() - a.diameter_mm.value_or(0) / 2 - b.diameter_mm.value_or(0) / 2;
+}
+
+Json to_json(const BoneCheck& check) {
+  const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
+  const auto place = [](const std::optional<Vector3d>& value) {
+    return value ? geometry::json_list(*value) : Json();
+  };
+  Json json = {{"diameter_mm", number(check.diameter_mm)},
+               {"bridge_mm", number(check.bridge_mm)},
+               {"bridge_sigma_mm", number(check.sigma_mm)},
+               {"drilled_sigma_mm", number(check.drilled_sigma_mm)},
+               {"required_bridge_mm", number(check.required_mm)},
+               {"at_mm", number(check.at_mm)},
+               {"length_in_bone_mm", check.length_in_bone_mm},
+               {"entry_mm", place(check.entry)},
+               {"exit_mm", place(check.exit)},
+               {"entry_angle_deg", number(check.entry_angle_deg)},
+               {"exit_angle_deg", number(check.exit_angle_deg)},
+               {"end_mm", number(check.end_mm)},
+               {"breach", check.is_breach()},
+               {"thin", check.is_thin()},
+               {"to_tunnels", Json::array()},
+               {"note", nullptr}};
+  for (const TunnelDistance& other : check.to_tunnels)
+    json["to_tunnels"].push_back({{"name", other.tunnel}, {"distance_mm", other.distance_mm}});
+  if (!check.diameter_mm)
+    json["note"] = "the tunnel has no diameter_mm: its wall was not compared with the bone's surface";
+  return json;
+}
+
+}  // namespace helicarm::registration
