@@ -37,8 +37,8 @@ constexpr int not_seen = -1;
 
 /// For each marker and view the index of its disc, or `not_seen`: the assignment of all markers to all discs
 /// with the largest likelihood, in which no disc serves twice. A marker's discs must agree with one place in
-/// space near the expected one (their ray gap is part of it), with its contrast and its size; a disc that is
-/// nobody's, and a marker that is hidden, have a price.
+/// space near the expected one (their ray gap is part of it), with its contrast and its size; a disc of no
+/// marker, and a marker that is hidden, have a price.
 std::vector<std::vector<int>> assign(std::span<const geometry::View> views,
                                      std::span<const ExpectedMarker> markers,
                                      std::span<const std::vector<Candidate>> discs);

@@ -49,7 +49,7 @@ std::optional<PickedMarker> picked_marker(const xray::XrayImage& image, const Ei
                                           const MarkerAppearance& appearance);
 
 /// All discs of about the markers' size in the windows, each once. Discs that overlap are fitted together,
-/// and so are two markers that are expected closer than they can be told apart.
+/// and so are two markers that are expected closer than two discs can be resolved.
 std::vector<MarkerImage> find_markers(const xray::XrayImage& image, std::span<const SearchWindow> windows,
                                       const MarkerAppearance& appearance);
 
