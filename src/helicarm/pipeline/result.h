@@ -89,7 +89,7 @@ struct ModelPoint {
 struct ModelTunnel {
   std::string model;
   guidance::Tunnel tunnel;
-  TunnelEnds ends;                                         ///< among the model points
+  TunnelEnds ends;  ///< among the model points
   /// Of the model's pose, to which its ends' `by_calibration` refers; empty: none.
   Eigen::MatrixXd shared_covariance = {};
   std::optional<registration::BoneCheck> bone_check = {};  ///< nothing: the model has no outline

@@ -39,8 +39,9 @@ struct BoneCheck {
   Eigen::Vector3d thinnest = Eigen::Vector3d::Zero();  ///< on the axis at that depth
   Eigen::Vector3d outward = Eigen::Vector3d::Zero();   ///< normal of the surface nearest to it
   double length_in_bone_mm = 0;
-  std::optional<Eigen::Vector3d> entry = {};  ///< on the bone's surface; nothing: the line lies outside the bone
-  std::optional<Eigen::Vector3d> exit = {};   ///< likewise; nothing: a blind tunnel
+  std::optional<Eigen::Vector3d> entry =
+      {};  ///< on the bone's surface; nothing: the line lies outside the bone
+  std::optional<Eigen::Vector3d> exit = {};  ///< likewise; nothing: a blind tunnel
   std::optional<double> entry_angle_deg = {},
                         exit_angle_deg = {};      ///< between axis and surface; 90: perpendicular
   std::optional<double> end_mm = {};              ///< bone ahead of a blind tunnel's end

@@ -175,7 +175,8 @@ std::optional<PickedMarker> picked_marker(const xray::XrayImage& image, const Ei
 
 std::vector<MarkerImage> find_markers(const xray::XrayImage& image, std::span<const SearchWindow> windows,
                                       const MarkerAppearance& appearance) {
-  constexpr float least_share = 0.1F;  // the expected response is that of the stated radius, the fit's is smaller
+  constexpr float least_share =
+      0.1F;  // the expected response is that of the stated radius, the fit's is smaller
   constexpr std::size_t most_peaks = 12;
   std::vector<MarkerImage> found;
   const auto add = [&](const MarkerImage& marker) {

@@ -182,8 +182,8 @@ std::optional<PoseFit> Tracker::pose_of(const BodyState& body, const BodyPlan& p
   std::vector<std::size_t> marker_of;
   for (std::size_t i = 0; i < plan.markers.size(); ++i) {
     if (body.seen[i] == 0) continue;
-    const std::vector<Sight> sights_of_it =
-        sights_of(plan.markers[i], sights, prior->world_from_body * body.in_body[i], velocity_of(plan.markers[i]));
+    const std::vector<Sight> sights_of_it = sights_of(
+        plan.markers[i], sights, prior->world_from_body * body.in_body[i], velocity_of(plan.markers[i]));
     for (const Sight& sight : sights_of_it) {
       seen.push_back({body.in_body[i], {sight}});
       marker_of.push_back(i);
