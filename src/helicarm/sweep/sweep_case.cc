@@ -72,6 +72,26 @@ std::vector<int> numbers_of_files(const pipeline::CaseView& view) {
   return numbers;
 }
 
+/// Warns of numbers without a file between the first and the last, if all others have one step.
+void warn_of_gaps(const std::vector<int>& numbers, const std::string& view, std::vector<Warning>& warnings) {
+  constexpr std::size_t most_named = 20;
+  if (numbers.size() < 3) return;
+  int step = numbers.back() - numbers.front();
+  for (std::size_t i = 1; i < numbers.size(); ++i) step = std::min(step, numbers[i] - numbers[i - 1]);
+  std::vector<int> gaps;
+  for (std::size_t i = 1; i < numbers.size(); ++i)
+    for (int number = numbers[i - 1] + step; number < numbers[i]; number += step) gaps.push_back(number);
+  if (gaps.empty()) return;
+  const std::size_t named = std::min(most_named, gaps.size());
+  warnings.push_back({Reason::frames_missing,
+                      fmt::format("{} of {} numbers of the run have no image: {}{}", gaps.size(),
+                                  gaps.size() + numbers.size(),
+                                  fmt::join(gaps.begin(), gaps.begin() + std::ptrdiff_t(named), ", "),
+                                  named < gaps.size() ? ", ..." : ""),
+                      view,
+                      {{"missing", double(gaps.size())}, {"images", double(numbers.size())}}});
+}
+
 std::vector<int> numbers_in(const FrameRange& range) {
   std::vector<int> numbers;
   for (int i = 0; i < range.count(); ++i) numbers.push_back(range.first + i * range.step);
@@ -103,6 +123,7 @@ void add_frames(SweepCase& read, const pipeline::CaseView& view, const std::stri
   std::string first;
   int missing = 0;
   const std::vector<int> numbers = numbers_of(read, view, frames);
+  if (frames == "all" && is_numbered(view.image)) warn_of_gaps(numbers, view.name, read.base.warnings);
   if (read.frames.size() + numbers.size() > pipeline::most_frames)
     throw BadInput(Reason::bad_value,
                    fmt::format("{}: more than {} images in the case", view.name, pipeline::most_frames));

@@ -41,6 +41,18 @@ TEST_F(SweepCaseFile, AllNumberedFilesAreFrames) {
   EXPECT_EQ(read("all")->frames[2].view.image.filename(), "run_003.png");
 }
 
+TEST_F(SweepCaseFile, AGapInTheNumbersIsWarnedOf) {
+  EXPECT_TRUE(read("all")->base.warnings.empty());
+  std::filesystem::remove(folder_.path() / "run_003.png");
+  const auto given = read("all");
+  ASSERT_TRUE(given);
+  EXPECT_EQ(given->frames.size(), 3U);
+  ASSERT_EQ(given->base.warnings.size(), 1U);
+  EXPECT_EQ(given->base.warnings[0].reason, Reason::frames_missing);
+  EXPECT_THAT(given->base.warnings[0].message,
+              testing::HasSubstr("1 of 4 numbers of the run have no image: 3"));
+}
+
 TEST_F(SweepCaseFile, ARangeMayHaveAStep) {
   EXPECT_THAT(names("2-4:2"), testing::ElementsAre("RUN/2", "RUN/4"));
 }
