@@ -12,6 +12,7 @@
 
 #include "command_line.h"
 #include "consent.h"
+#include "findings.h"
 #include "guide_by_hand.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/private_files.h"
@@ -63,7 +64,7 @@ void check_plan(const operation::OperationPlan& plan, const NavigateArguments& a
   if (!arguments.picks.empty()) return;
   for (const operation::PlannedTunnel& tunnel : plan.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end})
-      if (std::ranges::find(plan.picks, end, &pipeline::Pick::name) == plan.picks.end())
+      if (!tunnel.of_model && std::ranges::find(plan.picks, end, &pipeline::Pick::name) == plan.picks.end())
         refuse(Reason::bad_value, fmt::format("tunnel \"{}\": \"{}\" is not a pick", tunnel.name, end));
 }
 
@@ -224,6 +225,44 @@ void take_images(operation::Operation& operation, operation::Connections& device
   }
 }
 
+/// Registers the plan's models. A person compares the outlines with the bones before they guide anything.
+void register_models(const NavigateArguments& arguments, operation::Operation& operation, LineInput& input,
+                     const Ending& ending, Console& console) {
+  const auto registered = operation.register_models();
+  if (operation.registration()) {
+    for (const auto& model : operation.registration()->models)
+      print_warnings(model.registration.warnings, console);
+    if (console.json)
+      console.out
+          << Json{{"models", case_registration::to_json(*operation.registration()).at("models")}}.dump()
+          << std::endl;
+    else if (!console.quiet)
+      console.out << summary_of(*operation.registration()) << std::flush;
+  }
+  value_or_throw(registered);
+  if (!arguments.yes) {
+    const std::string report =
+        without_control_characters((arguments.out / "case-1/registration/report.html").string());
+    console.progress
+        << fmt::format(
+               "Compare the outlines with the bones in every view: {}\nType \"yes\" if they follow "
+               "the bones everywhere:\n",
+               report)
+        << std::flush;
+    std::optional<std::string> answer;
+    ending.wait_until([&] {
+      value_or_throw(operation.recorded());
+      return (answer = input.next(0)).has_value();
+    });
+    if (*answer != "yes")
+      throw BadInput(
+          Reason::registration_not_confirmed,
+          "the registration of the plan's models was not confirmed: correct the start or the models, "
+          "and begin a new operation");
+  }
+  value_or_throw(operation.confirm_registration());
+}
+
 /// Registers the robot and moves its tool to each tunnel.
 void drive_robot(const operation::OperationPlan& plan, const NavigateArguments& arguments,
                  operation::Operation& operation, robot::RobotLink& robot, LineInput& input,
@@ -257,6 +296,7 @@ void carry_out(const operation::OperationPlan& plan, const NavigateArguments& ar
   }
   value_or_throw(operation.measure());
   print_points(operation.result(), console);
+  if (!plan.models.empty()) register_models(arguments, operation, input, ending, console);
   if (plan.drill)
     for (const operation::PlannedTunnel& tunnel : plan.tunnels)
       guide_by_hand(tunnel, operation, input, ending, console);

@@ -118,7 +118,7 @@ Expected<pipeline::Case> operation_case(const fs::path& folder, const OperationP
   made.tracker = plan.tracker.noise();
   made.picks = plan.picks;
   for (const PlannedTunnel& tunnel : plan.tunnels)
-    if (is_picked(plan, tunnel.start) && is_picked(plan, tunnel.end))
+    if (!tunnel.of_model && is_picked(plan, tunnel.start) && is_picked(plan, tunnel.end))
       made.tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
   made.tool_lines = tool_lines;
   return pipeline::checked_case(std::move(made));

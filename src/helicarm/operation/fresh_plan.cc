@@ -55,6 +55,7 @@ Expected<PlanWatch> Operation::plan_watch(const robot::RobotOrder& order) const 
 Expected<void> Operation::check_plan(const robot::RobotOrder& order) {
   return guarded([&] {
     value_or_throw(recorded());
+    check_registered(tunnel_named(order.name));
     const Planned& plan = planned(order);
     if (plan.order != to_text(robot::to_json(order)))
       throw BadInput(

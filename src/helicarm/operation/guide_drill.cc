@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/operation/models.h"
 #include "helicarm/operation/operation.h"
 
 namespace helicarm::operation {
@@ -38,8 +39,12 @@ Expected<void> Operation::guide(const std::string& name, std::optional<double> o
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
       throw BadInput(Reason::usage, missing.front() + ": touch this check point first");
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");
+    check_registered(tunnel);
     notify_(Step::navigate, name);
     const PoseWindow window = look("guide");
+    if (tunnel.of_model)
+      value_or_throw(check_error_at_tip(plan_, tunnel, *result_,
+                                        value_or_throw(poses_now(window, plan_.tracker)), tool()));
     record("guide", {{"tunnel", name}, {"oldest_pose_s", oldest_pose_s}, {"window", to_json(window)}});
     guide_ =
         value_or_throw(FreehandGuide::begin(plan_, value_or_throw(live_tool()), name,
@@ -74,6 +79,7 @@ Expected<TunnelOutcome> Operation::verify_drilled(const std::string& name) {
     const PlannedTunnel& tunnel = tunnel_named(name);
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");
     if (!plan_.drill) throw BadInput(Reason::usage, "the plan has no hand-held drill");
+    check_registered(tunnel);
     if (guide_) check_in_tunnel(value_or_throw(guidance()));
     guide_.reset();
     in_place_.clear();

@@ -14,29 +14,37 @@ namespace {
 
 constexpr double degrees_per_rad = 180 / std::numbers::pi;
 
-const guidance::PropagatedPoint* located_in(const pipeline::Result& result, const std::string& name,
-                                            const guidance::Bone& bone) {
-  const auto point = std::ranges::find(result.points, name, &pipeline::PointResult::name);
-  if (point == result.points.end() || !point->place) return nullptr;
-  const guidance::Place* in_bone = point->place->in(bone);
+const guidance::PropagatedPoint* located_in(const pipeline::Result& result, const PlannedTunnel& tunnel,
+                                            const std::string& end) {
+  const guidance::PointInFrames* place = place_of(result, tunnel, end);
+  const guidance::Place* in_bone = place ? place->in(tunnel.bone) : nullptr;
   return in_bone ? &in_bone->propagated : nullptr;
+}
+
+/// Of all views' parameters, or of the pose of the tunnel's model.
+Eigen::MatrixXd shared_by_ends(const pipeline::Result& result, const PlannedTunnel& tunnel) {
+  if (!tunnel.of_model) return result.joint_covariance;
+  for (const pipeline::ModelTunnel& planned : result.model_tunnels)
+    if (planned.model == tunnel.of_model->model) return planned.shared_covariance;
+  return {};
 }
 
 }  // namespace
 
 LiveTool::LiveTool(const OperationPlan& plan, const pipeline::Result& result,
                    const std::vector<guidance::Poses>& exposures, const TrackedTool& tool)
-    : tracker_(plan.tracker), tool_(tool), calibration_covariance_(result.joint_covariance) {
+    : tracker_(plan.tracker), tool_(tool) {
   for (std::size_t i = 0; i < exposures.size(); ++i) {
     const auto& calibrated = result.views[i].calibrated;
     views_.push_back(
         {result.views[i].name, calibrated ? std::optional(calibrated->view) : std::nullopt, exposures[i]});
   }
   for (const PlannedTunnel& tunnel : plan.tunnels) {
-    const auto* enter = located_in(result, tunnel.start, tunnel.bone);
-    const auto* leave = located_in(result, tunnel.end, tunnel.bone);
+    const auto* enter = located_in(result, tunnel, tunnel.start);
+    const auto* leave = located_in(result, tunnel, tunnel.end);
     if (tunnel.enter_at == TunnelEnd::end) std::swap(enter, leave);
-    if (enter && leave) tunnels_.emplace(tunnel.name, Located{tunnel.bone, *enter, *leave});
+    if (enter && leave)
+      tunnels_.emplace(tunnel.name, Located{tunnel.bone, *enter, *leave, shared_by_ends(result, tunnel)});
   }
 }
 
@@ -113,7 +121,7 @@ Expected<TunnelAim> LiveTool::aim(const geometry::RigidTransform& tracker_from_b
                                   const geometry::RigidTransform& tracker_from_tool,
                                   const std::string& name) const {
   return guarded([&] {
-    const auto& [bone, in_bone_enter, in_bone_leave] = located(name);
+    const auto& [bone, in_bone_enter, in_bone_leave, shared_covariance] = located(name);
     const guidance::TrackerNoise noise = tracker_.noise();
     const guidance::PropagatedPoint enter =
         guidance::to_tool(in_bone_enter, bone, tracker_from_bone, tracker_from_tool);
@@ -124,13 +132,13 @@ Expected<TunnelAim> LiveTool::aim(const geometry::RigidTransform& tracker_from_b
     const Eigen::Vector3d axis_in_marker = way / length;
     const double depth = axis_in_marker.dot(tool_.marker_from_tip.translation - enter.point);
     const guidance::PropagatedPoint foot =
-        guidance::point_between(enter, leave, depth / length, calibration_covariance_);
+        guidance::point_between(enter, leave, depth / length, shared_covariance);
     const PointAtTip off = at_tip(foot.point, foot.total_covariance(noise), tool_);
 
     const Eigen::Vector3d axis = tool_.marker_from_tip.rotation.transpose() * axis_in_marker;
     const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis * axis.transpose();
     const Eigen::Matrix3d of_way =
-        guidance::covariance_between(enter, leave, calibration_covariance_, noise) / (length * length);
+        guidance::covariance_between(enter, leave, shared_covariance, noise) / (length * length);
     const Eigen::Matrix3d of_axis =
         tool_.marker_from_tip.rotation.transpose() * of_way * tool_.marker_from_tip.rotation;
     const double angle_variance =

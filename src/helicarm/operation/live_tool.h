@@ -77,6 +77,7 @@ class LiveTool {
   struct Located {
     guidance::Bone bone;
     guidance::PropagatedPoint enter, leave;  ///< in the bone's frame
+    Eigen::MatrixXd shared_covariance;       ///< of what `by_calibration` of both refers to
   };
   Now newest(const tracker::PoseBoard& board, const guidance::Bone& bone) const;
 
@@ -86,7 +87,6 @@ class LiveTool {
   TrackedTool tool_;
   std::vector<Shown> views_;
   std::map<std::string, Located> tunnels_;
-  Eigen::MatrixXd calibration_covariance_;  ///< of all views' parameters
 };
 
 }  // namespace helicarm::operation

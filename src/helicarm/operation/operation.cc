@@ -12,6 +12,7 @@
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/hand_eye_tour.h"
+#include "helicarm/operation/models.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/xray/digest.h"
@@ -77,7 +78,9 @@ Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const 
                      fmt::format("{}: already holds the record of another operation; choose an empty folder",
                                  folder.string()));
     operation->files_ = value_or_throw(files_of(operation->plan_));
+    const Digests models = value_or_throw(keep_models(operation->plan_, folder));
     operation->record("plan", to_json(operation->plan_));
+    if (!models.empty()) operation->record("models", {{"folder", "models"}, {"files", models}});
     return operation;
   });
 }
@@ -134,25 +137,35 @@ pipeline::Result Operation::run(const guidance::Poses& now,
   const std::string name = fmt::format("case-{}", ++measurements_);
   std::vector<CaseImage> images;
   for (const View& view : views_) images.push_back({view.name, view.image, view.digest, view.poses});
+  std::vector<guidance::ToolLine> of_picks, of_models;
+  for (const guidance::ToolLine& line : tool_lines)
+    (tunnel_named(line.tunnel).of_model ? of_models : of_picks).push_back(line);
   const pipeline::Case given =
-      value_or_throw(operation_case(folder_ / name, plan_, files_, images, now, tool_lines));
+      value_or_throw(operation_case(folder_ / name, plan_, files_, images, now, of_picks));
   const Digests files = value_or_throw(write_operation_case(given, files_, images));
-  record("case", {{"folder", name}, {"case", pipeline::to_json(given)}, {"files", files}});
+  record("case", {{"folder", name},
+                  {"case", pipeline::to_json(given)},
+                  {"files", files},
+                  {"verifies", tool_lines.empty() ? Json() : Json(tool_lines.front().tunnel)}});
   const auto earlier = measurement_ ? measurement_->calibration : nullptr;
   measurement_ = value_or_throw(measure_case(given, plan_, measurement_));
   if (measurement_->calibration != earlier || !earlier) ++calibrations_;
-  const Digests written = value_or_throw(write_result(measurement_->result, given.folder));
+  pipeline::Result result = measurement_->result;
+  if (registration_confirmed_ && !result.failure)
+    result = value_or_throw(with_registration(result, *registration_, plan_, given, of_models));
+  const Digests written = value_or_throw(write_result(result, given.folder));
   value_or_throw(check_digests(given.folder, files));
-  record(
-      "result",
-      {{"folder", name}, {"digest", digest_of(pipeline::to_json(measurement_->result))}, {"files", written}});
-  newest_ = measurement_->result;
+  record("result", {{"folder", name}, {"digest", digest_of(pipeline::to_json(result))}, {"files", written}});
+  if (tool_lines.empty()) measured_ = given;
+  newest_ = std::move(result);
   if (newest_->failure) throw BadInput(*newest_->failure);
   return *newest_;
 }
 
 /// The images are others now.
 void Operation::forget_measurement() {
+  forget_registration();
+  measured_.reset();
   result_.reset();
   measurement_.reset();
 }
@@ -162,6 +175,7 @@ Expected<void> Operation::measure() {
     if (const auto missing = views_to_come(); !missing.empty())
       throw BadInput(Reason::usage, fmt::format("{}: no image received; acquire this view", missing.front()));
     notify_(Step::measure, fmt::format("{} views", views_.size()));
+    forget_registration();
     result_ = run({}, {});
   });
 }
@@ -225,10 +239,12 @@ Expected<robot::RobotOrder> Operation::plan_tunnel(const std::string& name) {
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
       throw BadInput(Reason::usage, fmt::format("{}: touch this check point first", missing.front()));
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");
+    check_registered(tunnel);
     if (!hand_eye_) throw BadInput(Reason::usage, "the robot is not registered; register it first");
     notify_(Step::plan, name);
     const PoseWindow window = look("plan");
     const guidance::Poses now = value_or_throw(poses_now(window, plan_.tracker));
+    if (tunnel.of_model) value_or_throw(check_error_at_tip(plan_, tunnel, *result_, now, tool()));
     const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
     const PlanBasis basis = basis_of(tunnel, window, present);
     value_or_throw(refuse_moved_base(*hand_eye_, basis, present, plan_.limits));

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "helicarm/case_registration/measure_case.h"
 #include "helicarm/devices/receiver/inbox.h"
 #include "helicarm/devices/robot/robot_link.h"
 #include "helicarm/operation/case_of.h"
@@ -99,6 +100,17 @@ class Operation {
   int calibrations() const { return calibrations_; }
   /// Poses at each view's acquisition, in the plan's order.
   std::vector<guidance::Poses> exposures() const;
+
+  /// Registers the plan's models to the measured images; the report and an overlay of each view are then in
+  /// the session's folder. Takes seconds to minutes; `interrupt` ends it. Fails with the refusal of a model.
+  /// Until `confirm_registration` it guides nothing (registration_not_confirmed), nor after further images or
+  /// another measurement (registration_stale).
+  Expected<void> register_models();
+  /// The last registration of the present images, also a refused one.
+  const std::optional<case_registration::CaseRegistration>& registration() const { return registration_; }
+  /// After a person has compared the outlines with the bones in the images. Refuses (usage) without a
+  /// registration, and as the registration was refused.
+  Expected<void> confirm_registration();
 
   /// The moves that `register_robot` would make from the present pose, in order. Nothing moves.
   Expected<std::vector<robot::RobotOrder>> preview_tour() const;
@@ -209,6 +221,8 @@ class Operation {
   bool answers_again() const;
   TunnelOutcome check(const PlannedTunnel& tunnel);
   void forget_measurement();
+  void check_registered(const PlannedTunnel& tunnel) const;
+  void forget_registration();
   void draw_preview(const robot::RobotOrder& order);
 
   OperationPlan plan_;
@@ -229,6 +243,11 @@ class Operation {
   PlanFiles files_;
   std::optional<pipeline::Measurement> measurement_;  ///< of the present images
   int calibrations_ = 0;
+  std::optional<pipeline::Case> measured_;  ///< of the last measurement, not of a verification
+  std::optional<case_registration::CaseRegistration> registration_;  ///< of `measured_`
+  std::string registered_digest_;
+  bool registration_confirmed_ = false;
+  bool was_registered_ = false;  ///< earlier images were
   std::optional<pipeline::Result> result_, newest_;
   std::optional<tracker::HandEye> hand_eye_;
   std::map<std::string, Planned> planned_;  ///< by tunnel

@@ -60,10 +60,10 @@ Expected<TunnelOutcome> outcome_of(const PlannedTunnel& tunnel, const pipeline::
                                    const TrackedTool& tool) {
   return guarded([&] {
     const auto end = [&](const std::string& name) {
-      const auto point = std::ranges::find(result.points, name, &pipeline::PointResult::name);
-      if (point == result.points.end() || !point->place || !point->place->in_tool)
+      const guidance::PointInFrames* place = place_of(result, tunnel, name);
+      if (!place || !place->in_tool)
         throw BadInput(Reason::not_seen, fmt::format("{}: is not located in the tool marker's frame", name));
-      return end_miss(point->place->in_tool->point(), point->place->in_tool->covariance, tool);
+      return end_miss(place->in_tool->point(), place->in_tool->covariance, tool);
     };
     TunnelOutcome outcome{tunnel.name, {}, end(tunnel.start), end(tunnel.end), {}};
     if (!result.verifications.empty()) outcome.verification = result.verifications.front();

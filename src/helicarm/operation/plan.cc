@@ -143,7 +143,30 @@ HandDrill drill_from(JsonReader reader) {
   return drill;
 }
 
-PlannedTunnel tunnel_from(JsonReader& reader, const std::vector<guidance::Bone>& bones) {
+/// A line of a model's plan; the bone, given here or by the model, has a marker.
+PlannedTunnel model_tunnel_of(JsonReader& reader, OperationPlan& plan) {
+  const std::string name = reader.text("name");
+  const auto planned = pipeline::model_tunnel_from(reader, name, plan.models, plan.bones);
+  const auto model = std::ranges::find(plan.models, planned.model, &pipeline::CaseModel::name);
+  if (!model->moves_with)
+    reader.refuse(Reason::bad_value, "bone",
+                  fmt::format("is missing: the model \"{}\" has no \"moves_with\"", planned.model));
+  return {name,
+          *model->moves_with,
+          planned.line + "_start",
+          planned.line + "_end",
+          planned.enters_at_end ? TunnelEnd::end : TunnelEnd::start,
+          planned};
+}
+
+PlannedTunnel tunnel_from(JsonReader& reader, OperationPlan& plan) {
+  if (reader.has("model")) {
+    PlannedTunnel tunnel = model_tunnel_of(reader, plan);
+    check_file_name(reader, "name", tunnel.name);
+    reader.finish();
+    return tunnel;
+  }
+  const std::vector<guidance::Bone>& bones = plan.bones;
   PlannedTunnel tunnel{reader.text("name"), pipeline::bone_from(reader, "bone", bones), reader.text("start"),
                        reader.text("end"),
                        static_cast<TunnelEnd>(reader.choice("enter_at", {"start", "end"}))};
@@ -220,6 +243,21 @@ Json json_of(const RobotPlan& robot) {
             {"keep_outs", std::move(keep_outs)}}}};
 }
 
+Json json_of(const PlannedTunnel& tunnel) {
+  Json json = {{"name", tunnel.name},
+               {"bone", tunnel.bone},
+               {"enter_at", tunnel.enter_at == TunnelEnd::start ? "start" : "end"}};
+  if (!tunnel.of_model) {
+    json["start"] = tunnel.start, json["end"] = tunnel.end;
+    return json;
+  }
+  json["model"] = tunnel.of_model->model;
+  json["line"] = tunnel.of_model->line;
+  json["diameter_mm"] = tunnel.of_model->diameter_mm ? Json(*tunnel.of_model->diameter_mm) : Json();
+  json["bridge_mm"] = tunnel.of_model->bridge_mm;
+  return json;
+}
+
 }  // namespace
 
 guidance::TrackerNoise TrackerPlan::noise() const {
@@ -247,7 +285,8 @@ pipeline::RunOptions run_options(const OperationPlan& plan) {
   return options;
 }
 
-Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
+Expected<OperationPlan> plan_from(const Json& json, const std::string& origin,
+                                  const std::filesystem::path& folder) {
   return guarded([&] {
     JsonReader reader(json, origin);
     reader.choice("format", {plan_format, earlier_plan_format});
@@ -265,9 +304,11 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
     if (!plan.drill && tracker::is_recording(plan.tracker.address))
       reader.refuse(Reason::bad_value, "tracker",
                     "\"address\" names a recording, which must not guide a robot: give a server's address");
+    plan.folder = folder.empty() ? std::filesystem::absolute(origin).parent_path() : folder;
+    if (!reader.raw("models").is_null()) plan.models = pipeline::models_from(reader, plan.folder, plan.bones);
     std::set<std::string> names;
     for (JsonReader& entry : reader.objects("tunnels", true, 20)) {
-      plan.tunnels.push_back(tunnel_from(entry, plan.bones));
+      plan.tunnels.push_back(tunnel_from(entry, plan));
       take_once(entry, names, plan.tunnels.back().name);
     }
     names.clear();
@@ -299,17 +340,15 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
 
 Json to_json(const OperationPlan& plan) {
   Json tunnels = Json::array();
-  for (const PlannedTunnel& tunnel : plan.tunnels)
-    tunnels.push_back({{"name", tunnel.name},
-                       {"bone", tunnel.bone},
-                       {"start", tunnel.start},
-                       {"end", tunnel.end},
-                       {"enter_at", tunnel.enter_at == TunnelEnd::start ? "start" : "end"}});
+  for (const PlannedTunnel& tunnel : plan.tunnels) tunnels.push_back(json_of(tunnel));
   Json check_points = Json::array();
   for (const PlannedCheck& check : plan.check_points)
     check_points.push_back({{"name", check.name}, {"bone", check.bone}, {"limit_mm", check.limit_mm}});
   Json picks = Json::array();
   for (const pipeline::Pick& pick : plan.picks) picks.push_back(pipeline::to_json(pick));
+  Json models = Json::array();
+  for (const pipeline::CaseModel& model : plan.models)
+    models.push_back(pipeline::to_json(model, plan.folder));
   return {{"format", plan_format},
           {"calibrator", plan.calibrator},
           {"plate", plan.plate ? Json(*plan.plate) : Json()},
@@ -319,6 +358,7 @@ Json to_json(const OperationPlan& plan) {
           {"robot", plan.drill ? Json() : json_of(plan.robot)},
           {"drill", plan.drill ? json_of(*plan.drill) : Json()},
           {"tunnels", std::move(tunnels)},
+          {"models", std::move(models)},
           {"check_points", std::move(check_points)},
           {"picks", std::move(picks)},
           {"max_error_mm", plan.max_error_mm},

@@ -14,7 +14,7 @@
 #include "helicarm/devices/tracker/check_point.h"
 #include "helicarm/devices/tracker/facets.h"
 #include "helicarm/guidance/poses.h"
-#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/registration_case.h"
 #include "helicarm/pipeline/result.h"
 
 namespace helicarm::operation {
@@ -80,9 +80,11 @@ enum class TunnelEnd { start, end };
 struct PlannedTunnel {
   std::string name;
   guidance::Bone bone;
-  std::string start;  ///< names of picks
+  std::string start;  ///< names of picks, or of points of the model's plan
   std::string end;
   TunnelEnd enter_at = TunnelEnd::start;  ///< where the drill enters
+  /// Of a model's plan; `start` and `end` are then the ends of its line.
+  std::optional<pipeline::ModelTunnelPlan> of_model = {};
 };
 
 /// Limits beyond which an order is not carried out or is stopped (plan_stale).
@@ -109,13 +111,17 @@ struct OperationPlan {
   double motion_sigma_mm = 0;                       ///< as pipeline::RunOptions::motion_sigma_mm
   std::optional<calibration::CArmHistory> history;  ///< of the C-arm, used as prior
   PlanLimits limits;
+  std::vector<pipeline::CaseModel> models = {};  ///< registered after the measurement
+  std::filesystem::path folder = {};             ///< of the models' files
 };
 
 /// Of the plan's measurements.
 pipeline::RunOptions run_options(const OperationPlan& plan);
 
 /// Strict; fails as JsonReader and `picks_of`, and with name_clash for two tunnels or facets of one name.
-Expected<OperationPlan> plan_from(const Json& json, const std::string& origin);
+/// `folder`: of the models' files; that of `origin` unless given.
+Expected<OperationPlan> plan_from(const Json& json, const std::string& origin,
+                                  const std::filesystem::path& folder = {});
 Json to_json(const OperationPlan& plan);
 
 /// Picks in the plan's views, as case.json's. Fails as `picks_from`.

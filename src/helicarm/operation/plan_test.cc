@@ -24,6 +24,49 @@ TEST(Plan, WrittenPlanReadsBackEqual) {
   EXPECT_EQ(to_json(*read), json);
 }
 
+Json with_model() {
+  Json json = to_json(plan());
+  json["models"] = {
+      {{"name", "femur"},
+       {"volume", "ct.nrrd"},
+       {"window_hu", {150, 3000}},
+       {"start",
+        {{"world_from_model", {{0.96, -0.28, 0, 1.5}, {0.28, 0.96, 0, -2}, {0, 0, 1, 0.1}, {0, 0, 0, 1}}}}},
+       {"plan", "femur.mrk.json"}}};
+  json["tunnels"] = {{{"name", "ACL"},
+                      {"bone", "femur"},
+                      {"model", "femur"},
+                      {"line", "F"},
+                      {"diameter_mm", 8},
+                      {"bridge_mm", nullptr},
+                      {"enter_at", "end"}}};
+  return json;
+}
+
+TEST(Plan, ALineOfAModelsPlanIsATunnelOfItsBone) {
+  const auto read = plan_from(with_model(), "/somewhere/plan.json");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->models.at(0).volume, "/somewhere/ct.nrrd");
+  EXPECT_EQ(read->models[0].moves_with, "femur");
+  const PlannedTunnel& tunnel = read->tunnels.at(0);
+  ASSERT_TRUE(tunnel.of_model);
+  EXPECT_EQ(tunnel.of_model->diameter_mm, 8);
+  EXPECT_EQ(tunnel.start, "F_start");
+  EXPECT_EQ(tunnel.enter_at, TunnelEnd::end);
+  const Json written = to_json(*read);
+  EXPECT_EQ(to_json(*plan_from(written, "/elsewhere/plan.json")), written) << "also its pose, to the bit";
+}
+
+TEST(Plan, AModelThatMovesWithNoBoneGuidesNothing) {
+  Json json = with_model();
+  json["tunnels"][0].erase("bone");
+  EXPECT_EQ(plan_from(json, "plan.json").error().reason, Reason::bad_value);
+  json["models"][0]["moves_with"] = "tibia";
+  EXPECT_EQ(plan_from(json, "plan.json")->tunnels.at(0).bone, "tibia");
+  json["tunnels"][0]["bone"] = "femur";
+  EXPECT_EQ(plan_from(json, "plan.json").error().reason, Reason::bad_value);
+}
+
 TEST(Plan, OptionsOfTheMeasurementsLeadThroughTheFile) {
   OperationPlan given = plan();
   given.method = rectification::Method::paper;

@@ -13,6 +13,7 @@
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/freehand.h"
+#include "helicarm/operation/models.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/operation/replay_orders.h"
 #include "helicarm/operation/session_log.h"
@@ -23,6 +24,7 @@ namespace helicarm::operation {
 namespace {
 
 constexpr std::uintmax_t most_image_bytes = std::uintmax_t{256} << 20;
+constexpr std::uintmax_t most_listed_bytes = std::uintmax_t{1} << 31;  // of a model's volume
 constexpr const char* earlier_format = "helicarm-case/1";
 
 /// The case of an operation of an earlier version in the present form; `present` has its format and bones.
@@ -86,7 +88,7 @@ class Replay {
   void take(const SessionRecord& record) {
     const std::string origin = fmt::format("record {}", record.number);
     if (report.finished) differ(origin, "a record after the end of the operation");
-    if (record.kind == "plan") plan_ = value_or_throw(plan_from(record.content, origin));
+    if (record.kind == "plan") plan_ = value_or_throw(plan_from(record.content, origin, session_));
     if (record.kind == "exposure") exposure(record, origin);
     if (record.kind == "touched") touched(record, origin);
     if (record.kind == "refused") refused(record);
@@ -94,6 +96,9 @@ class Replay {
     if (record.kind == "end") end(record);
     if (record.kind == "result") result(record, origin);
     if (record.kind == "preview") list_files(record, "", origin);
+    if (record.kind == "models") list_files(record, record.content.at("folder").get<std::string>(), origin);
+    if (record.kind == "registered") registered(record, origin);
+    if (record.kind == "registration_confirmed") registration_confirmed(record, origin);
     if (record.kind == "hand_eye") ++report.hand_eyes;
     if (record.kind == "guide") guide(record, origin);
     if (record.kind == "guided") guided(record, origin);
@@ -121,7 +126,7 @@ class Replay {
     for (const auto& [file, listed] : files_) {
       ++report.files;
       const auto path = path_inside(session_, file);
-      const auto bytes = path ? read_file(*path, most_image_bytes) : tl::unexpected<Failure>(path.error());
+      const auto bytes = path ? read_file(*path, most_listed_bytes) : tl::unexpected<Failure>(path.error());
       if (!bytes)
         differ(listed.origin, fmt::format("{} is missing or cannot be read", file));
       else if (xray::digest(*bytes) != listed.digest)
@@ -163,14 +168,14 @@ class Replay {
                           });
     if (!accepted) return;
     views_[view] = {view, {}, digest, *poses};
-    measurement_.reset();
+    forget_measurement();
   }
 
   /// An earlier image that turned out to be delayed has no digest.
   void refused(const SessionRecord& record) {
     if (record.content.contains("picture")) return;
     views_.erase(record.content.at("view").get<std::string>());
-    measurement_.reset();
+    forget_measurement();
   }
 
   /// Digests of all files of an inbox.
@@ -221,8 +226,10 @@ class Replay {
         differ(origin, fmt::format("{}/{} is not the recorded image", folder, file));
     }
     derived_.reset();
-    const auto derived =
-        guarded([&] { return derived_case(recorded, value_or_throw(path_inside(session_, folder))); });
+    const auto derived = guarded([&] {
+      return derived_case(recorded, verified_tunnel(record.content),
+                          value_or_throw(path_inside(session_, folder)));
+    });
     if (!derived) return differ(origin, fmt::format("{}: {}", name, derived.error().message));
     earlier_ = recorded.value("format", "") == earlier_format;
     derived_ = earlier_ ? as_read_earlier(*derived) : *derived;
@@ -230,8 +237,17 @@ class Replay {
     compare(case_in_present_form(recorded, now_written, plan_), now_written, origin, "case");
   }
 
+  /// The tunnel whose verification a case is; empty: of a measurement.
+  static std::string verified_tunnel(const Json& content) {
+    if (content.contains("verifies"))
+      return content.at("verifies").is_null() ? "" : content.at("verifies").get<std::string>();
+    const Json& lines = content.at("case").at("tool_lines");  // of an earlier version
+    return lines.empty() ? "" : lines.at(0).at("tunnel").get<std::string>();
+  }
+
   /// From the records before it; the picks are the user's.
-  pipeline::Case derived_case(const Json& recorded, const std::filesystem::path& folder) {
+  pipeline::Case derived_case(const Json& recorded, const std::string& name,
+                              const std::filesystem::path& folder) {
     OperationPlan plan = plan_;
     plan.picks = value_or_throw(picks_of(plan_, recorded.at("picks"), "case.json"));
     const PlanFiles files = value_or_throw(files_of_case(plan_, folder));
@@ -240,18 +256,19 @@ class Replay {
       if (const auto taken = views_.find(view); taken != views_.end()) images.push_back(taken->second);
     guidance::Poses now;
     std::vector<guidance::ToolLine> lines;
+    model_lines_.clear();
     const auto look = orders_.take_verify_look();
-    verifies_ = !recorded.at("tool_lines").empty();
+    verifies_ = !name.empty();
     if (verifies_) {
       if (!look) throw BadInput(Reason::bad_value, "the poses of its verification are not recorded");
       now = value_or_throw(poses_now(*look, plan_.tracker));
-      const std::string name = recorded.at("tool_lines").at(0).at("tunnel").get<std::string>();
       const auto tunnel = std::ranges::find(plan_.tunnels, name, &PlannedTunnel::name);
       const auto tool = orders_.tool(plan_);
       if (tunnel == plan_.tunnels.end() || !tool || images.empty())
         throw BadInput(Reason::bad_value, "its tool line is of no tunnel of the plan, or of no tool");
-      lines.push_back(
-          value_or_throw(tool_line(name, tunnel->bone, images.front().poses, now, tool->marker_from_tip)));
+      (tunnel->of_model ? model_lines_ : lines)
+          .push_back(value_or_throw(
+              tool_line(name, tunnel->bone, images.front().poses, now, tool->marker_from_tip)));
     }
     return value_or_throw(operation_case(folder, plan, files, images, now, lines));
   }
@@ -266,6 +283,12 @@ class Replay {
     if (!measured) return differ(origin, measured.error().message);
     measurement_ = *measured;
     newest_ = measured->result;
+    if (!verifies_) {
+      registration_.reset(), is_confirmed_ = false;
+      measured_ = derived_;
+    }
+    if (is_confirmed_ && !newest_->failure)
+      newest_ = value_or_throw(with_registration(*newest_, *registration_, plan_, *derived_, model_lines_));
     if (!verifies_) result_ = newest_;
     const auto then = read_json(inside / "result.json");
     if (!then) return differ(origin, then.error().message);
@@ -276,6 +299,35 @@ class Replay {
     if (const Json written = without_timing(*then); written != now)
       differ(origin, fmt::format("{}/result.json differs from the recomputed result{}", folder,
                                  differing_fields(written, now)));
+  }
+
+  void forget_measurement() {
+    measurement_.reset();
+    registration_.reset();
+    is_confirmed_ = false;
+  }
+
+  /// From the model files, images and picks before it.
+  void registered(const SessionRecord& record, const std::string& origin) {
+    ++report.registrations;
+    list_files(record, record.content.at("folder").get<std::string>(), origin);
+    registration_.reset(), is_confirmed_ = false;
+    if (!measured_ || !measurement_) return differ(origin, "a registration without a measurement");
+    auto now = register_models(plan_, *measured_, *measurement_, {});
+    if (!now) return differ(origin, now.error().message);
+    registered_digest_ = xray::digest(to_text(recorded(*now)));
+    if (record.content.at("digest") != registered_digest_)
+      differ(origin, "the registration differs from the recorded one on recomputation");
+    registration_ = *std::move(now);
+  }
+
+  /// Before it no tunnel of a model is known to the records that follow.
+  void registration_confirmed(const SessionRecord& record, const std::string& origin) {
+    if (!registration_ || registration_->refused() || !result_ ||
+        record.content.at("digest") != registered_digest_)
+      return differ(origin, "the confirmation is of no registration, or of one that was refused");
+    is_confirmed_ = true;
+    result_ = newest_ = value_or_throw(with_registration(*result_, *registration_, plan_, *measured_));
   }
 
   void guide(const SessionRecord& record, const std::string& origin) {
@@ -308,6 +360,11 @@ class Replay {
   std::optional<FreehandGuide> guide_;
   std::optional<pipeline::Case> derived_;             ///< of the last case record
   std::optional<pipeline::Measurement> measurement_;  ///< of the accepted images
+  std::optional<pipeline::Case> measured_;            ///< of the last measurement
+  std::optional<case_registration::CaseRegistration> registration_;
+  std::string registered_digest_;
+  bool is_confirmed_ = false;                    ///< the registration
+  std::vector<guidance::ToolLine> model_lines_;  ///< of the last case, to tunnels of models
   OrderReplay orders_;
   std::map<std::string, CaseImage> views_;  ///< the accepted images, without their paths
   std::map<std::string, std::set<std::string>> inboxes_;

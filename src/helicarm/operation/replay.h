@@ -18,6 +18,7 @@ struct ReplayReport {
   std::size_t exposures = 0;
   std::size_t images = 0;
   std::size_t results = 0;
+  std::size_t registrations = 0;  ///< of the plan's models
   std::size_t hand_eyes = 0;
   std::size_t decisions = 0;  ///< on a hand-held drill
   std::size_t orders = 0;

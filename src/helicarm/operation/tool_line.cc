@@ -30,19 +30,30 @@ geometry::RigidTransform pose_of(const guidance::Poses& poses, const guidance::B
   return *pose;
 }
 
-Vector3d located(const pipeline::Result& result, const std::string& name, const guidance::Bone& bone) {
-  const auto point = std::ranges::find(result.points, name, &pipeline::PointResult::name);
-  if (point != result.points.end() && point->place)
-    if (const guidance::Place* in_bone = point->place->in(bone)) return in_bone->point();
-  throw BadInput(Reason::not_seen, fmt::format("{}: is not located in its bone's frame", name));
+Vector3d located(const pipeline::Result& result, const PlannedTunnel& tunnel, const std::string& end) {
+  if (const guidance::PointInFrames* place = place_of(result, tunnel, end))
+    if (const guidance::Place* in_bone = place->in(tunnel.bone)) return in_bone->point();
+  throw BadInput(Reason::not_seen, fmt::format("{}: is not located in its bone's frame", end));
 }
 
 }  // namespace
 
+const guidance::PointInFrames* place_of(const pipeline::Result& result, const PlannedTunnel& tunnel,
+                                        const std::string& end) {
+  if (tunnel.of_model) {
+    const auto point = std::ranges::find_if(result.model_points, [&](const pipeline::ModelPoint& each) {
+      return each.model == tunnel.of_model->model && each.name == end;
+    });
+    return point == result.model_points.end() ? nullptr : &point->place;
+  }
+  const auto point = std::ranges::find(result.points, end, &pipeline::PointResult::name);
+  return point != result.points.end() && point->place ? &*point->place : nullptr;
+}
+
 Expected<TunnelInBone> tunnel_in_bone(const pipeline::Result& result, const PlannedTunnel& tunnel) {
   return guarded([&] {
-    TunnelInBone in_bone{tunnel.bone, located(result, tunnel.start, tunnel.bone),
-                         located(result, tunnel.end, tunnel.bone)};
+    TunnelInBone in_bone{tunnel.bone, located(result, tunnel, tunnel.start),
+                         located(result, tunnel, tunnel.end)};
     if (tunnel.enter_at == TunnelEnd::end) std::swap(in_bone.enter, in_bone.leave);
     return in_bone;
   });

@@ -17,7 +17,11 @@ struct TunnelInBone {
   Eigen::Vector3d leave;
 };
 
-/// From the located picks. Refuses (not_seen) an end that is not located.
+/// An end of the tunnel, by its name: a pick, or a point of the tunnel's model; null if it is not located.
+const guidance::PointInFrames* place_of(const pipeline::Result& result, const PlannedTunnel& tunnel,
+                                        const std::string& end);
+
+/// From the located picks or the registered plan. Refuses (not_seen) an end that is not located.
 Expected<TunnelInBone> tunnel_in_bone(const pipeline::Result& result, const PlannedTunnel& tunnel);
 
 /// The tunnel in the robot's base frame at the bone's present pose.

@@ -12,6 +12,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/connections.h"
+#include "helicarm/rehearsal/ct_plan.h"
 
 namespace helicarm::rehearsal {
 namespace {
@@ -113,14 +114,22 @@ operation::HandDrill calibrated_drill(const virtual_devices::HeldDrill& drill) {
           drill_sigma_mm};
 }
 
+/// The ball at a tunnel's end.
+std::string ball_at(const operation::PlannedTunnel& tunnel, bool start) {
+  if (!tunnel.of_model) return start ? tunnel.start : tunnel.end;
+  return std::string(tunnel.bone == "femur" ? "F" : "T") + (start ? "S" : "E");
+}
+
 void add_ends(Rehearsal& done, const operation::PlannedTunnel& tunnel,
               const operation::TunnelOutcome& outcome, VirtualDevices& virtual_or) {
   using guidance::Verification, guidance::LineError;
   const auto in_xrays = [&](const std::optional<LineError> Verification::*end) {
     return outcome.verification ? (*outcome.verification).*end : std::nullopt;
   };
-  done.ends.push_back(end_error(tunnel.start, outcome.start, in_xrays(&Verification::start), virtual_or));
-  done.ends.push_back(end_error(tunnel.end, outcome.end, in_xrays(&Verification::end), virtual_or));
+  done.ends.push_back(
+      end_error(ball_at(tunnel, true), outcome.start, in_xrays(&Verification::start), virtual_or));
+  done.ends.push_back(
+      end_error(ball_at(tunnel, false), outcome.end, in_xrays(&Verification::end), virtual_or));
 }
 
 /// Virtual devices and an operation on them, after its measurement.
@@ -132,7 +141,12 @@ struct Stage {
                                                  0};
     ports.freehand = freehand;
     virtual_or = value_or_throw(VirtualDevices::open(ports));
-    const operation::OperationPlan plan = plan_for(*virtual_or, virtual_or->tracker().port());
+    operation::OperationPlan plan = plan_for(*virtual_or, virtual_or->tracker().port());
+    if (options.ct_plan) {
+      const std::filesystem::path ct = folder.parent_path() / (folder.filename().string() + "-ct");
+      std::filesystem::create_directories(ct);
+      plan = with_ct_plan(std::move(plan), virtual_or->simulated_scene().simulated_case(), ct);
+    }
     devices = std::make_unique<operation::Connections>(
         plan, value_or_throw(receiver::Inbox::open(folder / "inbox")));
     receiver::ReceiverOptions receiving;
@@ -149,6 +163,9 @@ struct Stage {
     for (const std::string& view : plan.views)
       value_or_throw(expose(view, *virtual_or, *devices, *operation));
     value_or_throw(operation->measure());
+    if (!options.ct_plan) return;
+    value_or_throw(operation->register_models());
+    value_or_throw(operation->confirm_registration());
   }
 
   std::unique_ptr<VirtualDevices> virtual_or;

@@ -18,6 +18,7 @@ struct RehearsalOptions {
   bool move_bones = true;   ///< between acquisition and navigation
   bool plans_again = true;  ///< after late poses, states or heartbeats; else these end it
   std::function<void(const std::string&)> notify = [](const std::string&) {};
+  bool ct_plan = false;  ///< the tunnels are lines in a CT of the knee, which is registered (`with_ct_plan`)
 };
 
 /// A tunnel's end after the tool was moved to its tunnel.

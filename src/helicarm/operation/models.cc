@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/models.h"
+
+#include <algorithm>
+#include <regex>
+
+#include <fmt/format.h>
+
+#include "helicarm/case_registration/carry_plan.h"
+#include "helicarm/case_registration/case_plans.h"
+#include "helicarm/case_registration/plan_errors.h"
+#include "helicarm/core/files.h"
+#include "helicarm/core/private_files.h"
+#include "helicarm/localization/error_bound.h"
+#include "helicarm/operation/tool_line.h"
+#include "helicarm/xray/digest.h"
+
+namespace helicarm::operation {
+namespace {
+
+namespace fs = std::filesystem;
+using case_registration::CaseRegistration;
+
+constexpr std::uintmax_t most_model_bytes = std::uintmax_t{1} << 31;
+
+pipeline::RegistrationCase with_models_of(const OperationPlan& plan, const pipeline::Case& given) {
+  pipeline::RegistrationCase made{given, {}, plan.models, {}};
+  for (const PlannedTunnel& tunnel : plan.tunnels)
+    if (tunnel.of_model) made.tunnels.push_back(*tunnel.of_model);
+  return made;
+}
+
+/// The file of voxels that a header names beside itself (MetaImage, NRRD, NIfTI); nothing: in the file
+/// itself.
+std::optional<fs::path> data_beside(const fs::path& header) {
+  const std::string kind = header.extension().string();
+  if (kind == ".hdr") return fs::path(header).replace_extension(".img");
+  if (kind != ".mhd" && kind != ".nhdr") return std::nullopt;
+  static const std::regex names(R"((?:^|\n)\s*(?:ElementDataFile\s*=|data ?file:)\s*([^\r\n]*[^\s]))");
+  const std::string text = value_or_throw(read_file(header, std::uintmax_t{1} << 24));
+  std::smatch found;
+  if (!std::regex_search(text, found, names)) return std::nullopt;
+  const std::string name = found[1];
+  if (name == "LOCAL") return std::nullopt;
+  if (name.starts_with("LIST"))
+    throw BadInput(
+        Reason::unsupported,
+        fmt::format("{}: lists several data files: save the volume as one file (.nrrd, .mha) for an "
+                    "operation",
+                    header.filename().string()));
+  return value_or_throw(path_inside(header.parent_path(), name));
+}
+
+class ModelFolder {
+ public:
+  explicit ModelFolder(fs::path folder) : folder_(std::move(folder)) {
+    value_or_throw(make_private_folder(folder_));
+  }
+
+  /// The copy of a file, with the data that it names, or of a folder of files.
+  fs::path kept(const fs::path& file, const std::string& into) {
+    std::error_code ec;
+    if (!fs::is_directory(file, ec)) {
+      if (const auto data = data_beside(file)) copy(*data, into);
+      return copy(file, into);
+    }
+    const std::string name = into + "/" + file.filename().string();
+    for (const auto& entry : fs::directory_iterator(file, ec))
+      if (entry.is_regular_file()) copy(entry.path(), name);
+    return folder_ / name;
+  }
+
+  Digests files;
+
+ private:
+  fs::path copy(const fs::path& file, const std::string& into) {
+    const std::string name = into + "/" + file.filename().string();
+    const std::string bytes = value_or_throw(read_file(file, most_model_bytes));
+    if (const auto [kept, is_new] = files.emplace(name, xray::digest(bytes)); is_new) {
+      value_or_throw(make_private_folder((folder_ / name).parent_path()));
+      value_or_throw(write_private_file(folder_ / name, bytes));
+    } else if (kept->second != xray::digest(bytes)) {
+      throw BadInput(Reason::name_clash, fmt::format("{}: two files of a model have this name", name));
+    }
+    return folder_ / name;
+  }
+
+  fs::path folder_;
+};
+
+guidance::LineError error_of(const guidance::PointInFrames& place, const guidance::Bone& bone,
+                             const pipeline::Result& result, const pipeline::Case& given,
+                             const guidance::ToolLine& line) {
+  guidance::PlannedPoint planned{place.in_calibrator, {}};
+  std::vector<geometry::View> views;
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    views.push_back(result.views[i].calibrated.value().view);
+    // Where the bone was at this view's acquisition, as a pick would show it.
+    const auto calibrator_from_bone = guidance::calibrator_from(bone, given.views[i].poses);
+    const guidance::Place* in_bone = place.in(bone);
+    planned.uv.push_back(calibrator_from_bone && in_bone
+                             ? std::optional(views.back().project(*calibrator_from_bone * in_bone->point()))
+                             : std::nullopt);
+  }
+  return value_or_throw(guidance::distance_to_line(views, planned, line));
+}
+
+}  // namespace
+
+Expected<Digests> keep_models(OperationPlan& plan, const fs::path& session) {
+  return guarded([&]() -> Digests {
+    if (plan.models.empty()) return {};
+    ModelFolder folder(session / "models");
+    for (std::size_t i = 0; i < plan.models.size(); ++i) {
+      pipeline::CaseModel& model = plan.models[i];
+      const std::string into = std::to_string(i + 1);
+      for (auto* file : {&model.volume, &model.surface, &model.mask, &model.landmarks, &model.plan})
+        if (*file) *file = folder.kept(**file, into);
+      value_or_throw(case_registration::load_model(model));
+    }
+    plan.folder = session;
+    pipeline::Case given;
+    given.picks = plan.picks;
+    case_registration::read_plans(with_models_of(plan, given));
+    return std::move(folder.files);
+  });
+}
+
+Expected<CaseRegistration> register_models(const OperationPlan& plan, const pipeline::Case& given,
+                                           const pipeline::Measurement& measured,
+                                           const case_registration::Progress& progress) {
+  return guarded([&] {
+    if (!measured.calibration) throw BadInput(Reason::usage, "no measurement yet");
+    const pipeline::RegistrationCase with_models = with_models_of(plan, given);
+    case_registration::RegisterOptions options;
+    options.run = run_options(plan);
+    return value_or_throw(case_registration::register_loaded(
+        with_models, case_registration::views_of_calibration(with_models, *measured.calibration), options,
+        progress));
+  });
+}
+
+Json recorded(const CaseRegistration& registration) {
+  Json json = case_registration::to_json(registration);
+  for (Json& model : json["models"]) model.erase("seconds");
+  return json;
+}
+
+Expected<pipeline::Result> with_registration(const pipeline::Result& measured,
+                                             const CaseRegistration& registration, const OperationPlan& plan,
+                                             const pipeline::Case& given,
+                                             const std::vector<guidance::ToolLine>& lines) {
+  return guarded([&] {
+    const auto plans = case_registration::read_plans(with_models_of(plan, given));
+    CaseRegistration now;
+    now.models = registration.models;
+    for (std::size_t i = 0; i < now.models.size(); ++i) {
+      case_registration::RegisteredModel& model = now.models[i];
+      if (!plans[i] || model.registration.failure || !model.registration.is_determined()) continue;
+      carry_plan(*plans[i], given, model);
+      limit_error(case_registration::largest_error(model.points), plan.max_error_mm, model.registration);
+    }
+    pipeline::Result result = case_registration::with_models(measured, now);
+    for (const guidance::ToolLine& line : lines) {
+      const auto tunnel = std::ranges::find(plan.tunnels, line.tunnel, &PlannedTunnel::name);
+      if (tunnel == plan.tunnels.end()) continue;
+      guidance::Verification verified{line.name, {}, {}};
+      if (const auto* start = place_of(result, *tunnel, tunnel->start))
+        verified.start = error_of(*start, tunnel->bone, result, given, line);
+      if (const auto* end = place_of(result, *tunnel, tunnel->end))
+        verified.end = error_of(*end, tunnel->bone, result, given, line);
+      result.verifications.push_back(verified);
+    }
+    return result;
+  });
+}
+
+Expected<void> check_error_at_tip(const OperationPlan& plan, const PlannedTunnel& tunnel,
+                                  const pipeline::Result& result, const guidance::Poses& now,
+                                  const TrackedTool& tool) {
+  return guarded([&] {
+    const auto tracker_from_bone = now.tracker_from(tunnel.bone);
+    if (!tracker_from_bone || !now.tracker_from_tool)
+      throw BadInput(Reason::no_pose, "the marker of the tool or the bone is not visible");
+    for (const std::string& end : {tunnel.start, tunnel.end}) {
+      const guidance::PointInFrames* place = place_of(result, tunnel, end);
+      const guidance::Place* in_bone = place ? place->in(tunnel.bone) : nullptr;
+      if (!in_bone)
+        throw BadInput(Reason::not_seen, fmt::format("{}: is not located in its bone's frame", end));
+      const guidance::PropagatedPoint at =
+          guidance::to_tool(in_bone->propagated, tunnel.bone, *tracker_from_bone, *now.tracker_from_tool);
+      const double error_mm = localization::length_at_95(
+          at_tip(at.point, at.total_covariance(plan.tracker.noise()), tool).covariance);
+      if (error_mm > plan.max_error_mm)
+        throw BadInput(
+            {Reason::uncertain,
+             fmt::format("{}: the 95 % error of \"{}\" at the tool's tip is {:.3g} mm, with those of "
+                         "registration, tracker and tool, over the limit of {:g} mm",
+                         tunnel.name, end, error_mm, plan.max_error_mm),
+             {},
+             {{"error_95_mm", error_mm}, {"limit_mm", plan.max_error_mm}}});
+    }
+  });
+}
+
+}  // namespace helicarm::operation

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// Registration of the plan's models during an operation. Nothing is guided to a model's tunnel before a
+// person has confirmed the registration.
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/operation/models.h"
+#include "helicarm/operation/operation.h"
+#include "helicarm/report/overlay.h"
+#include "helicarm/xray/digest.h"
+
+namespace helicarm::operation {
+namespace {
+
+constexpr std::uintmax_t most_report_bytes = std::uintmax_t{256} << 20;
+constexpr const char* registration_folder = "registration";
+
+/// Report and overlays of a registration, with their digests.
+Digests write_with_digests(const case_registration::CaseRegistration& registration,
+                           const std::filesystem::path& folder) {
+  value_or_throw(case_registration::write_registration(registration, folder));
+  std::vector<std::string> names{"registration.json", "report.html"};
+  for (std::size_t i = 0; i < registration.loaded.views.size(); ++i)
+    names.push_back(report::overlay_name(registration.loaded.views[i].name, i));
+  Digests files;
+  for (const std::string& name : names)
+    files[name] = xray::digest(value_or_throw(read_file(folder / name, most_report_bytes)));
+  return files;
+}
+
+/// The first refusal.
+std::optional<Failure> refusal_of(const case_registration::CaseRegistration& registration) {
+  if (registration.failure) return registration.failure;
+  for (const case_registration::RegisteredModel& model : registration.models)
+    if (model.registration.failure) return model.registration.failure;
+  return std::nullopt;
+}
+
+}  // namespace
+
+Expected<void> Operation::register_models() {
+  return guarded([&] {
+    if (plan_.models.empty()) throw BadInput(Reason::usage, "the plan has no \"models\"");
+    if (!result_ || !measured_) throw BadInput(Reason::usage, "no measurement yet");
+    forget_registration();
+    notify_(Step::measure, "registration of the plan's models");
+    case_registration::Progress progress;
+    progress.step = [&](const std::string& model, std::string_view step) {
+      notify_(Step::measure, fmt::format("{}: {}", model, step));
+    };
+    progress.interrupt = [this] {
+      if (end_.stop_requested()) throw BadInput(Reason::interrupted, "the registration was stopped");
+    };
+    auto found = value_or_throw(operation::register_models(plan_, *measured_, *measurement_, progress));
+    const std::string folder = measured_->folder.filename().string() + "/" + registration_folder;
+    const Digests files = write_with_digests(found, folder_ / folder);
+    registered_digest_ = xray::digest(to_text(operation::recorded(found)));
+    record("registered", {{"folder", folder}, {"digest", registered_digest_}, {"files", files}});
+    registration_ = std::move(found);
+    if (const auto refusal = refusal_of(*registration_)) throw BadInput(*refusal);
+  });
+}
+
+Expected<void> Operation::confirm_registration() {
+  return guarded([&] {
+    if (!registration_)
+      throw BadInput(Reason::usage, "no registration to confirm; register the models first");
+    if (const auto refusal = refusal_of(*registration_)) throw BadInput(*refusal);
+    if (registration_confirmed_) return;
+    pipeline::Result with_models =
+        value_or_throw(with_registration(*result_, *registration_, plan_, *measured_));
+    if (with_models.failure) throw BadInput(*with_models.failure);
+    record("registration_confirmed", {{"digest", registered_digest_}, {"by", who_}});
+    registration_confirmed_ = true;
+    result_ = newest_ = std::move(with_models);
+  });
+}
+
+void Operation::check_registered(const PlannedTunnel& tunnel) const {
+  if (!tunnel.of_model || registration_confirmed_) return;
+  if (registration_)
+    throw BadInput(Reason::registration_not_confirmed,
+                   fmt::format("{}: the registration of \"{}\" is not confirmed: look at its overlays, and "
+                               "confirm that the outline follows the bone in every view",
+                               tunnel.name, tunnel.of_model->model));
+  if (was_registered_)
+    throw BadInput(
+        Reason::registration_stale,
+        fmt::format("{}: images or picks were taken again since \"{}\" was registered: register the "
+                    "models again",
+                    tunnel.name, tunnel.of_model->model));
+  throw BadInput(Reason::registration_not_confirmed,
+                 fmt::format("{}: \"{}\" is not registered: register the models first", tunnel.name,
+                             tunnel.of_model->model));
+}
+
+/// What was planned to the models' tunnels ends with their registration.
+void Operation::forget_registration() {
+  was_registered_ = was_registered_ || registration_.has_value();
+  registration_.reset();
+  registration_confirmed_ = false;
+  registered_digest_.clear();
+  for (const PlannedTunnel& tunnel : plan_.tunnels)
+    if (tunnel.of_model) {
+      planned_.erase(tunnel.name);
+      if (guide_ && guide_->tunnel().name == tunnel.name) guide_.reset(), guided_.reset();
+    }
+}
+
+}  // namespace helicarm::operation
