@@ -119,15 +119,18 @@ std::optional<MarkerImage> fitted_at(const image::Image<float>& grey, const Eige
   return std::nullopt;
 }
 
-/// Fits each disc together with its neighbours.
+/// Fits each disc together with its neighbours. Faint texture beside it is none: a joint fit would wander.
 void fit_overlapping(const image::Image<float>& grey, std::vector<MarkerImage>& found,
                      const MarkerAppearance& appearance) {
+  constexpr double least_contrast = 0.3, vague = 0.12, farthest_px = 1;
   const std::vector<MarkerImage> alone = found;
   for (std::size_t i = 0; i < found.size(); ++i) {
     std::vector<std::pair<double, std::size_t>> near;
     for (std::size_t k = 0; k < alone.size(); ++k) {
       const double distance = (alone[k].uv_raw - alone[i].uv_raw).norm();
-      if (k != i && distance < alone[i].radius_px + alone[k].radius_px + overlap_px)
+      if (k != i && distance < alone[i].radius_px + alone[k].radius_px + overlap_px &&
+          std::abs(alone[k].contrast) > least_contrast * std::abs(alone[i].contrast) &&
+          alone[k].sigma_px < vague * alone[k].radius_px)
         near.emplace_back(distance, k);
     }
     if (near.empty()) continue;
@@ -137,8 +140,11 @@ void fit_overlapping(const image::Image<float>& grey, std::vector<MarkerImage>& 
     for (const auto& [distance, k] : near) starts.push_back(start_at(alone[k].uv_raw, alone[k].radius_px));
     const std::vector<detection::BallProfile> profiles(starts.size(), appearance.profile);
     const auto together = detection::fit_dots_together(grey, starts, profiles, {}, appearance.options);
-    if (together && together->front().contrast * appearance.polarity > 0)
-      found[i] = marker_from(together->front());
+    if (!together || together->front().contrast * appearance.polarity <= 0) continue;
+    const MarkerImage joint = marker_from(together->front());
+    if ((joint.uv_raw - alone[i].uv_raw).norm() < farthest_px && has_marker_size(joint, alone[i].radius_px) &&
+        joint.sigma_px < 3 * alone[i].sigma_px)
+      found[i] = joint;
   }
 }
 

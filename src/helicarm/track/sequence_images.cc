@@ -10,6 +10,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/pipeline/registration_case.h"
 #include "helicarm/pipeline/view_image.h"
+#include "helicarm/xray/read_dicom.h"
 
 namespace helicarm::track {
 namespace {
@@ -37,6 +38,15 @@ std::optional<Eigen::Vector2i> png_size(const fs::path& path) {
                std::uint32_t(head[at + 2]) << 8 | head[at + 3]);
   };
   return Eigen::Vector2i(number(16), number(20));
+}
+
+/// A reader that finds more bright discs than dark ones inverts the image. A sequence keeps its polarity, which
+/// the picks show.
+void keep_polarity(xray::XrayImage& image) {
+  if (std::erase_if(image.warnings, [](const Warning& warning) {
+        return warning.reason == Reason::tag_disagrees && warning.message.ends_with("values were inverted");
+      }) > 0)
+    xray::invert(image);
 }
 
 void check_size(const std::string& view, int number, const Eigen::Vector2i& size,
@@ -100,6 +110,7 @@ Expected<xray::XrayImage> SequenceImages::image(std::size_t view, int frame) con
     xray::XrayImage read =
         files_[view] ? value_or_throw(files_[view]->read(asked.images.name, frame + asked.frame_offset))
                      : value_or_throw(pipeline::image_of(at_number(asked, frame)));
+    keep_polarity(read);
     check_size(asked.images.name, frame + asked.frame_offset, {read.pixels.width(), read.pixels.height()},
                sizes_[view]);
     return read;
