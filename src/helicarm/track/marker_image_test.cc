@@ -33,7 +33,7 @@ xray::XrayImage drawn(std::span<const Eigen::Vector2d> centres, double radius, d
 MarkerAppearance appearance_for(double contrast) {
   MarkerAppearance appearance;
   appearance.polarity = contrast > 0 ? 1 : -1;
-  appearance.profile = detection::BallProfile(0.3, 0.8);
+  appearance.profile = detection::BallProfile(0.2, 8);
   return appearance;
 }
 

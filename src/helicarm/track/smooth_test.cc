@@ -35,7 +35,8 @@ Data measured_at(int frames, int gap_first, int gap_last, unsigned seed) {
     for (int k = 0; k < 6; ++k) step[k] = (k < 3 ? sigma_rad : sigma_mm) * normal(random);
     auto& made = data.measured.emplace_back();
     if (i >= gap_first && i <= gap_last) continue;
-    made = FramePose{registration::moved_about(pose_at(i), pose_at(i) * centre, step), {}};
+    made.emplace();
+    made->pose = registration::moved_about(pose_at(i), pose_at(i) * centre, step);
     made->covariance.diagonal() << sigma_rad * sigma_rad * Eigen::Vector3d::Ones(),
         sigma_mm * sigma_mm * Eigen::Vector3d::Ones();
   }

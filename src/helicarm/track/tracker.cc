@@ -520,26 +520,31 @@ void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
     double least = 1e9;
     std::size_t most = 0;
     for (const double polarity : {1.0, -1.0})
-      for (const double blur : profile_blurs()) {
-        MarkerAppearance tried;
-        tried.polarity = polarity;
-        tried.profile = detection::BallProfile(blur, 0.8);
-        tried.options = detection::fit_options_for(images[k]);
-        std::vector<double> misfits;
-        for (const MarkerPick& pick : given_->picks) {
-          if (pick.view != k) continue;
-          const double radius = radius_px(k, markers_[pick.marker].place);
-          if (const auto found = picked_marker(images[k], pick.uv_raw, radius, click_px + radius, tried))
-            misfits.push_back(found->misfit);
+      for (const double absorbance : {0.8, 8.0})  // like the chord's length, and a flat disc
+        for (const double blur : profile_blurs()) {
+          MarkerAppearance tried;
+          tried.polarity = polarity;
+          tried.profile = detection::BallProfile(blur, absorbance);
+          tried.options = detection::fit_options_for(images[k]);
+          std::vector<double> misfits, sizes;
+          for (const MarkerPick& pick : given_->picks) {
+            if (pick.view != k) continue;
+            const double radius = radius_px(k, markers_[pick.marker].place);
+            if (const auto found = picked_marker(images[k], pick.uv_raw, radius, click_px + radius, tried)) {
+              misfits.push_back(found->misfit);
+              sizes.push_back(std::log(found->image.radius_px / radius));
+            }
+          }
+          if (misfits.empty() || misfits.size() + 1 < most) continue;
+          // A blurred small disc looks like a sharp large one: of what fits, the stated size decides.
+          const double misfit =
+              (median(misfits) + 0.1 * std::abs(median(sizes))) / double(misfits.size());
+          if (misfits.size() > most + 1 || misfit < least) {
+            least = misfit;
+            best = tried;
+          }
+          most = std::max(most, misfits.size());
         }
-        if (misfits.empty() || misfits.size() + 1 < most) continue;
-        const double misfit = median(misfits) / double(misfits.size());
-        if (misfits.size() > most + 1 || misfit < least) {
-          least = misfit;
-          best = tried;
-        }
-        most = std::max(most, misfits.size());
-      }
     if (most == 0) best.options = detection::fit_options_for(images[k]);
     appearance_.push_back(best);
   }
