@@ -83,8 +83,8 @@ py::dict bodies_dict(const Tracked& t, std::vector<track::TrackedBody> track::Bo
   return dict;
 }
 
-Eigen::MatrixXd matrix_of(const track::FramePose& pose) { return pose.pose.matrix(); }
-Eigen::MatrixXd covariance_of_pose(const track::FramePose& pose) { return pose.covariance; }
+Eigen::MatrixXd pose_matrix(const track::FramePose& pose) { return pose.pose.matrix(); }
+Eigen::MatrixXd pose_covariance(const track::FramePose& pose) { return pose.covariance; }
 
 }  // namespace
 
@@ -126,22 +126,22 @@ void add_track(py::module_& module) {
           "n lists of m words: tracked, one_view, predicted, lost.")
       .def_property_readonly(
           "bodies",
-          [](const Tracked& t) { return bodies_dict(t, &track::BodySequence::frames, 4, matrix_of); },
+          [](const Tracked& t) { return bodies_dict(t, &track::BodySequence::frames, 4, pose_matrix); },
           "{name: (n, 4, 4)}: world_from_body of each frame against the first, NaN where it has no pose.")
       .def_property_readonly(
           "body_covariances",
           [](const Tracked& t) {
-            return bodies_dict(t, &track::BodySequence::frames, 6, covariance_of_pose);
+            return bodies_dict(t, &track::BodySequence::frames, 6, pose_covariance);
           },
           "{name: (n, 6, 6)}: rotation vector in rad, then mm, in world axes about the body's centroid.")
       .def_property_readonly(
           "smoothed",
-          [](const Tracked& t) { return bodies_dict(t, &track::BodySequence::smoothed, 4, matrix_of); },
+          [](const Tracked& t) { return bodies_dict(t, &track::BodySequence::smoothed, 4, pose_matrix); },
           "{name: (n, 4, 4)}: likewise, of one estimate over all frames, gaps filled.")
       .def_property_readonly(
           "smoothed_covariances",
           [](const Tracked& t) {
-            return bodies_dict(t, &track::BodySequence::smoothed, 6, covariance_of_pose);
+            return bodies_dict(t, &track::BodySequence::smoothed, 6, pose_covariance);
           },
           "{name: (n, 6, 6)}.")
       .def_property_readonly("warnings", [](const Tracked& t) { return warning_list(t.sequence.warnings); })

@@ -22,6 +22,7 @@ using OptionalPlace = std::optional<Eigen::Vector3d>;
 
 constexpr double median_of_chi2 = 0.4549;  // one degree of freedom
 constexpr double sight_floor_px = 0.02;
+constexpr std::size_t few_frames = 5;  // too few for a marker's place in its body and its deviations
 
 /// The sequence's data while it is estimated.
 struct Work {
@@ -281,7 +282,7 @@ struct Shift {
 };
 
 Shift shift_of(const std::vector<OptionalPlace>& deviations) {
-  constexpr std::size_t least_side = 4;
+  constexpr std::size_t least_side = 6;
   std::vector<std::size_t> at;
   std::vector<Eigen::Vector3d> sums{Eigen::Vector3d::Zero()};
   for (std::size_t f = 0; f < deviations.size(); ++f)
@@ -310,7 +311,7 @@ Shift shift_of(const std::vector<OptionalPlace>& deviations) {
 void find_loose(const Work& work, const BodyPlan& plan, std::vector<char>& counts, BodySequence& body,
                 Shape& shape, const std::vector<int>& frames, std::vector<Warning>& warnings) {
   constexpr double least_mm = 0.3;  // radiostereometry's limit of marker stability
-  constexpr double least_sigmas = 3;
+  constexpr double least_sigmas = 5;
   while (std::ranges::count(counts, 1) >= 4) {
     std::optional<std::size_t> worst;
     Shift farthest;
@@ -468,10 +469,12 @@ void learn_deviations(const Work& work, const BodyPlan& plan, Estimated& at, Bod
                   turn.transpose() * work.points[f][plan.markers[i]]->covariance * turn;
       ++count;
     }
-    // Never less than the deviation alone; a marker without frames of its own has that of the body, twice.
+    // Never less than the deviation alone; a marker with few frames has that of the body, twice, and one with
+    // fewer still may be another disc.
     const double least = std::pow(body.deviation_mm, 2) + 1e-6;
-    Eigen::Matrix3d spread = 4 * least * Eigen::Matrix3d::Identity();
-    if (count > 5) {
+    constexpr double few_mm = 0.7;
+    Eigen::Matrix3d spread = (at.counts[i] ? 4 * least : few_mm * few_mm) * Eigen::Matrix3d::Identity();
+    if (at.counts[i] && count > int(few_frames)) {
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(products / count);
       spread = parts.eigenvectors() * parts.eigenvalues().cwiseMax(least).asDiagonal() *
                parts.eigenvectors().transpose();
@@ -675,6 +678,12 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
     Estimated& at = bodies.emplace_back();
     for (const std::size_t marker : plan.markers) body.markers.push_back({marker, {}, 0, {}});
     at.counts.assign(plan.markers.size(), 1);
+    // A marker that two views show in a few frames alone, perhaps wrongly, determines no pose.
+    for (std::size_t i = 0; i < plan.markers.size(); ++i) {
+      std::size_t shown = 0;
+      for (std::size_t f = 0; f < work.frames; ++f) shown += work.points[f][plan.markers[i]].has_value();
+      at.counts[i] = shown >= std::min(few_frames + 1, (work.frames + 1) / 2);
+    }
     at.shape = shape_of(work, plan, at.counts);
     find_loose(work, plan, at.counts, body, at.shape, sequence.frames, sequence.warnings);
     learn_deviations(work, plan, at, body);
