@@ -537,8 +537,7 @@ void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
           }
           if (misfits.empty() || misfits.size() + 1 < most) continue;
           // A blurred small disc looks like a sharp large one: of what fits, the stated size decides.
-          const double misfit =
-              (median(misfits) + 0.1 * std::abs(median(sizes))) / double(misfits.size());
+          const double misfit = (median(misfits) + 0.1 * std::abs(median(sizes))) / double(misfits.size());
           if (misfits.size() > most + 1 || misfit < least) {
             least = misfit;
             best = tried;
@@ -586,7 +585,7 @@ void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) 
     // Weak discs are texture, where a clear one is near.
     for (const MarkerImage& image : found)
       if (const double distance = (image.uv_raw - pick.uv_raw).norm();
-          distance < reach && has_marker_size(image, radius) && nearest && image.sigma_px < 0.3 * radius &&
+          distance < reach && has_marker_size(image, radius) && nearest && image.sigma_px < 0.15 * radius &&
           std::abs(image.contrast) > 0.5 * std::abs(nearest->image.contrast))
         snaps.push_back({distance, &pick, image});
   }
@@ -625,7 +624,7 @@ void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) 
                     frame));
 }
 
-void Tracker::check_rays() const {
+void Tracker::check_rays() {
   constexpr double largest_gap_mm = 1, largest_gap_px = 4;
   const auto gap_of = [&](std::size_t first, std::size_t second, std::size_t k) -> std::optional<double> {
     const auto &a = first_.of[first][0], &b = first_.of[second][k];
@@ -652,6 +651,29 @@ void Tracker::check_rays() const {
                            *there),
                given_->views[k].images.name,
                {{"gap_mm", *gap}, {"exchanged_mm", *here}}});
+      }
+      // Clicks whose rays meet are right: a disc beside one of them is not the marker's.
+      const auto click_in = [&](std::size_t view) {
+        return std::ranges::find_if(
+            given_->picks, [&](const MarkerPick& pick) { return pick.marker == m && pick.view == view; });
+      };
+      const auto a = click_in(0), b = click_in(k);
+      if (geometry::gap_between(geometry::ray_through(cameras_[0], rectified(0, a->uv_raw)),
+                                geometry::ray_through(cameras_[k], rectified(k, b->uv_raw))) <
+          std::max(largest_gap_mm, largest_gap_px * mm_per_px)) {
+        const bool is_first =
+            (first_.of[m][0]->uv_raw - a->uv_raw).norm() > (first_.of[m][k]->uv_raw - b->uv_raw).norm();
+        const std::size_t view = is_first ? 0 : k;
+        first_.of[m][view].reset();
+        markers_[m].known = true;
+        warnings_.push_back(
+            {Reason::target_not_found,
+             fmt::format("frame {}: the disc nearest to the pick \"{}\" contradicts the other view "
+                         "by {:.2f} mm: the marker counts as hidden in this view",
+                         first_.frame, given_->markers[m], *gap),
+             given_->views[view].images.name,
+             {{"gap_mm", *gap}}});
+        continue;
       }
       throw BadInput({Reason::residual_too_large,
                       fmt::format("frame {}: the rays of \"{}\" in {} and {} miss each other by {:.2f} mm: a "

@@ -87,7 +87,7 @@ class Tracker {
   Eigen::Vector3d velocity_of(std::size_t marker) const;
   void learn_appearance(const std::vector<xray::XrayImage>& images);
   void find_first(int frame, const std::vector<xray::XrayImage>& images);
-  void check_rays() const;
+  void check_rays();
   void check_geometry() const;
   void update_delay(std::size_t marker, const FrameSights& sights, const Eigen::Vector3d& place,
                     const Eigen::Vector3d& velocity);
