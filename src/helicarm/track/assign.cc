@@ -17,7 +17,7 @@ constexpr double log_density = -6.9;     // of discs that are no marker's: one i
 constexpr double detected = 0.95;        // chance that a marker is found in a view
 constexpr double least_sigma_px = 0.15;  // texture behind a marker displaces its fit
 constexpr double sigma_factor = 2;
-constexpr double vaguest = 0.1;        // standard deviation of a disc over its radius: texture beyond
+constexpr double vaguest = 0.15;       // standard deviation of a disc over its radius: texture beyond
 constexpr double usual_spread = 0.35;  // of a contrast's logarithm, between frames
 constexpr double gate = 25;            // chi2 of one disc
 constexpr std::size_t most_per_view = 6, beam = 100;
