@@ -40,7 +40,7 @@ struct BoneCheck {
   Eigen::Vector3d outward = Eigen::Vector3d::Zero();   ///< normal of the surface nearest to it
   double length_in_bone_mm = 0;
   std::optional<Eigen::Vector3d> entry =
-      {};  ///< on the bone's surface; nothing: the line lies outside the bone
+      {};  ///< on the bone's surface; nothing: the line does not meet the bone
   std::optional<Eigen::Vector3d> exit = {};  ///< likewise; nothing: a blind tunnel
   std::optional<double> entry_angle_deg = {},
                         exit_angle_deg = {};      ///< between axis and surface; 90: perpendicular
