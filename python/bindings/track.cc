@@ -130,9 +130,7 @@ void add_track(py::module_& module) {
           "{name: (n, 4, 4)}: world_from_body of each frame against the first, NaN where it has no pose.")
       .def_property_readonly(
           "body_covariances",
-          [](const Tracked& t) {
-            return bodies_dict(t, &track::BodySequence::frames, 6, pose_covariance);
-          },
+          [](const Tracked& t) { return bodies_dict(t, &track::BodySequence::frames, 6, pose_covariance); },
           "{name: (n, 6, 6)}: rotation vector in rad, then mm, in world axes about the body's centroid.")
       .def_property_readonly(
           "smoothed",
@@ -140,9 +138,7 @@ void add_track(py::module_& module) {
           "{name: (n, 4, 4)}: likewise, of one estimate over all frames, gaps filled.")
       .def_property_readonly(
           "smoothed_covariances",
-          [](const Tracked& t) {
-            return bodies_dict(t, &track::BodySequence::smoothed, 6, pose_covariance);
-          },
+          [](const Tracked& t) { return bodies_dict(t, &track::BodySequence::smoothed, 6, pose_covariance); },
           "{name: (n, 6, 6)}.")
       .def_property_readonly("warnings", [](const Tracked& t) { return warning_list(t.sequence.warnings); })
       .def(
