@@ -31,8 +31,9 @@ State moved(const State& state, const Vector& step) {
 
 Vector between(const State& from, const State& to) {
   Vector step;
-  step << geometry::vector_from_rotation(to.rotation * from.rotation.transpose()), to.centre - from.centre,
-      to.rates - from.rates;
+  step.head<3>() = geometry::vector_from_rotation(to.rotation * from.rotation.transpose());
+  step.segment<3>(3) = to.centre - from.centre;
+  step.tail<12>() = to.rates - from.rates;
   return step;
 }
 
