@@ -19,7 +19,7 @@ def limits(schema):
     kinds = [kinds] if isinstance(kinds, str) else kinds
     if "enum" in schema:
         return ""
-    if "number" in kinds or "integer" in kinds:
+    if "minimum" in schema:
         return f"{schema['minimum']:g} to {schema['maximum']:g}"
     if "string" in kinds and "minLength" in schema:
         return f"{schema['minLength']} to {schema['maxLength']} characters"
