@@ -143,8 +143,8 @@ void calibrate_with(double factor, const SweepCase& given, FrameEstimate& at, co
   if (!again) refuse(at, again.error(), view);
 }
 
-/// The camera between two others, by the share of the way; nothing where the run turns by too much between
-/// them.
+/// The camera on the way between two others, or beyond them, by the share of the way; nothing where the run
+/// turns by too much between them.
 std::optional<fiducials::ExpectedView> camera_between(const geometry::View& before,
                                                       const geometry::View& after, double share) {
   constexpr double most_deg = 15, least_within_deg = 2, of_the_way = 0.5;
@@ -160,29 +160,44 @@ std::optional<fiducials::ExpectedView> camera_between(const geometry::View& befo
   const Eigen::Vector4d inner =
       mean(Eigen::Vector4d(k.fx, k.fy, k.u0, k.v0), Eigen::Vector4d(l.fx, l.fy, l.u0, l.v0));
   view.intrinsics = {inner[0], inner[1], inner[2], inner[3]};
-  return fiducials::ExpectedView{view, std::max(least_within_deg, of_the_way * turned_deg)};
+  return fiducials::ExpectedView{view,
+                                 std::max(least_within_deg, of_the_way * turned_deg * std::max(1.0, share))};
 }
 
-/// Labels again the frames that their image alone leaves ambiguous and whose camera the accepted frames on
-/// both sides tell. A phantom seen along its axis, or half out of the field, looks alike from two directions:
-/// a run does not jump.
+/// The two accepted frames from which the camera of a frame follows: on both sides, or at an end of the run
+/// the two nearest ones; each at most `reach` away.
+std::optional<std::pair<std::ptrdiff_t, std::ptrdiff_t>> neighbours_of(
+    std::ptrdiff_t frame, const std::vector<FrameEstimate>& frames) {
+  constexpr std::ptrdiff_t reach = 5;
+  const auto next = [&](std::ptrdiff_t from, std::ptrdiff_t step) -> std::optional<std::ptrdiff_t> {
+    for (std::ptrdiff_t i = from + step; std::abs(i - frame) <= reach; i += step)
+      if (i >= 0 && i < std::ssize(frames) && !frames[std::size_t(i)].failure) return i;
+    return {};
+  };
+  const auto before = next(frame, -1), after = next(frame, 1);
+  if (before && after) return std::pair(*before, *after);
+  if (!before && !after) return {};
+  const std::ptrdiff_t nearest = before ? *before : *after, step = before ? -1 : 1;
+  const auto farther = next(nearest, step);
+  if (!farther) return {};
+  return std::pair(*farther, nearest);
+}
+
+/// Labels again the frames that their image alone leaves ambiguous and whose camera the accepted frames
+/// beside them tell. A phantom seen along its axis, or half out of the field, looks alike from two
+/// directions: a run does not jump.
 void label_by_neighbours(double factor, const SweepCase& given, std::vector<FrameEstimate>& estimates,
                          unsigned threads) {
-  constexpr std::ptrdiff_t reach = 5;  // frames on either side
   const std::vector<FrameEstimate> alone = estimates;
-  const auto accepted = [&](std::ptrdiff_t i) {
-    return i >= 0 && i < std::ssize(alone) && !alone[std::size_t(i)].failure;
-  };
   parallel_for(estimates.size(), threads, [&](std::size_t index) {
     const auto i = std::ptrdiff_t(index);
     if (!alone[index].failure || alone[index].failure->reason != Reason::ambiguous_labels) return;
-    std::ptrdiff_t before = i - 1, after = i + 1;
-    while (before >= i - reach && !accepted(before)) --before;
-    while (after <= i + reach && !accepted(after)) ++after;
-    if (!accepted(before) || !accepted(after)) return;
+    const auto beside = neighbours_of(i, alone);
+    if (!beside) return;
+    const auto [first, second] = *beside;
     const auto expected =
-        camera_between(alone[std::size_t(before)].alone->view, alone[std::size_t(after)].alone->view,
-                       double(i - before) / double(after - before));
+        camera_between(alone[std::size_t(first)].alone->view, alone[std::size_t(second)].alone->view,
+                       double(i - first) / double(second - first));
     if (!expected) return;
     const Frame& frame = given.frames[index];
     auto again = estimate_frame(frame, file_of(frame, given), given.base, {}, expected);
