@@ -40,8 +40,8 @@ std::optional<Eigen::Vector2i> png_size(const fs::path& path) {
   return Eigen::Vector2i(number(16), number(20));
 }
 
-/// A reader that finds more bright discs than dark ones inverts the image. A sequence keeps its polarity, which
-/// the picks show.
+/// A reader that finds more bright discs than dark ones inverts the image. A sequence keeps its polarity,
+/// which the picks show.
 void keep_polarity(xray::XrayImage& image) {
   if (std::erase_if(image.warnings, [](const Warning& warning) {
         return warning.reason == Reason::tag_disagrees && warning.message.ends_with("values were inverted");
