@@ -353,6 +353,7 @@ struct Estimated {
   std::vector<char> counts;
   std::vector<std::optional<FramePose>> poses;  // world_from_body of the body's own frame
   std::vector<Eigen::Matrix3d> spread;          // of each marker about its place by the others, body frame
+  std::optional<SmoothMotion> motion;
 };
 
 std::vector<SeenMarker> seen_markers(const Work& work, const BodyPlan& plan, const Estimated& at,
@@ -612,12 +613,8 @@ TrackedBody relative_of(const TrackedBody& reference, const TrackedBody& body) {
   return made;
 }
 
-}  // namespace
-
-Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights>& sights) {
-  constexpr double in_step = 0.02, lost_mm = 5, worst_turn_deg = 5, condition_limit = 150;
-  Sequence sequence;
-  sequence.warnings = given.warnings;
+/// The images' sights, rectified.
+Work work_of(const TrackCase& given, const std::vector<FrameSights>& sights, Sequence& sequence) {
   Work work{given, sights.size(), given.markers.size(), given.views.size(), {}, {}, {}, {}};
   for (const TrackView& view : given.views) work.cameras.push_back(view.camera);
   for (const FrameSights& frame : sights) {
@@ -638,6 +635,11 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
       }
   }
   locate_all(work);
+  return work;
+}
+
+/// Estimates the views' delays, and carries their images to the first view's moment.
+void correct_delays(Work& work, Sequence& sequence) {
   const auto as_seen = work.sights;
   for (int round = 0; round < 2; ++round) {
     // The velocities of the second round are free of the delay; the gaps are those of the images as seen.
@@ -648,6 +650,11 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
     take_out_delays(work, sequence.delays);
     locate_all(work);
   }
+}
+
+void warn_of_delays(const Work& work, Sequence& sequence) {
+  constexpr double in_step = 0.02;
+  const TrackCase& given = work.given;
   for (std::size_t k = 1; k < work.views; ++k) {
     const ViewDelay& delay = sequence.delays[k];
     if (!delay.is_known || std::abs(delay.frames) < in_step || std::abs(delay.frames) < 4 * delay.sigma)
@@ -666,164 +673,172 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
     warning.message += ": its images are carried to the first camera's moment";
     sequence.warnings.push_back(std::move(warning));
   }
-  sequence.sigma_factor = sigma_factors(work);
-  locate_all(work);
-  sequence.correlation = correlation_of(work);
-  sequence.distances = distances_of(work);
+}
 
-  std::vector<Estimated> bodies;
-  std::vector<std::optional<SmoothMotion>> motions;
-  for (const BodyPlan& plan : given.bodies) {
-    BodySequence& body = sequence.bodies.emplace_back();
-    Estimated& at = bodies.emplace_back();
-    for (const std::size_t marker : plan.markers) body.markers.push_back({marker, {}, 0, {}});
-    at.counts.assign(plan.markers.size(), 1);
-    // A marker that two views show in a few frames alone, perhaps wrongly, determines no pose.
-    for (std::size_t i = 0; i < plan.markers.size(); ++i) {
-      std::size_t shown = 0;
-      for (std::size_t f = 0; f < work.frames; ++f) shown += work.points[f][plan.markers[i]].has_value();
-      at.counts[i] = shown >= std::min(few_frames + 1, (work.frames + 1) / 2);
-    }
-    at.shape = shape_of(work, plan, at.counts);
-    find_loose(work, plan, at.counts, body, at.shape, sequence.frames, sequence.warnings);
-    learn_deviations(work, plan, at, body);
-    std::vector<Eigen::Vector3d> points;
-    for (std::size_t i = 0; i < plan.markers.size(); ++i)
-      if (at.counts[i] && at.shape.in_body[i]) points.push_back(*at.shape.in_body[i]);
-    body.frames.assign(work.frames, {});
-    body.smoothed.assign(work.frames, {});
-    const auto refuse = [&](const std::string& why) {
-      sequence.warnings.push_back({Reason::body_ill_conditioned,
-                                   fmt::format("the body \"{}\" has no pose: {}", plan.name, why),
-                                   {},
-                                   {}});
-      for (auto* frames : {&body.frames, &body.smoothed})
-        for (TrackedBody& frame : *frames) {
-          frame = {};
-          frame.reason = Reason::body_ill_conditioned;
-        }
-      at.poses.assign(work.frames, std::nullopt);
-      motions.emplace_back();
-    };
-    if (points.size() < 3) {
-      refuse(fmt::format("{} of its markers are located, three are needed", points.size()));
-      continue;
-    }
-    body.condition_per_m = condition_of(points);
-    pose_frames(work, plan, at, body);
-    std::vector<double> turns;
-    for (const auto& pose : at.poses)
-      if (pose)
-        turns.push_back(
-            std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(pose->covariance.topLeftCorner<3, 3>())
-                          .eigenvalues()[2]) *
-            180 / EIGEN_PI);
-    if (turns.empty()) {
-      refuse("in no frame are three of its markers seen");
-      continue;
-    }
-    const double turn = median(turns);
-    if (turn > worst_turn_deg || extents(points)[1] < 0.5) {
-      refuse(fmt::format(
-          "its markers are within {:.2f} mm of one line: its turn about it has a standard deviation "
-          "of {:.1f} degrees, limit {:g}; the condition number is {:.0f} per metre",
-          extents(points)[1], turn, worst_turn_deg, body.condition_per_m));
-      continue;
-    }
-    if (body.condition_per_m > condition_limit)
-      sequence.warnings.push_back(
-          {Reason::body_ill_conditioned,
-           fmt::format(
-               "the markers of the body \"{}\" have the condition number {:.0f} per metre, limit {:g} "
-               "(radiostereometry): its turns have {:.2f} degrees of standard deviation",
-               plan.name, body.condition_per_m, condition_limit, turn),
-           {},
-           {{"condition_per_m", body.condition_per_m}, {"sigma_deg", turn}}});
-    const Eigen::Vector3d centre = mean_of(points);
-    // Of correlated errors, as many independent ones as their means' variance shows.
-    const double fewer = (1 + sequence.correlation) / (1 - sequence.correlation);
-    std::vector<std::optional<FramePose>> measured = at.poses;
-    for (auto& pose : measured)
-      if (pose) pose->covariance *= fewer;
-    auto& motion = motions.emplace_back(smooth_poses(work.times, measured, centre));
-    if (motion) {
-      body.prior = motion->prior;
-      std::vector<std::optional<FramePose>> smooth;
-      for (const FramePose& pose : motion->frames) smooth.emplace_back(pose);
-      against_first(body.smoothed, smooth, centre, *smooth.front());
-      for (std::size_t f = 0; f < work.frames; ++f) {
-        TrackedBody& frame = body.smoothed[f];
-        const TrackedBody& own = body.frames[f];
-        frame.markers = own.markers;
-        frame.rms_mm = own.rms_mm;
-        frame.reason = own.reason;
-        frame.decision = at.poses[f] ? own.decision : PoseDecision::warn;
-      }
-    }
-    // The first frame's own pose, or, where it has none, the smooth one.
-    if (const auto first = at.poses.front() ? at.poses.front()
-                           : motion         ? std::optional(motion->frames.front())
-                                            : std::nullopt)
-      against_first(body.frames, at.poses, centre, *first);
-    for (TrackedBody& frame : body.frames)
-      if (!frame.pose) frame.decision = PoseDecision::refuse;
+/// Which markers count, where they are in the body, and their deviations from there.
+void learn_shape(const Work& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
+                 Sequence& sequence) {
+  for (const std::size_t marker : plan.markers) body.markers.push_back({marker, {}, 0, {}});
+  at.counts.assign(plan.markers.size(), 1);
+  // A marker that two views show in a few frames alone, perhaps wrongly, determines no pose.
+  for (std::size_t i = 0; i < plan.markers.size(); ++i) {
+    std::size_t shown = 0;
+    for (std::size_t f = 0; f < work.frames; ++f) shown += work.points[f][plan.markers[i]].has_value();
+    at.counts[i] = shown >= std::min(few_frames + 1, (work.frames + 1) / 2);
   }
+  at.shape = shape_of(work, plan, at.counts);
+  find_loose(work, plan, at.counts, body, at.shape, sequence.frames, sequence.warnings);
+  learn_deviations(work, plan, at, body);
+}
 
-  sequence.markers.assign(work.frames, std::vector<TrackedMarker>(work.markers));
-  for (std::size_t m = 0; m < work.markers; ++m) {
-    const auto holder = std::ranges::find_if(
-        given.bodies, [&](const BodyPlan& body) { return std::ranges::count(body.markers, m) > 0; });
-    std::optional<std::vector<FramePlace>> alone;
-    bool is_smoothed = false;
-    Eigen::Matrix3d of_cameras = Eigen::Matrix3d::Zero();
-    bool is_first = true;
+/// The smooth motion, and the frames' poses against the first one.
+void smooth_body(const Work& work, Estimated& at, BodySequence& body, const Eigen::Vector3d& centre,
+                 double correlation) {
+  // Of correlated errors, as many independent ones as their means' variance shows.
+  const double fewer = (1 + correlation) / (1 - correlation);
+  std::vector<std::optional<FramePose>> measured = at.poses;
+  for (auto& pose : measured)
+    if (pose) pose->covariance *= fewer;
+  at.motion = smooth_poses(work.times, measured, centre);
+  const auto& motion = at.motion;
+  if (motion) {
+    body.prior = motion->prior;
+    std::vector<std::optional<FramePose>> smooth;
+    for (const FramePose& pose : motion->frames) smooth.emplace_back(pose);
+    against_first(body.smoothed, smooth, centre, *smooth.front());
     for (std::size_t f = 0; f < work.frames; ++f) {
-      TrackedMarker& marker = sequence.markers[f][m];
-      const auto seen = work.seen(f, m);
-      for (std::size_t k = 0; k < work.views; ++k)
-        if (work.sights[f][m][k]) marker.views.push_back(k);
-      if (const auto& point = work.points[f][m]) {
-        marker.status = MarkerStatus::tracked;
-        marker.place = FramePlace{point->place, point->covariance};
-        marker.ray_gap_mm = point->ray_gap_mm;
-      } else {
-        std::optional<FramePlace> guess;
-        if (holder != given.bodies.end()) {
-          const auto b = std::size_t(holder - given.bodies.begin());
-          const auto i = std::size_t(std::ranges::find(holder->markers, m) - holder->markers.begin());
-          guess = place_by_body(work, *holder, bodies[b], sequence.bodies[b], i, f, motions[b]);
-        }
-        if (!guess) {
-          if (!is_smoothed) {
-            std::vector<std::optional<FramePlace>> measured;
-            for (std::size_t g = 0; g < work.frames; ++g) {
-              auto& made = measured.emplace_back();
-              if (const auto& met = work.points[g][m]) made = FramePlace{met->place, met->covariance};
-            }
-            alone = smooth_places(work.times, measured);
-            is_smoothed = true;
-          }
-          if (alone) guess = (*alone)[f];
-        }
-        if (guess) {
-          const FramePlace place = with_sights(*guess, seen);
-          const double sigma =
-              std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(place.covariance).eigenvalues()[2]);
-          if (sigma < lost_mm) {
-            marker.status = seen.empty() ? MarkerStatus::predicted : MarkerStatus::one_view;
-            marker.place = place;
-          }
-        }
-      }
-      if (!marker.place) continue;
-      if (is_first) of_cameras = by_cameras(work, marker.place->place), is_first = false;
-      marker.place->covariance += of_cameras;
+      TrackedBody& frame = body.smoothed[f];
+      const TrackedBody& own = body.frames[f];
+      frame.markers = own.markers;
+      frame.rms_mm = own.rms_mm;
+      frame.reason = own.reason;
+      frame.decision = at.poses[f] ? own.decision : PoseDecision::warn;
     }
   }
-  for (std::size_t f = 0; f < work.frames; ++f)
-    sequence.complete += std::ranges::all_of(sequence.markers[f], [](const TrackedMarker& marker) {
-      return marker.status == MarkerStatus::tracked;
-    });
+  // The first frame's own pose, or, where it has none, the smooth one.
+  if (const auto first = at.poses.front() ? at.poses.front()
+                         : motion         ? std::optional(motion->frames.front())
+                                          : std::nullopt)
+    against_first(body.frames, at.poses, centre, *first);
+  for (TrackedBody& frame : body.frames)
+    if (!frame.pose) frame.decision = PoseDecision::refuse;
+}
+
+/// A body's geometry, poses and motion; one whose markers do not determine its poses has none, and a warning
+/// says why.
+void estimate_body(const Work& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
+                   Sequence& sequence) {
+  constexpr double worst_turn_deg = 5, condition_limit = 150;
+  learn_shape(work, plan, at, body, sequence);
+  std::vector<Eigen::Vector3d> points;
+  for (std::size_t i = 0; i < plan.markers.size(); ++i)
+    if (at.counts[i] && at.shape.in_body[i]) points.push_back(*at.shape.in_body[i]);
+  body.frames.assign(work.frames, {});
+  body.smoothed.assign(work.frames, {});
+  const auto refuse = [&](const std::string& why) {
+    sequence.warnings.push_back({Reason::body_ill_conditioned,
+                                 fmt::format("the body \"{}\" has no pose: {}", plan.name, why),
+                                 {},
+                                 {}});
+    for (auto* frames : {&body.frames, &body.smoothed})
+      for (TrackedBody& frame : *frames) {
+        frame = {};
+        frame.reason = Reason::body_ill_conditioned;
+      }
+    at.poses.assign(work.frames, std::nullopt);
+  };
+  if (points.size() < 3) {
+    refuse(fmt::format("{} of its markers are located, three are needed", points.size()));
+    return;
+  }
+  body.condition_per_m = condition_of(points);
+  pose_frames(work, plan, at, body);
+  std::vector<double> turns;
+  for (const auto& pose : at.poses)
+    if (pose)
+      turns.push_back(
+          std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(pose->covariance.topLeftCorner<3, 3>())
+                        .eigenvalues()[2]) *
+          180 / EIGEN_PI);
+  if (turns.empty()) {
+    refuse("in no frame are three of its markers seen");
+    return;
+  }
+  const double turn = median(turns);
+  if (turn > worst_turn_deg || extents(points)[1] < 0.5) {
+    refuse(fmt::format(
+        "its markers are within {:.2f} mm of one line: its turn about it has a standard deviation "
+        "of {:.1f} degrees, limit {:g}; the condition number is {:.0f} per metre",
+        extents(points)[1], turn, worst_turn_deg, body.condition_per_m));
+    return;
+  }
+  if (body.condition_per_m > condition_limit)
+    sequence.warnings.push_back(
+        {Reason::body_ill_conditioned,
+         fmt::format("the markers of the body \"{}\" have the condition number {:.0f} per metre, limit {:g} "
+                     "(radiostereometry): its turns have {:.2f} degrees of standard deviation",
+                     plan.name, body.condition_per_m, condition_limit, turn),
+         {},
+         {{"condition_per_m", body.condition_per_m}, {"sigma_deg", turn}}});
+  smooth_body(work, at, body, mean_of(points), sequence.correlation);
+}
+
+/// A marker's places by its own images alone, smoothed over the sequence.
+std::optional<std::vector<FramePlace>> smoothed_alone(const Work& work, std::size_t m) {
+  std::vector<std::optional<FramePlace>> measured;
+  for (std::size_t f = 0; f < work.frames; ++f) {
+    auto& made = measured.emplace_back();
+    if (const auto& met = work.points[f][m]) made = FramePlace{met->place, met->covariance};
+  }
+  return smooth_places(work.times, measured);
+}
+
+/// A marker in every frame: by two views, else by its body or its own smooth motion and what one view shows.
+void place_marker(const Work& work, const std::vector<Estimated>& bodies, std::size_t m, Sequence& sequence) {
+  constexpr double lost_mm = 5;
+  const auto holder = std::ranges::find_if(
+      work.given.bodies, [&](const BodyPlan& body) { return std::ranges::count(body.markers, m) > 0; });
+  std::optional<std::vector<FramePlace>> alone;
+  bool is_smoothed = false;
+  Eigen::Matrix3d of_cameras = Eigen::Matrix3d::Zero();
+  bool is_first = true;
+  for (std::size_t f = 0; f < work.frames; ++f) {
+    TrackedMarker& marker = sequence.markers[f][m];
+    const auto seen = work.seen(f, m);
+    for (std::size_t k = 0; k < work.views; ++k)
+      if (work.sights[f][m][k]) marker.views.push_back(k);
+    if (const auto& point = work.points[f][m]) {
+      marker.status = MarkerStatus::tracked;
+      marker.place = FramePlace{point->place, point->covariance};
+      marker.ray_gap_mm = point->ray_gap_mm;
+    } else {
+      std::optional<FramePlace> guess;
+      if (holder != work.given.bodies.end()) {
+        const auto b = std::size_t(holder - work.given.bodies.begin());
+        const auto i = std::size_t(std::ranges::find(holder->markers, m) - holder->markers.begin());
+        guess = place_by_body(work, *holder, bodies[b], sequence.bodies[b], i, f, bodies[b].motion);
+      }
+      if (!guess) {
+        if (!is_smoothed) alone = smoothed_alone(work, m), is_smoothed = true;
+        if (alone) guess = (*alone)[f];
+      }
+      if (guess) {
+        const FramePlace place = with_sights(*guess, seen);
+        const double sigma =
+            std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(place.covariance).eigenvalues()[2]);
+        if (sigma < lost_mm) {
+          marker.status = seen.empty() ? MarkerStatus::predicted : MarkerStatus::one_view;
+          marker.place = place;
+        }
+      }
+    }
+    if (!marker.place) continue;
+    if (is_first) of_cameras = by_cameras(work, marker.place->place), is_first = false;
+    marker.place->covariance += of_cameras;
+  }
+}
+
+void warn_of_lost_markers(const Work& work, Sequence& sequence) {
   for (std::size_t m = 0; m < work.markers; ++m) {
     std::vector<int> lost;
     for (std::size_t f = 0; f < work.frames; ++f)
@@ -833,10 +848,35 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
           {Reason::marker_lost,
            fmt::format("\"{}\" is lost in {} of {} frames, first in frame {}: hidden in both "
                        "views for too long, or outside the images",
-                       given.markers[m], lost.size(), work.frames, lost.front()),
+                       work.given.markers[m], lost.size(), work.frames, lost.front()),
            {},
            {{"frames", double(lost.size())}, {"first", double(lost.front())}}});
   }
+}
+
+}  // namespace
+
+Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights>& sights) {
+  Sequence sequence;
+  sequence.warnings = given.warnings;
+  Work work = work_of(given, sights, sequence);
+  correct_delays(work, sequence);
+  warn_of_delays(work, sequence);
+  sequence.sigma_factor = sigma_factors(work);
+  locate_all(work);
+  sequence.correlation = correlation_of(work);
+  sequence.distances = distances_of(work);
+  std::vector<Estimated> bodies(given.bodies.size());
+  sequence.bodies.resize(given.bodies.size());
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+    estimate_body(work, given.bodies[b], bodies[b], sequence.bodies[b], sequence);
+  sequence.markers.assign(work.frames, std::vector<TrackedMarker>(work.markers));
+  for (std::size_t m = 0; m < work.markers; ++m) place_marker(work, bodies, m, sequence);
+  for (std::size_t f = 0; f < work.frames; ++f)
+    sequence.complete += std::ranges::all_of(sequence.markers[f], [](const TrackedMarker& marker) {
+      return marker.status == MarkerStatus::tracked;
+    });
+  warn_of_lost_markers(work, sequence);
   for (std::size_t b = 1; b < sequence.bodies.size(); ++b) {
     auto& relative = sequence.relative.emplace_back();
     for (std::size_t f = 0; f < work.frames; ++f)
