@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/track/body_motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+#include <fmt/format.h>
+
+#include "helicarm/core/statistics.h"
+
+namespace helicarm::track {
+namespace {
+
+constexpr std::size_t few_frames = 5;  // too few for a marker's place in its body and its deviations
+
+/// Condition number of radiostereometry (Soderkvist and Wedin 1993): of markers in metres.
+double condition_of(std::span<const Eigen::Vector3d> points) {
+  const Eigen::Vector3d sigma = extents(points) * std::sqrt(double(points.size())) / 1000;
+  return 1 / std::max(1e-9, std::hypot(sigma[1], sigma[2]));
+}
+
+std::vector<SeenMarker> seen_markers(const SequenceData& work, const BodyPlan& plan, const Estimated& at,
+                                     std::size_t f) {
+  std::vector<SeenMarker> seen;
+  for (std::size_t i = 0; i < plan.markers.size(); ++i)
+    if (at.counts[i] && at.shape.in_body[i])
+      seen.push_back({*at.shape.in_body[i], work.seen(f, plan.markers[i])});
+  return seen;
+}
+
+/// Poses of every frame with covariance; markers that do not fit are left out and the frame is warned of.
+void pose_frames(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body) {
+  constexpr double misfit = 30, misfit_mm = 0.5;
+  at.poses.assign(work.frames, std::nullopt);
+  body.frames.assign(work.frames, {});
+  std::optional<RigidTransform> last;
+  for (std::size_t f = 0; f < work.frames; ++f) {
+    TrackedBody& frame = body.frames[f];
+    std::vector<SeenMarker> seen = seen_markers(work, plan, at, f);
+    const auto sighted = [&] {
+      return std::ranges::count_if(seen, [](const SeenMarker& marker) { return !marker.sights.empty(); });
+    };
+    if (at.shape.poses[f]) last = at.shape.poses[f];
+    frame.reason = Reason::marker_lost;
+    if (sighted() < 3 || !last) continue;
+    bool is_dropped = false;
+    for (int round = 0; round < 2; ++round) {
+      const auto fit = fit_pose(*last, seen, std::nullopt, {.loose_mm = body.deviation_mm});
+      if (!fit) break;
+      std::optional<std::size_t> worst;
+      for (std::size_t i = 0; i < seen.size(); ++i) {
+        if (seen[i].sights.size() < 2) continue;
+        const auto point = sighted_point(seen[i].sights);
+        const bool is_off = fit->chi2[i] > misfit * double(seen[i].sights.size()) && point &&
+                            (point->place - fit->world_from_body * seen[i].in_body).norm() > misfit_mm;
+        if (is_off && (!worst || fit->chi2[i] > fit->chi2[*worst])) worst = i;
+      }
+      if (worst && round == 0 && sighted() > 3) {
+        seen[*worst].sights.clear();
+        is_dropped = true;
+        continue;
+      }
+      const RigidCovariance covariance = covariance_of(*fit, seen, body.deviation_mm);
+      if (!covariance.allFinite()) break;
+      at.poses[f] = FramePose{fit->world_from_body, covariance};
+      double squares = 0;
+      int full = 0;
+      for (const SeenMarker& marker : seen) {
+        if (marker.sights.size() < 2) continue;
+        if (const auto point = sighted_point(marker.sights)) {
+          squares += (point->place - fit->world_from_body * marker.in_body).squaredNorm();
+          ++full;
+        }
+      }
+      frame.markers = int(sighted());
+      if (full > 0) frame.rms_mm = std::sqrt(squares / full);
+      frame.centre = fit->centre;
+      const bool is_odd = is_dropped || worst || full < 3;
+      frame.decision = is_odd ? PoseDecision::warn : PoseDecision::accept;
+      frame.reason = is_dropped || worst ? std::optional(Reason::residual_too_large)
+                     : is_odd            ? std::optional(Reason::marker_lost)
+                                         : std::nullopt;
+      last = fit->world_from_body;
+      break;
+    }
+  }
+}
+
+/// Poses against the first frame: the first one's error is in every other.
+void against_first(std::vector<TrackedBody>& frames, const std::vector<std::optional<FramePose>>& poses,
+                   const Eigen::Vector3d& centre_in_body, const FramePose& first) {
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    if (!poses[f]) continue;
+    FramePose made{poses[f]->pose * first.pose.inverse(), poses[f]->covariance};
+    RigidCovariance turned = RigidCovariance::Zero();
+    turned.topLeftCorner<3, 3>() = turned.bottomRightCorner<3, 3>() = made.pose.rotation;
+    made.covariance += turned * first.covariance * turned.transpose();
+    if (f == 0) made = {RigidTransform{}, RigidCovariance::Zero()};
+    frames[f].pose = made;
+    frames[f].centre = poses[f]->pose * centre_in_body;
+  }
+}
+
+/// What the markers of a body deviate from their places.
+void learn_deviations(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body) {
+  double squares = 0, by_images = 0, freedom = 0;
+  for (std::size_t f = 0; f < work.frames; ++f) {
+    if (!at.shape.poses[f]) continue;
+    int n = 0;
+    double here = 0, traces = 0;
+    for (std::size_t i = 0; i < plan.markers.size(); ++i)
+      if (const auto& point = work.points[f][plan.markers[i]]; at.counts[i] && at.shape.in_body[i] && point) {
+        here += (point->place - *at.shape.poses[f] * *at.shape.in_body[i]).squaredNorm();
+        traces += point->covariance.trace();
+        ++n;
+      }
+    if (n < 3) continue;
+    const double left = 3 * n - 6;
+    squares += here;
+    by_images += traces * left / (3 * n);
+    freedom += left;
+  }
+  const double shown = double(work.frames) > 1 ? double(work.frames - 1) / double(work.frames) : 1;
+  if (freedom > 0) body.deviation_mm = std::sqrt(std::max(0.0, (squares / shown - by_images) / freedom));
+  for (std::size_t i = 0; i < plan.markers.size(); ++i) {
+    const auto deviations = deviations_of(work, plan, at.shape, at.counts, i);
+    Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+    int count = 0;
+    for (std::size_t f = 0; f < work.frames; ++f) {
+      if (!deviations[f] || !at.shape.poses[f]) continue;
+      const Eigen::Matrix3d turn = at.shape.poses[f]->rotation;
+      products += *deviations[f] * deviations[f]->transpose() -
+                  turn.transpose() * work.points[f][plan.markers[i]]->covariance * turn;
+      ++count;
+    }
+    // Never less than the deviation alone; a marker with few frames has that of the body, twice, and one with
+    // fewer still may be another disc.
+    const double least = std::pow(body.deviation_mm, 2) + 1e-6;
+    constexpr double few_mm = 0.7;
+    Eigen::Matrix3d spread = (at.counts[i] ? 4 * least : few_mm * few_mm) * Eigen::Matrix3d::Identity();
+    if (at.counts[i] && count > int(few_frames)) {
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(products / count);
+      spread = parts.eigenvectors() * parts.eigenvalues().cwiseMax(least).asDiagonal() *
+               parts.eigenvectors().transpose();
+    }
+    at.spread.push_back(spread);
+    body.markers[i].loose_mm = std::sqrt(spread.trace() / 3);
+    if (at.shape.in_body[i]) {
+      Eigen::Matrix3d covariance = spread / std::max(1, count);
+      body.markers[i].in_body = {*at.shape.in_body[i], covariance};
+    }
+  }
+}
+
+/// Which markers count, where they are in the body, and their deviations from there.
+void learn_shape(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
+                 Sequence& sequence) {
+  for (const std::size_t marker : plan.markers) body.markers.push_back({marker, {}, 0, {}});
+  at.counts.assign(plan.markers.size(), 1);
+  // A marker that two views show in a few frames alone, perhaps wrongly, determines no pose.
+  for (std::size_t i = 0; i < plan.markers.size(); ++i) {
+    std::size_t shown = 0;
+    for (std::size_t f = 0; f < work.frames; ++f) shown += work.points[f][plan.markers[i]].has_value();
+    at.counts[i] = shown >= std::min(few_frames + 1, (work.frames + 1) / 2);
+  }
+  at.shape = shape_of(work, plan, at.counts);
+  find_loose(work, plan, at.counts, body, at.shape, sequence.frames, sequence.warnings);
+  learn_deviations(work, plan, at, body);
+}
+
+/// The smooth motion, and the frames' poses against the first one.
+void smooth_body(const SequenceData& work, Estimated& at, BodySequence& body, const Eigen::Vector3d& centre,
+                 double correlation) {
+  // Of correlated errors, as many independent ones as their means' variance shows.
+  const double fewer = (1 + correlation) / (1 - correlation);
+  std::vector<std::optional<FramePose>> measured = at.poses;
+  for (auto& pose : measured)
+    if (pose) pose->covariance *= fewer;
+  at.motion = smooth_poses(work.times, measured, centre);
+  const auto& motion = at.motion;
+  if (motion) {
+    body.prior = motion->prior;
+    std::vector<std::optional<FramePose>> smooth;
+    for (const FramePose& pose : motion->frames) smooth.emplace_back(pose);
+    against_first(body.smoothed, smooth, centre, *smooth.front());
+    for (std::size_t f = 0; f < work.frames; ++f) {
+      TrackedBody& frame = body.smoothed[f];
+      const TrackedBody& own = body.frames[f];
+      frame.markers = own.markers;
+      frame.rms_mm = own.rms_mm;
+      frame.reason = own.reason;
+      frame.decision = at.poses[f] ? own.decision : PoseDecision::warn;
+    }
+  }
+  // The first frame's own pose, or, where it has none, the smooth one.
+  if (const auto first = at.poses.front() ? at.poses.front()
+                         : motion         ? std::optional(motion->frames.front())
+                                          : std::nullopt)
+    against_first(body.frames, at.poses, centre, *first);
+  for (TrackedBody& frame : body.frames)
+    if (!frame.pose) frame.decision = PoseDecision::refuse;
+}
+
+}  // namespace
+
+void estimate_body(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
+                   Sequence& sequence) {
+  constexpr double worst_turn_deg = 5, condition_limit = 150;
+  learn_shape(work, plan, at, body, sequence);
+  std::vector<Eigen::Vector3d> points;
+  for (std::size_t i = 0; i < plan.markers.size(); ++i)
+    if (at.counts[i] && at.shape.in_body[i]) points.push_back(*at.shape.in_body[i]);
+  body.frames.assign(work.frames, {});
+  body.smoothed.assign(work.frames, {});
+  const auto refuse = [&](const std::string& why) {
+    sequence.warnings.push_back({Reason::body_ill_conditioned,
+                                 fmt::format("the body \"{}\" has no pose: {}", plan.name, why),
+                                 {},
+                                 {}});
+    for (auto* frames : {&body.frames, &body.smoothed})
+      for (TrackedBody& frame : *frames) {
+        frame = {};
+        frame.reason = Reason::body_ill_conditioned;
+      }
+    at.poses.assign(work.frames, std::nullopt);
+  };
+  if (points.size() < 3) {
+    refuse(fmt::format("{} of its markers are located, three are needed", points.size()));
+    return;
+  }
+  body.condition_per_m = condition_of(points);
+  pose_frames(work, plan, at, body);
+  std::vector<double> turns;
+  for (const auto& pose : at.poses)
+    if (pose)
+      turns.push_back(
+          std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(pose->covariance.topLeftCorner<3, 3>())
+                        .eigenvalues()[2]) *
+          180 / EIGEN_PI);
+  if (turns.empty()) {
+    refuse("in no frame are three of its markers seen");
+    return;
+  }
+  const double turn = median(turns);
+  if (turn > worst_turn_deg || extents(points)[1] < 0.5) {
+    refuse(fmt::format(
+        "its markers are within {:.2f} mm of one line: its turn about it has a standard deviation "
+        "of {:.1f} degrees, limit {:g}; the condition number is {:.0f} per metre",
+        extents(points)[1], turn, worst_turn_deg, body.condition_per_m));
+    return;
+  }
+  if (body.condition_per_m > condition_limit)
+    sequence.warnings.push_back(
+        {Reason::body_ill_conditioned,
+         fmt::format("the markers of the body \"{}\" have the condition number {:.0f} per metre, limit {:g} "
+                     "(radiostereometry): its turns have {:.2f} degrees of standard deviation",
+                     plan.name, body.condition_per_m, condition_limit, turn),
+         {},
+         {{"condition_per_m", body.condition_per_m}, {"sigma_deg", turn}}});
+  smooth_body(work, at, body, mean_of(points), sequence.correlation);
+}
+
+std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan& plan, const Estimated& at,
+                                        const BodySequence& body, std::size_t i, std::size_t f) {
+  if (!at.shape.in_body[i] || body.markers[i].moved_at) return std::nullopt;
+  std::vector<SeenMarker> others;
+  std::size_t full = 0;
+  for (std::size_t k = 0; k < plan.markers.size(); ++k)
+    if (k != i && at.counts[k] && at.shape.in_body[k]) {
+      others.push_back({*at.shape.in_body[k], work.seen(f, plan.markers[k])});
+      full += others.back().sights.size() >= 2;
+    }
+  std::optional<FramePose> pose;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  bool by_others = false;
+  if (full >= 3 && at.poses[f])
+    if (const auto fit = fit_pose(at.poses[f]->pose, others, std::nullopt, {.loose_mm = body.deviation_mm})) {
+      pose = FramePose{fit->world_from_body, covariance_of(*fit, others, 0)};
+      centre = fit->centre;
+      by_others = true;
+    }
+  if (!pose && at.motion) {
+    pose = at.motion->frames[f];
+    std::vector<Eigen::Vector3d> in_body;
+    for (std::size_t k = 0; k < plan.markers.size(); ++k)
+      if (at.counts[k] && at.shape.in_body[k]) in_body.push_back(*at.shape.in_body[k]);
+    centre = pose->pose * mean_of(in_body);
+  }
+  if (!pose) return std::nullopt;
+  const Eigen::Vector3d place = pose->pose * *at.shape.in_body[i];
+  const auto slope = point_by_step(place, centre);
+  const Eigen::Matrix3d turn = pose->pose.rotation;
+  // Fewer others than usual carry their own deviations farther.
+  const double usual = double(std::ranges::count(at.counts, 1)) - 1;
+  const double fewer = by_others ? std::max(1.0, usual / double(full)) : 1;
+  return FramePlace{place, slope * pose->covariance * slope.transpose() +
+                               fewer * fewer * turn * at.spread[i] * turn.transpose()};
+}
+
+}  // namespace helicarm::track

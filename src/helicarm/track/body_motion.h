@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "helicarm/track/body_shape.h"
+
+namespace helicarm::track {
+
+/// What is estimated of a body on the way to its `BodySequence`.
+struct Estimated {
+  Shape shape;
+  std::vector<char> counts;
+  std::vector<std::optional<FramePose>> poses;  // world_from_body of the body's own frame
+  std::vector<Eigen::Matrix3d> spread;          // of each marker about its place by the others, body frame
+  std::optional<SmoothMotion> motion;
+};
+
+/// A body's geometry, poses and motion; one whose markers do not determine its poses has none, and a warning
+/// says why.
+void estimate_body(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
+                   Sequence& sequence);
+
+/// The place of a marker by the other markers of its body in this frame.
+std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan& plan, const Estimated& at,
+                                        const BodySequence& body, std::size_t i, std::size_t f);
+
+}  // namespace helicarm::track
