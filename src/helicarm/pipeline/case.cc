@@ -117,11 +117,6 @@ Json take_model_tunnels(Json& json) {
 Case case_of(Json json, const std::string& origin, const fs::path& folder, Purpose purpose) {
   if (json.is_object() && json.contains("models")) take_model_tunnels(json);
   JsonReader reader(json, origin);
-  for (const char* key : {"markers", "bodies"})
-    if (reader.has(key))
-      reader.refuse(
-          Reason::bad_value, key,
-          "makes the case a sequence of markers: follow them with `helicarm track CASE --frames A-B`");
   Case read;
   read.folder = folder;
   FromJson codec(reader);
@@ -146,8 +141,15 @@ Json to_json(const Pick& pick) {
 
 Json case_schema() {
   const Case shape;
-  return schema_of("case.json",
-                   [&](ToSchema& codec) { description::describe_case(codec, shape, Purpose::run); });
+  Json schema = schema_of("case.json",
+                          [&](ToSchema& codec) { description::describe_case(codec, shape, Purpose::run); });
+  // A tunnel is one of picks, or a line of a model's plan.
+  Json& tunnel = schema["properties"]["tunnels"]["items"];
+  tunnel["anyOf"] = Json::array({{{"required", tunnel["required"]}}, {{"required", {"name", "model"}}}});
+  tunnel.erase("required");
+  for (const char* key : {"model", "line", "bone", "diameter_mm", "bridge_mm", "enter_at"})
+    tunnel["properties"][key] = {{"description", "of a line of a model's plan, see below"}};
+  return schema;
 }
 
 namespace {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <set>
-#include <tuple>
 
 #include "helicarm/core/codec.h"
 #include "helicarm/pipeline/case_json.h"
@@ -49,52 +48,43 @@ void describe_poses(Codec& codec, const char* key, Poses& poses, const std::vect
       [&] { return has_reading(poses) ? std::optional(to_json(poses, other)) : std::nullopt; });
 }
 
+inline constexpr const char* of_track =
+    "makes the case a sequence of markers: follow them with `helicarm track CASE --frames A-B`";
+
+/// A key of another command, which takes it out before this description reads the rest.
+template <class Codec>
+void describe_elsewhere(Codec& codec, const char* key, const char* type, const char* refusal,
+                        const char* help) {
+  codec.custom(
+      key, false, {{"type", type}}, help,
+      [&](JsonReader& reader) {
+        if (!reader.raw(key).is_null()) reader.refuse(Reason::bad_value, key, refusal);
+      },
+      [] { return std::optional<Json>(); });
+}
+
 template <class Codec, class View>
 void describe_view(Codec& codec, View& view, const std::filesystem::path& folder,
                    const std::vector<guidance::Bone>& bones) {
   codec.text("name", view.name, "unique");
   codec.file("image", view.image, folder, "path of an [image file](#images-and-sidecars)");
   codec.integer("frame", view.frame, 1, 100000, "1-based; needed only if the file has several frames");
-  codec.custom(
-      "camera", false, {{"type", "string"}},
+  describe_elsewhere(
+      codec, "camera", "string",
+      "is for `helicarm register`, which uses cameras of other programs; here each view is calibrated",
       "of `helicarm register` and `helicarm track`: path of a [camera of another "
       "program](#projections-of-other-programs), for all views or for none; the image is taken as free of "
-      "distortion. "
-      "Then `calibrator` and `plate` may be left out, and the world is the cameras'",
-      [](JsonReader& reader) {
-        if (!reader.raw("camera").is_null())
-          reader.refuse(Reason::unknown_key, "camera",
-                        "is for `helicarm register`, which uses cameras of other programs; here each view is "
-                        "calibrated");
-      },
-      [] { return std::optional<Json>(); });
-  for (const auto& [key, kind, help] :
-       {std::tuple{
-            "calibration", "string",
-            "of [`helicarm track`](motion.md#run-it): path of a result.json that holds this view's camera"},
-        {"frame_offset", "integer",
-         "of `helicarm track`: the image's number is the sequence's frame plus this"}})
-    codec.custom(
-        key, false, {{"type", kind}}, help,
-        [key](JsonReader& reader) {
-          if (!reader.raw(key).is_null())
-            reader.refuse(Reason::unknown_key, key,
-                          "is for `helicarm track`, which follows markers through a sequence");
-        },
-        [] { return std::optional<Json>(); });
-  codec.custom(
-      "frames", false, {{"type", "string"}},
+      "distortion. Then `calibrator` and `plate` may be left out, and the world is the cameras'");
+  describe_elsewhere(
+      codec, "calibration", "string", of_track,
+      "of [`helicarm track`](motion.md#run-it): path of a result.json that holds this view's camera");
+  describe_elsewhere(codec, "frame_offset", "integer", of_track,
+                     "of `helicarm track`: the image's number is the sequence's frame plus this");
+  describe_elsewhere(
+      codec, "frames", "string",
+      "makes the view a run of images: calibrate it with `helicarm sweep`, or name one image by \"frame\"",
       "of `helicarm sweep` alone: `\"all\"` or `\"A-B[:STEP]\"`, frames of the file or of numbered files "
-      "(`{frame}` or "
-      "`{frame:04d}` in `image`); each is a view `NAME/12`, up to 1000",
-      [](JsonReader& reader) {
-        if (!reader.raw("frames").is_null())
-          reader.refuse(
-              Reason::bad_value, "frames",
-              "makes the view a run of images: calibrate it with `helicarm sweep`, or name one image by "
-              "\"frame\"");
-      },
-      [] { return std::optional<Json>(); });
+      "(`{frame}` or `{frame:04d}` in `image`); each is a view `NAME/12`, up to 1000");
   codec.file("plate_image", view.plate_image, folder,
              "image of the plate alone, acquired in the same C-arm position; needs a `plate`");
   codec.file("map", view.map, folder, "path of a [map.json](#mapjson); not beside `plate_image`");
@@ -135,6 +125,7 @@ void describe_pick(Codec& codec, PickValue& pick, const std::vector<CaseView>& v
     if (!find_named(views, pick.view, &CaseView::name))
       reader.refuse(Reason::bad_value, "view", fmt::format("\"{}\" is not a view of the case", pick.view));
   });
+  describe_elsewhere(codec, "frame", "integer", of_track, "of `helicarm track`: the sequence's first frame");
   codec.vector("uv", pick.uv_raw, pixel_range, "raw pixel `[u, v]`, inside the image");
   if (codec.wants(pick.snap != Snap::none))
     codec.choice(
@@ -264,6 +255,12 @@ void describe_case(Codec& codec, CaseValue& given, Purpose purpose) {
         reader.choice("format", {"helicarm-case/2", "helicarm-case/1"});
       },
       [] { return std::optional<Json>("helicarm-case/2"); });
+  describe_elsewhere(codec, "markers", "object", of_track,
+                     "of [`helicarm track`](motion.md#run-it): `diameter_mm`");
+  describe_elsewhere(codec, "bodies", "array", of_track, "of `helicarm track`: rigid sets of markers");
+  describe_elsewhere(codec, "frame_rate_hz", "number", of_track, "of `helicarm track`");
+  describe_elsewhere(codec, "calibration", "string", of_track,
+                     "of `helicarm track`: as `calibration` of every view");
   codec.custom(
       "calibrator", true, {{"type", {"string", "null"}}},
       "`\"udcsc\"` or path of a [calibrator.json](#calibratorjson); may be `null` for `phantom measure "

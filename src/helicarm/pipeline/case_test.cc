@@ -327,6 +327,23 @@ TEST_F(CaseFile, NegativeSigmaOfAPickIsRefused) {
   EXPECT_EQ(failure().reason, Reason::bad_value);
 }
 
+TEST(Case, SchemaKnowsTheKeysOfEveryCommand) {
+  const Json keys = case_schema()["properties"];
+  for (const char* key : {"models", "markers", "bodies", "frame_rate_hz"})
+    EXPECT_TRUE(keys.contains(key)) << key;
+  for (const char* key : {"camera", "frames", "frame_offset"})
+    EXPECT_TRUE(keys["views"]["items"]["properties"].contains(key)) << key;
+  const Json& tunnel = keys["tunnels"]["items"];
+  EXPECT_FALSE(tunnel.contains("required"));
+  EXPECT_EQ(tunnel["anyOf"][1]["required"], Json::array({"name", "model"}));
+}
+
+TEST_F(CaseFile, KeysOfAnotherCommandNameIt) {
+  json_["views"][0]["frame_offset"] = 3;
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+  EXPECT_THAT(failure().message, HasSubstr("helicarm track"));
+}
+
 TEST(Case, RoundTripOfPicks) {
   std::vector<Pick> picks{{"FS", "AP", {512.25, 300.5}, Snap::ball, 3, {}, "femur"},
                           {"FS", "LAT", {401, 299}, Snap::none, 3, 0.5, "femur"}};
