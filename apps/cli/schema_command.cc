@@ -5,6 +5,7 @@
 
 #include "command_line.h"
 #include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/operation/session_records.h"
 #include "helicarm/phantom/schemas.h"
 #include "helicarm/pipeline/case.h"
 
@@ -13,10 +14,9 @@ namespace {
 
 const std::map<std::string, std::function<Json()>>& schemas() {
   static const std::map<std::string, std::function<Json()>> by_file{
-      {"calibrator", phantom::calibrator_schema},
-      {"case", pipeline::case_schema},
-      {"machine", calibration::history_schema},
-      {"plate", phantom::plate_schema}};
+      {"calibrator", phantom::calibrator_schema}, {"case", pipeline::case_schema},
+      {"machine", calibration::history_schema},   {"plan", operation::plan_schema},
+      {"plate", phantom::plate_schema},           {"session", operation::session_schema}};
   return by_file;
 }
 

@@ -6,9 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/operation/plan.h"
-#include "helicarm/operation/seen_poses.h"
-#include "helicarm/operation/session_log.h"
+#include "helicarm/operation/session_records.h"
 
 /// A short operation's record for tests, with one record of each kind.
 namespace helicarm::gui {
@@ -17,40 +15,54 @@ inline constexpr std::array<std::string_view, 15> session_kinds{
     "session",  "plan",  "refused",   "exposure",  "exposure", "case",   "result", "poses",
     "hand_eye", "order", "confirmed", "navigated", "outcome",  "halted", "end"};
 
-inline Json window_with(double femur_x) {
+inline operation::PoseWindow window_with(double femur_x) {
   operation::PoseWindow window{10, 0.5, {}};
   window.samples["femur"] = {{9.8, 0, 9.8, {Eigen::Matrix3d::Identity(), {0, 0, 0}}},
                              {10.2, 0, 10.2, {Eigen::Matrix3d::Identity(), {femur_x, 0, 0}}}};
   window.samples["tibia"] = {};
-  return operation::to_json(window);
+  return window;
+}
+
+inline robot::RobotOrder order_to(const char* tunnel) {
+  robot::RobotOrder order;
+  order.name = tunnel;
+  order.model = "UR5";
+  order.tool.flange_from_tcp = {Eigen::Matrix3d::Identity(), {0, 0, 150}};
+  order.waypoints = {{{Eigen::Matrix3d::Identity(), {400, 0, 300}}, 10, 100}};
+  return order;
+}
+
+inline tracker::HandEye found_hand_eye() {
+  tracker::HandEye found;
+  found.flange_from_marker = found.tracker_from_base = {Eigen::Matrix3d::Identity(), {1, 2, 3}};
+  found.covariance.setIdentity();
+  found.rms_mm = 0.2;
+  return found;
 }
 
 inline void write_session(const std::filesystem::path& folder) {
   const auto session = operation::SessionLog::open(folder / "session.log").value();
-  const auto add = [&](const char* kind, Json content) {
-    ASSERT_TRUE(session->append(kind, std::move(content)));
+  const auto add = [&](const operation::Record& record) {
+    ASSERT_TRUE(session->append(std::string(operation::kind_of(record)), operation::content_of(record)));
   };
-  const Json end = {{"across_mm", {0.3, 0.4}},
-                    {"covariance_mm2", {{0.05, 0}, {0, 0.06}}},
-                    {"distance_mm", 0.5},
-                    {"predicted_mm", 0.6}};
-  add("plan", operation::to_json(operation::OperationPlan{}));
-  add("refused", {{"view", "AP"}, {"picture", "00"}, {"why", "stale_pose"}});
-  add("exposure", {{"view", "AP"}, {"picture", "01"}, {"window", window_with(1)}, {"poses", Json::object()}});
-  add("exposure", {{"view", "LAT"}, {"picture", "02"}, {"window", window_with(2)}, {"poses", nullptr}});
-  add("case", {{"folder", "case-1"}});
-  add("result", {{"folder", "case-1"}, {"digest", "03"}});
-  add("poses", {{"why", "plan"}, {"window", window_with(3)}});
-  add("hand_eye", {{"pairs", Json::array()}, {"found", {{"rms_mm", 0.2}}}});
-  add("order", {{"name", "femur"}, {"waypoints", Json::array()}});
-  add("confirmed", {{"order", "femur"}, {"digest", "04"}, {"by", "tester"}});
-  add("navigated", {{"tunnel", "femur"},
-                    {"loop",
-                     {{{"distance_mm", 1.5}, {"turn_deg", 1.0}, {"sigma_mm", 0.1}},
-                      {{"distance_mm", 0.25}, {"turn_deg", 0.1}, {"sigma_mm", 0.1}}}}});
-  add("outcome", {{"tunnel", "femur"}, {"start", end}, {"end", end}});
-  add("halted", {{"order", "tibia"}, {"why", "robot_stopped"}, {"message", "stopped by a person"}});
-  add("end", Json::object());
+  using namespace operation::record;
+  const operation::EndMiss end{{0.3, 0.4}, Eigen::Vector2d(0.05, 0.06).asDiagonal().toDenseMatrix()};
+  operation::OperationPlan plan;
+  plan.robot.tool.flange_from_tcp = order_to("femur").tool.flange_from_tcp;
+  add(Plan{plan});
+  add(Refused{"AP", "00", "stale_pose", {}});
+  add(Exposure{"AP", "01", {}, {}, window_with(1), guidance::Poses{}});
+  add(Exposure{"LAT", "02", {}, {}, window_with(2), {}});
+  add(CaseBegun{"case-1", Json::object(), {}, {}});
+  add(Measured{"case-1", "03", {}});
+  add(Poses{Look::plan, window_with(3)});
+  add(HandEye{{}, found_hand_eye()});
+  add(Order::of(order_to("femur")));
+  add(Confirmed{"femur", "04", "tester"});
+  add(Navigated{"femur", {{1.5, 1, 0.1}, {0.25, 0.1, 0.1}}});
+  add(Outcome{"femur", end, end});
+  add(Halted{"tibia", "robot_stopped", "stopped by a person", {}});
+  add(End{});
 }
 
 }  // namespace helicarm::gui

@@ -4,13 +4,11 @@
 #include <QCoreApplication>
 #include <QStringList>
 #include <algorithm>
+#include <array>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/operation/records.h"
-#include "helicarm/operation/seen_poses.h"
-#include "helicarm/operation/session_log.h"
 
 namespace helicarm::gui {
 namespace {
@@ -19,143 +17,173 @@ struct TimelineWords {
   Q_DECLARE_TR_FUNCTIONS(Timeline)
 };
 
-QString text_of(const Json& content, const char* key) {
-  return QString::fromStdString(content.at(key).get<std::string>());
-}
+using namespace operation;
 
-QString millimetres(const Json& number) { return QString::number(number.get<double>(), 'f', 2); }
+QString text(const std::string& utf8) { return QString::fromStdString(utf8); }
 
-QString count_of(const Json& list) { return QString::number(list.size()); }
+QString millimetres(double number) { return QString::number(number, 'f', 2); }
 
-QString exposure_summary(const Json& content) {
-  const QString view = text_of(content, "view");
-  return content.at("poses").is_null() ? TimelineWords::tr("Acquisition %1, without poses").arg(view)
-                                       : TimelineWords::tr("Acquisition %1").arg(view);
-}
-
-QString loop_summary(const Json& content) {
-  const Json& loop = content.at("loop");
-  const QString tunnel = text_of(content, "tunnel");
-  if (loop.empty()) return TimelineWords::tr("Tool at %1").arg(tunnel);
-  return TimelineWords::tr("Tool at %1: error %2 mm, measurements: %3")
-      .arg(tunnel, millimetres(loop.back().at("distance_mm")), count_of(loop));
-}
-
-QString outcome_summary(const Json& content) {
-  return TimelineWords::tr("Check of %1: start %2 mm, end %3 mm from the tool's axis")
-      .arg(text_of(content, "tunnel"), millimetres(content.at("start").at("distance_mm")),
-           millimetres(content.at("end").at("distance_mm")));
-}
-
-QString poses_summary(const Json& content) {
-  QStringList seen;
-  for (const auto& [tool, samples] : content.at("window").at("tools").items())
-    if (!samples.empty()) seen << QString::fromStdString(tool);
-  return TimelineWords::tr("Tracker poses (%1): %2")
-      .arg(text_of(content, "why"), seen.isEmpty() ? TimelineWords::tr("none visible") : seen.join(", "));
-}
-
-QString summary_of(const std::string& kind, const Json& content) {
-  if (kind == "session")
-    return TimelineWords::tr("Record begins, helicarm %1").arg(text_of(content, "version"));
-  if (kind == "plan") return TimelineWords::tr("Plan, tunnels: %1").arg(count_of(content.at("tunnels")));
-  if (kind == "exposure") return exposure_summary(content);
-  if (kind == "refused")
-    return TimelineWords::tr("Image for %1 refused: %2")
-        .arg(text_of(content, "view"), text_of(content, "why"));
-  if (kind == "case") return TimelineWords::tr("Measurement %1 begins").arg(text_of(content, "folder"));
-  if (kind == "result") return TimelineWords::tr("Measurement %1 done").arg(text_of(content, "folder"));
-  if (kind == "poses") return poses_summary(content);
-  if (kind == "hand_eye")
+/// One line for each kind of record.
+struct Summary {
+  QString operator()(const record::Session& session) const {
+    return TimelineWords::tr("Record begins, helicarm %1").arg(text(session.version));
+  }
+  QString operator()(const record::Plan& record) const {
+    return TimelineWords::tr("Plan, tunnels: %1").arg(record.plan.tunnels.size());
+  }
+  QString operator()(const record::Models& models) const {
+    return TimelineWords::tr("Model files kept: %1").arg(models.files.size());
+  }
+  QString operator()(const record::Exposure& exposure) const {
+    return (exposure.poses ? TimelineWords::tr("Acquisition %1")
+                           : TimelineWords::tr("Acquisition %1, without poses"))
+        .arg(text(exposure.view));
+  }
+  QString operator()(const record::Refused& refused) const {
+    return TimelineWords::tr("Image for %1 refused: %2").arg(text(refused.view), text(refused.why));
+  }
+  QString operator()(const record::Touched& touched) const {
+    return TimelineWords::tr("Check point %1 touched").arg(text(touched.check_point));
+  }
+  QString operator()(const record::CaseBegun& begun) const {
+    return begun.verifies.empty() ? TimelineWords::tr("Measurement %1 begins").arg(text(begun.folder))
+                                  : TimelineWords::tr("Verification of %1 begins: %2")
+                                        .arg(text(begun.verifies), text(begun.folder));
+  }
+  QString operator()(const record::Measured& measured) const {
+    return TimelineWords::tr("Measurement %1 done").arg(text(measured.folder));
+  }
+  QString operator()(const record::Registered& registered) const {
+    return TimelineWords::tr("Models registered: %1").arg(text(registered.folder));
+  }
+  QString operator()(const record::RegistrationConfirmed& confirmed) const {
+    return TimelineWords::tr("Registration confirmed by %1").arg(text(confirmed.by));
+  }
+  QString operator()(const record::Poses& poses) const {
+    QStringList seen;
+    for (const auto& [tool, samples] : poses.window.samples)
+      if (!samples.empty()) seen << text(tool);
+    const std::array words{TimelineWords::tr("plan"),     TimelineWords::tr("hand-eye"),
+                           TimelineWords::tr("correct"),  TimelineWords::tr("verify"),
+                           TimelineWords::tr("withdraw"), TimelineWords::tr("guide")};
+    return TimelineWords::tr("Tracker poses (%1): %2")
+        .arg(words[std::size_t(poses.why)],
+             seen.isEmpty() ? TimelineWords::tr("none visible") : seen.join(", "));
+  }
+  QString operator()(const record::Tour&) const {
+    return TimelineWords::tr("Registration of the robot begins");
+  }
+  QString operator()(const record::HandEye& hand_eye) const {
     return TimelineWords::tr("Robot registered, %1 mm rms, poses: %2")
-        .arg(millimetres(content.at("found").at("rms_mm")), count_of(content.at("pairs")));
-  if (kind == "order")
+        .arg(millimetres(hand_eye.found.rms_mm))
+        .arg(hand_eye.pairs.size());
+  }
+  QString operator()(const record::Withdraw&) const { return TimelineWords::tr("The tool withdraws"); }
+  QString operator()(const record::Robot&) const { return TimelineWords::tr("Joints of the robot"); }
+  QString operator()(const record::Order& record) const {
     return TimelineWords::tr("Order %1, waypoints: %2")
-        .arg(text_of(content, "name"), count_of(content.at("waypoints")));
-  if (kind == "confirmed")
-    return TimelineWords::tr("Order %1 confirmed by %2")
-        .arg(text_of(content, "order"), text_of(content, "by"));
-  if (kind == "halted")
-    return TimelineWords::tr("Order %1 halted: %2")
-        .arg(text_of(content, "order"), text_of(content, "message"));
-  if (kind == "replanned")
+        .arg(text(record.order.name))
+        .arg(record.order.waypoints.size());
+  }
+  QString operator()(const record::Preview& preview) const {
+    return TimelineWords::tr("Path of order %1 drawn").arg(text(preview.order));
+  }
+  QString operator()(const record::Confirmed& confirmed) const {
+    return TimelineWords::tr("Order %1 confirmed by %2").arg(text(confirmed.order), text(confirmed.by));
+  }
+  QString operator()(const record::CarriedOut& carried_out) const {
+    return TimelineWords::tr("Order %1 carried out").arg(text(carried_out.confirmed.order));
+  }
+  QString operator()(const record::Halted& halted) const {
+    return TimelineWords::tr("Order %1 halted: %2").arg(text(halted.order), text(halted.message));
+  }
+  QString operator()(const record::Replanned& replanned) const {
     return TimelineWords::tr("Order %1 planned again after %2")
-        .arg(text_of(content, "order"), text_of(content, "why"));
-  if (kind == "navigated") return loop_summary(content);
-  if (kind == "outcome") return outcome_summary(content);
-  if (kind == "end") return TimelineWords::tr("End of the operation");
-  return QString::fromStdString(kind);
-}
-
-/// Runs `read`; a record without the fields of its kind is bad_value.
-template <class Read>
-auto of_record(std::size_t number, Read&& read) {
-  try {
-    return read();
-  } catch (const Json::exception&) {
-    throw BadInput(Reason::bad_value,
-                   fmt::format("record {}: a field that its kind requires is missing", number));
+        .arg(text(replanned.order), text(replanned.why));
   }
-}
-
-void see(SessionState& state, const Json& window, std::size_t number) {
-  const std::string origin = fmt::format("record {}", number);
-  for (const auto& [tool, samples] : value_or_throw(operation::pose_window_from(window, origin)).samples)
-    if (!samples.empty()) state.tracker_from[tool] = samples.back().tracker_from_tool;
-}
-
-std::vector<robot::Miss> loop_from(const Json& json) {
-  std::vector<robot::Miss> loop;
-  for (const Json& miss : json)
-    loop.push_back({miss.at("distance_mm").get<double>(), miss.at("turn_deg").get<double>(),
-                    miss.at("sigma_mm").get<double>()});
-  return loop;
-}
-
-operation::EndMiss end_miss_from(const Json& json) {
-  operation::EndMiss miss;
-  for (int i = 0; i < 2; ++i) {
-    miss.across_mm[i] = json.at("across_mm").at(std::size_t(i)).get<double>();
-    for (int j = 0; j < 2; ++j)
-      miss.covariance(i, j) = json.at("covariance_mm2").at(std::size_t(i)).at(std::size_t(j)).get<double>();
+  QString operator()(const record::Navigated& navigated) const {
+    if (navigated.loop.empty()) return TimelineWords::tr("Tool at %1").arg(text(navigated.tunnel));
+    return TimelineWords::tr("Tool at %1: error %2 mm, measurements: %3")
+        .arg(text(navigated.tunnel), millimetres(navigated.loop.back().distance_mm))
+        .arg(navigated.loop.size());
   }
-  return miss;
-}
-
-void take(SessionState& state, const Timeline& timeline, std::size_t number) {
-  const auto& [seconds, kind, summary, content] = timeline.moments[number];
-  if (kind == "exposure") {
-    const auto view = content.at("view").get<std::string>();
-    std::erase(state.exposures, view);
-    state.exposures.push_back(view);
-    state.exposed_at[view] = number;
+  QString operator()(const record::Guide& guide) const {
+    return TimelineWords::tr("Drill guided to %1").arg(text(guide.tunnel));
   }
-  if (kind == "hand_eye") {
+  QString operator()(const record::Guided& guided) const {
+    const Guidance& now = guided.guidance;
+    const QString decision = now.why_not ? text(now.why_not->message) : TimelineWords::tr("on target");
+    if (!now.aim) return TimelineWords::tr("Drill at %1: %2").arg(text(guided.tunnel), decision);
+    return TimelineWords::tr("Drill at %1, %2 mm and %3° off its axis: %4")
+        .arg(text(guided.tunnel), millimetres(now.aim->distance_mm),
+             QString::number(now.aim->angle_deg, 'f', 1), decision);
+  }
+  QString operator()(const record::Outcome& outcome) const {
+    return TimelineWords::tr("Check of %1: start %2 mm, end %3 mm from the tool's axis")
+        .arg(text(outcome.tunnel), millimetres(outcome.start.distance_mm()),
+             millimetres(outcome.end.distance_mm()));
+  }
+  QString operator()(const record::End& end) const {
+    return end.why ? TimelineWords::tr("End of the operation: %1").arg(text(*end.why))
+                   : TimelineWords::tr("End of the operation");
+  }
+};
+
+/// The state after a record, which holds what the record says.
+struct Take {
+  SessionState& state;
+  const Timeline& timeline;
+  std::size_t number;
+
+  void see(const PoseWindow& window) const {
+    for (const auto& [tool, samples] : window.samples)
+      if (!samples.empty()) state.tracker_from[tool] = samples.back().tracker_from_tool;
+  }
+
+  template <class Other>
+  void operator()(const Other&) const {}
+  void operator()(const record::Exposure& exposure) const {
+    std::erase(state.exposures, exposure.view);
+    state.exposures.push_back(exposure.view);
+    state.exposed_at[exposure.view] = number;
+    see(exposure.window);
+  }
+  void operator()(const record::HandEye& hand_eye) const {
     state.registered_at = number;
-    state.hand_eye_rms_mm = content.at("found").at("rms_mm").get<double>();
+    state.hand_eye_rms_mm = hand_eye.found.rms_mm;
   }
-  if (kind == "order") state.tunnel = content.at("name").get<std::string>();
-  if (kind == "exposure" || kind == "poses") see(state, content.at("window"), number);
-  if (kind == "case")
-    state.case_folder =
-        value_or_throw(path_inside(timeline.session, content.at("folder").get<std::string>()));
-  if (kind == "case" || kind == "result") state.measured = kind == "result";
-  if (kind == "navigated")
-    state.loops[content.at("tunnel").get<std::string>()] = loop_from(content.at("loop"));
-  if (kind == "outcome") {
-    const auto tunnel = content.at("tunnel").get<std::string>();
-    state.outcomes.insert_or_assign(tunnel, operation::TunnelOutcome{tunnel,
-                                                                     state.loops[tunnel],
-                                                                     end_miss_from(content.at("start")),
-                                                                     end_miss_from(content.at("end")),
-                                                                     {}});
+  void operator()(const record::Order& record) const { state.tunnel = record.order.name; }
+  void operator()(const record::Poses& poses) const { see(poses.window); }
+  void operator()(const record::Touched& touched) const { see(touched.window); }
+  void operator()(const record::Guide& guide) const {
+    state.tunnel = guide.tunnel;
+    state.guidance.reset();
+    see(guide.window);
   }
-}
+  void operator()(const record::Guided& guided) const {
+    state.tunnel = guided.tunnel;
+    state.guidance = guided.guidance;
+    see(guided.window);
+  }
+  void operator()(const record::CaseBegun& begun) const {
+    state.case_folder = value_or_throw(path_inside(timeline.session, begun.folder));
+    state.measured = false;
+  }
+  void operator()(const record::Measured&) const { state.measured = true; }
+  void operator()(const record::Navigated& navigated) const {
+    state.loops[navigated.tunnel] = navigated.loop;
+  }
+  void operator()(const record::Outcome& outcome) const {
+    state.outcomes.insert_or_assign(
+        outcome.tunnel,
+        TunnelOutcome{outcome.tunnel, state.loops[outcome.tunnel], outcome.start, outcome.end, {}});
+  }
+};
 
-operation::OperationPlan plan_of(const Timeline& timeline) {
-  const auto plan = std::ranges::find(timeline.moments, "plan", &Moment::kind);
-  if (plan == timeline.moments.end()) throw BadInput(Reason::usage, "the record holds no plan");
-  return value_or_throw(operation::plan_from(plan->content, "the record's plan"));
+const OperationPlan& plan_of(const Timeline& timeline) {
+  for (const Moment& moment : timeline.moments)
+    if (const auto* record = std::get_if<record::Plan>(&moment.record)) return record->plan;
+  throw BadInput(Reason::usage, "the record holds no plan");
 }
 
 }  // namespace
@@ -175,11 +203,13 @@ Expected<Timeline> read_timeline(const std::filesystem::path& session) {
     Timeline timeline{session, {}, history.torn};
     double seconds = 0;
     const double begin = history.records.front().time_s;
-    for (operation::SessionRecord& record : history.records) {
-      seconds = std::max(seconds, record.time_s - begin);  // the clock may be set back
-      QString summary = of_record(record.number, [&] { return summary_of(record.kind, record.content); });
-      timeline.finished = timeline.finished || record.kind == "end";
-      timeline.moments.push_back({seconds, record.kind, std::move(summary), std::move(record.content)});
+    for (SessionRecord& written : history.records) {
+      seconds = std::max(seconds, written.time_s - begin);  // the clock may be set back
+      Record record = value_or_throw(record_from(written, session));
+      timeline.finished = timeline.finished || std::holds_alternative<record::End>(record);
+      QString summary = std::visit(Summary{}, record);
+      timeline.moments.push_back(
+          {seconds, written.kind, std::move(summary), std::move(written.content), std::move(record)});
     }
     return timeline;
   });
@@ -189,7 +219,7 @@ Expected<SessionState> state_at(const Timeline& timeline, std::size_t index) {
   return guarded([&] {
     SessionState state;
     for (std::size_t i = 0; i <= index && i < timeline.moments.size(); ++i)
-      of_record(i, [&] { take(state, timeline, i); });
+      std::visit(Take{state, timeline, i}, timeline.moments[i].record);
     return state;
   });
 }
@@ -197,30 +227,27 @@ Expected<SessionState> state_at(const Timeline& timeline, std::size_t index) {
 Expected<operation::LiveTool> tool_of(const Timeline& timeline, const SessionState& state,
                                       const pipeline::Result& result) {
   return guarded([&] {
-    if (!state.measured || !state.registered_at)
+    const OperationPlan& plan = plan_of(timeline);
+    if (!state.measured || (!plan.drill && !state.registered_at))
       throw BadInput(Reason::usage, "no measurement or no registration before this moment");
-    const operation::OperationPlan plan = plan_of(timeline);
     std::vector<guidance::Poses> exposures;
     for (const pipeline::ViewResult& view : result.views) {
       const auto at = state.exposed_at.find(view.name);
       if (at == state.exposed_at.end())
         throw BadInput(Reason::usage, fmt::format("{}: no image before this moment", view.name));
-      const std::string origin = fmt::format("record {}", at->second);
-      const Json& window = timeline.moments[at->second].content.at("window");
-      exposures.push_back(value_or_throw(operation::poses_of_exposure(
-          value_or_throw(operation::pose_window_from(window, origin)), plan.tracker)));
+      const auto& exposure = std::get<record::Exposure>(timeline.moments[at->second].record);
+      exposures.push_back(value_or_throw(poses_of_exposure(exposure.window, plan.tracker)));
     }
-    const Json& pairs = timeline.moments[*state.registered_at].content.at("pairs");
-    const tracker::HandEye hand_eye = value_or_throw(tracker::calibrate_hand_eye(value_or_throw(
-        operation::hand_eye_pairs_from(pairs, fmt::format("record {}", *state.registered_at)))));
-    return operation::LiveTool(plan, result, exposures, hand_eye);
+    if (plan.drill) return LiveTool(plan, result, exposures, tracked_tool(*plan.drill));
+    const auto& registered = std::get<record::HandEye>(timeline.moments[*state.registered_at].record);
+    return LiveTool(plan, result, exposures, value_or_throw(tracker::calibrate_hand_eye(registered.pairs)));
   });
 }
 
 Expected<operation::ToolOverlay> overlay_of(const operation::LiveTool& tool, const Timeline& timeline,
                                             const SessionState& state) {
   return guarded([&] {
-    const operation::OperationPlan plan = plan_of(timeline);
+    const OperationPlan& plan = plan_of(timeline);
     const auto pose = [&](const std::string& marker) -> std::optional<geometry::RigidTransform> {
       const auto seen = state.tracker_from.find(marker);
       return seen == state.tracker_from.end() ? std::nullopt : std::optional(seen->second);

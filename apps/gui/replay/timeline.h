@@ -11,7 +11,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
 #include "helicarm/operation/live_tool.h"
-#include "helicarm/operation/operation.h"
+#include "helicarm/operation/session_records.h"
 
 namespace helicarm::gui {
 
@@ -21,6 +21,7 @@ struct Moment {
   std::string kind;
   QString summary;  ///< one line
   Json content;
+  operation::Record record;  ///< what `content` says
 
   QString detail() const;  ///< the content as indented JSON
 };
@@ -47,18 +48,19 @@ struct SessionState {
   std::map<std::string, std::size_t> exposed_at;                 ///< moment of each view's acquisition
   std::optional<std::size_t> registered_at;                      ///< moment of the latest registration
   std::optional<double> hand_eye_rms_mm;                         ///< of it
-  std::string tunnel;                                            ///< target of the newest order
+  std::string tunnel;                                            ///< target of the newest order or guidance
+  std::optional<operation::Guidance> guidance;                   ///< the newest decision on a hand-held drill
 };
 
 /// Reads session.log in a session's folder. An incomplete end is left out and reported in `torn`; refuses as
-/// `read_session`, and a record without the fields of its kind (bad_value).
+/// `read_session` and `operation::record_from`.
 Expected<Timeline> read_timeline(const std::filesystem::path& session);
 
 /// State after the moment with this index and all before it. Refuses as `read_timeline`.
 Expected<SessionState> state_at(const Timeline& timeline, std::size_t index);
 
-/// Follows the tool in that state's case, whose measurement is `result`. Refuses (usage) a state before
-/// measurement or registration.
+/// Follows the robot's tool or the hand-held drill in that state's case, whose measurement is `result`.
+/// Refuses (usage) a state before the measurement, or that of a robot before its registration.
 Expected<operation::LiveTool> tool_of(const Timeline& timeline, const SessionState& state,
                                       const pipeline::Result& result);
 

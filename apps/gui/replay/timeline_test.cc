@@ -96,8 +96,37 @@ TEST_F(TimelineTest, RecordWithoutContentIsNamedInTheMessage) {
 
 TEST_F(TimelineTest, CaseOutsideTheSessionIsRefused) {
   const auto session = operation::SessionLog::open(folder_ / "session.log").value();
-  ASSERT_TRUE(session->append("case", {{"folder", "../elsewhere"}}));
+  const operation::Record begun = operation::record::CaseBegun{"../elsewhere", Json::object(), {}, {}};
+  ASSERT_TRUE(session->append("case", operation::content_of(begun)));
   EXPECT_EQ(state_at(read(), session_kinds.size()).error().reason, Reason::path_outside);
+}
+
+TEST_F(TimelineTest, AHandHeldDrillReplaysWithItsTouchesAndGuidance) {
+  using namespace operation::record;
+  const auto session = operation::SessionLog::open(folder_ / "session.log").value();
+  const auto add = [&](const operation::Record& record) {
+    ASSERT_TRUE(session->append(std::string(operation::kind_of(record)), operation::content_of(record)));
+  };
+  operation::Guidance off;
+  off.aim = operation::TunnelAim{1.25, 3, -4, 30, 0.1, 0.2, 0.1, {1.25, 0, 0}, Eigen::Vector3d::UnitZ()};
+  off.why_not = Failure{Reason::off_target, "1.2 mm off the axis"};
+  off.age_s = 0.05;
+  off.bone_moved = operation::Motion{0.1, 0.2};
+  add(Touched{"divot", window_with(4), {1, 2, 3}});
+  add(Guide{"tibia", 0.15, window_with(5)});
+  add(Guided{"tibia", window_with(6), off});
+  const Timeline timeline = read();
+  const std::size_t last = timeline.moments.size() - 1;
+  EXPECT_EQ(timeline.moments[last - 2].summary, "Check point divot touched");
+  EXPECT_EQ(timeline.moments[last - 1].summary, "Drill guided to tibia");
+  EXPECT_EQ(timeline.moments[last].summary,
+            "Drill at tibia, 1.25 mm and 3.0° off its axis: 1.2 mm off the axis");
+  const SessionState state = state_at(timeline, last).value();
+  ASSERT_TRUE(state.guidance);
+  EXPECT_EQ(operation::to_json(*state.guidance), operation::to_json(off));
+  EXPECT_EQ(state.tunnel, "tibia");
+  EXPECT_EQ(state.tracker_from.at("femur").translation.x(), 6);
+  EXPECT_FALSE(state_at(timeline, last - 1).value().guidance) << "before the first decision";
 }
 
 }  // namespace

@@ -153,7 +153,7 @@ void MainWindow::show_recorded() {
   const auto then = state_at(*replay_->timeline(), std::size_t(replay_->moment()));
   const bool is_shown = then && then->case_folder && controller_.state().folder == *then->case_folder &&
                         controller_.state().measured;
-  if (!is_shown || !then->registered_at) return;
+  if (!is_shown || !(then->registered_at || then->guidance)) return;
   if (!recorded_tool_ || recorded_at_ != then->registered_at || recorded_of_ != shown_) {
     const auto tool = tool_of(*replay_->timeline(), *then, *shown_);
     if (!tool) return say(tool.error());

@@ -63,7 +63,7 @@ void name_lines(const pipeline::RegistrationCase& given, const pipeline::CaseMod
     named.name = tunnel.name;
     named.diameter_mm = tunnel.diameter_mm;
     named.bridge_mm = tunnel.bridge_mm;
-    named.enters_at_end = tunnel.enters_at_end;
+    named.enters_at_end = tunnel.enter_at == pipeline::TunnelEnd::end;
   }
 }
 

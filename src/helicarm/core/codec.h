@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -43,6 +44,11 @@ class FromJson {
   void check(Work&& work) {
     work(*reader_);
   }
+  /// Keys of one form of the object, which is told by whether `key` is given.
+  template <class Work>
+  void form(const char* key, bool with_key, bool, Work&& work) {
+    if (reader_->has(key) == with_key) work();
+  }
 
   void text(const char* key, std::string& value, const char*, TextLimits limits = {}) {
     value = reader_->text(key, limits.most);
@@ -66,6 +72,10 @@ class FromJson {
   }
   void integer(const char* key, std::optional<int>& value, int low, int high, const char*) {
     if (!reader_->raw(key).is_null()) value = reader_->integer(key, low, high);
+  }
+  template <std::integral Integer>
+  void integer(const char* key, Integer& value, int low, int high, const char*) {
+    value = static_cast<Integer>(reader_->integer(key, low, high));
   }
   void boolean(const char* key, std::optional<bool>& value, const char*) {
     if (!reader_->raw(key).is_null()) value = reader_->boolean(key, false);
@@ -92,6 +102,10 @@ class FromJson {
   template <class Vector>
   void vector(const char* key, Vector& value, Range range, const char*) {
     value = Vector(reader_->numbers(key, std::size_t(Vector::SizeAtCompileTime), range).data());
+  }
+  template <class Vector>
+  void vector(const char* key, std::optional<Vector>& value, Range range, const char* help) {
+    if (!reader_->raw(key).is_null()) vector(key, value.emplace(), range, help);
   }
   template <class Matrix>
   void matrix(const char* key, Matrix& value, Range range, const char*) {
@@ -123,6 +137,10 @@ class FromJson {
     } else {
       read_object(key, value, describe);
     }
+  }
+  template <class T, class Describe>
+  void required_object(const char* key, T& value, const char*, Describe&& describe) {
+    read_object(key, value, describe);
   }
   /// At most `most`; an absent list is empty unless `required`.
   template <class T, class Describe>
@@ -181,6 +199,10 @@ class ToJson {
   static bool wants(bool needed) { return needed; }
   template <class Work>
   void check(Work&&) {}
+  template <class Work>
+  void form(const char*, bool, bool holds, Work&& work) {
+    if (holds) work();
+  }
 
   void text(const char* key, const std::string& value, const char*, TextLimits = {}) { json[key] = value; }
   void text(const char* key, const std::optional<std::string>& value, const char*, TextLimits = {}) {
@@ -193,6 +215,10 @@ class ToJson {
   void number(const char* key, const std::optional<double>& value, Range, const char*) { put(key, value); }
   void number_or_default(const char* key, double value, Range, const char*) { json[key] = value; }
   void integer(const char* key, const std::optional<int>& value, int, int, const char*) { put(key, value); }
+  template <std::integral Integer>
+  void integer(const char* key, Integer value, int, int, const char*) {
+    json[key] = value;
+  }
   void boolean(const char* key, const std::optional<bool>& value, const char*) { put(key, value); }
   template <class Enum, std::size_t n>
   void choice(const char* key, Enum value, const std::array<std::string_view, n>& words, const char*) {
@@ -211,6 +237,10 @@ class ToJson {
   template <class Vector>
   void vector(const char* key, const Vector& value, Range, const char*) {
     json[key] = std::vector<double>(value.begin(), value.end());
+  }
+  template <class Vector>
+  void vector(const char* key, const std::optional<Vector>& value, Range range, const char* help) {
+    if (value) vector(key, *value, range, help);
   }
   template <class Matrix>
   void matrix(const char* key, const Matrix& value, Range, const char*) {
@@ -232,10 +262,17 @@ class ToJson {
   template <class T, class Describe>
   void object(const char* key, const T& value, const char*, Describe&& describe) {
     if constexpr (requires { value.has_value(); }) {
-      if (value) json[key] = written(*value, describe);
+      if (value)
+        json[key] = written(*value, describe);
+      else if (unset_ == Unset::null)
+        json[key] = nullptr;
     } else {
       json[key] = written(value, describe);
     }
+  }
+  template <class T, class Describe>
+  void required_object(const char* key, const T& value, const char*, Describe&& describe) {
+    json[key] = written(value, describe);
   }
   template <class T, class Describe>
   void list(const char* key, const std::vector<T>& values, bool, std::size_t, const char*,
@@ -277,6 +314,12 @@ class ToSchema {
   static bool wants(bool) { return true; }
   template <class Work>
   void check(Work&&) {}
+  template <class Work>
+  void form(const char*, bool, bool, Work&& work) {
+    in_a_form_ = true;
+    work();
+    in_a_form_ = false;
+  }
 
   void text(const char* key, const std::string&, const char* help, TextLimits limits = {}) {
     add(key, true, {{"type", "string"}, {"minLength", limits.least}, {"maxLength", limits.most}}, help);
@@ -301,6 +344,10 @@ class ToSchema {
   void integer(const char* key, const std::optional<int>&, int low, int high, const char* help) {
     add(key, false, {{"type", "integer"}, {"minimum", low}, {"maximum", high}}, help);
   }
+  template <std::integral Integer>
+  void integer(const char* key, Integer, int low, int high, const char* help) {
+    add(key, true, {{"type", "integer"}, {"minimum", low}, {"maximum", high}}, help);
+  }
   void boolean(const char* key, const std::optional<bool>&, const char* help) {
     add(key, false, {{"type", "boolean"}}, help);
   }
@@ -320,8 +367,11 @@ class ToSchema {
   }
   template <class Vector>
   void vector(const char* key, const Vector&, Range range, const char* help) {
-    constexpr int n = Vector::SizeAtCompileTime;
-    add(key, true, {{"type", "array"}, {"items", number_in(range)}, {"minItems", n}, {"maxItems", n}}, help);
+    add(key, true, numbers_in<Vector>(range), help);
+  }
+  template <class Vector>
+  void vector(const char* key, const std::optional<Vector>&, Range range, const char* help) {
+    add(key, false, numbers_in<Vector>(range), help);
   }
   template <class Matrix>
   void matrix(const char* key, const Matrix&, Range range, const char* help) {
@@ -345,6 +395,10 @@ class ToSchema {
     add(key, false, described<T>(describe), help);
   }
   template <class T, class Describe>
+  void required_object(const char* key, const T&, const char* help, Describe&& describe) {
+    add(key, true, described<T>(describe), help);
+  }
+  template <class T, class Describe>
   void list(const char* key, const std::vector<T>&, bool required, std::size_t most, const char* help,
             Describe&& describe) {
     add(key, required, {{"type", "array"}, {"maxItems", most}, {"items", described<T>(describe)}}, help);
@@ -357,6 +411,11 @@ class ToSchema {
  private:
   static Json number_in(Range range) {
     return {{"type", "number"}, {"minimum", range.low}, {"maximum", range.high}};
+  }
+  template <class Vector>
+  static Json numbers_in(Range range) {
+    constexpr int n = Vector::SizeAtCompileTime;
+    return {{"type", "array"}, {"items", number_in(range)}, {"minItems", n}, {"maxItems", n}};
   }
   static Json path_schema() { return {{"type", "string"}, {"maxLength", 1000}}; }
   template <class T, class Describe>
@@ -373,7 +432,8 @@ class ToSchema {
   }
   /// An optional key may be null.
   void add(const char* key, bool required, Json schema, const char* help) {
-    if (required)
+    if (json["properties"].contains(key)) return;  // of several forms
+    if (required && !in_a_form_)
       json["required"].push_back(key);
     else if (schema.contains("type"))
       schema["type"] = Json::array({schema["type"], "null"});
@@ -382,6 +442,8 @@ class ToSchema {
     schema["description"] = help;
     json["properties"][key] = std::move(schema);
   }
+
+  bool in_a_form_ = false;
 };
 
 /// The schema of a file, `describe(codec)` being its description.

@@ -47,7 +47,7 @@ void Operation::weigh_delay(const std::string& view, const xray::Acquisition& he
     const double held = held_s(earlier.acquisition, earlier.arrival_s);
     if (held <= longest_held_s) return false;
     const Failure why = held_back(earlier.name, held);
-    record("refused", {{"view", earlier.name}, {"why", code(why.reason)}, {"figures", why.figures}});
+    record(record::Refused{earlier.name, {}, std::string(code(why.reason)), why.figures});
     notify_(Step::acquire, fmt::format("{}; acquire it again", why.message));
     forget_measurement();
     return true;
@@ -99,11 +99,12 @@ xray::Acquisition Operation::acquisition_of(std::string& view, const receiver::A
   return header;
 }
 
-/// The image's folder, by its name within that of the session; null outside. The image's own name may hold
+/// The image's folder, by its name within that of the session; nothing outside. The image's own name may hold
 /// UIDs.
-Json Operation::inbox_of(const std::filesystem::path& image) const {
+std::optional<std::string> Operation::inbox_of(const std::filesystem::path& image) const {
   const std::filesystem::path inbox = image.parent_path().lexically_relative(folder_);
-  return inbox.empty() || *inbox.begin() == ".." ? Json() : Json(inbox.string());
+  if (inbox.empty() || *inbox.begin() == "..") return std::nullopt;
+  return inbox.string();
 }
 
 Expected<void> Operation::take(const std::string& wanted, const receiver::Arrival& arrival,
@@ -116,20 +117,14 @@ Expected<void> Operation::take(const std::string& wanted, const receiver::Arriva
     const auto acquisition = guarded([&] { return acquisition_of(view, arrival, arrival_s); });
     if (!acquisition) {
       const Failure& why = acquisition.error();
-      record(
-          "refused",
-          {{"view", view}, {"picture", arrival.digest}, {"why", code(why.reason)}, {"figures", why.figures}});
+      record(record::Refused{view, arrival.digest, std::string(code(why.reason)), why.figures});
       throw BadInput(why);
     }
     const double coarse_s = acquisition->acquired ? acquisition->acquired->resolution_s : 0;
     const PoseWindow window = window_of_exposure(board_, plan_.tracker, arrival_s, coarse_s);
     const auto seen = poses_of_exposure(window, plan_.tracker);
-    record("exposure", {{"view", view},
-                        {"picture", arrival.digest},
-                        {"inbox", inbox_of(arrival.path)},
-                        {"held_s", held_s(*acquisition, arrival_s)},
-                        {"window", to_json(window)},
-                        {"poses", seen ? pipeline::to_json(*seen) : Json()}});
+    record(record::Exposure{view, arrival.digest, inbox_of(arrival.path), held_s(*acquisition, arrival_s),
+                            window, seen ? std::optional(*seen) : std::nullopt});
     const guidance::Poses poses = value_or_throw(seen);
     for (const PlannedTunnel& tunnel : plan_.tunnels)
       if (!poses.tracker_from(tunnel.bone))

@@ -26,8 +26,7 @@ Expected<double> Operation::touch(const std::string& name) {
       throw BadInput(Reason::usage, fmt::format("{}: must be touched before the first image", name));
     const PoseWindow window = window_now(board_, plan_.tracker, end_.get_token());
     const Eigen::Vector3d tip = value_or_throw(touched_in_bone(window, plan_.tracker, check->bone));
-    record("touched",
-           {{"check_point", name}, {"window", to_json(window)}, {"in_bone", geometry::json_list(tip)}});
+    record(record::Touched{name, window, tip});
     if (first == touched_in_bone_.end()) {
       touched_in_bone_[name] = tip;
       return 0;

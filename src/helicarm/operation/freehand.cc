@@ -8,13 +8,15 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
-#include "helicarm/geometry/view_json.h"
+#include "helicarm/operation/guidance_description.h"
 
 namespace helicarm::operation {
 namespace {
 
 using Eigen::Vector3d;
 using Samples = std::vector<tracker::PoseSample>;
+
+constexpr std::string_view on_target = "on_target";
 
 /// Scatter is estimated from this time: 15 samples at 30 Hz.
 constexpr double recent_poses_s = 0.5;
@@ -77,30 +79,25 @@ void add_scatter(TunnelAim& aim, const std::vector<geometry::RigidTransform>& ti
   aim.angle_sigma_deg = std::hypot(aim.angle_sigma_deg, turn * 180 / std::numbers::pi);
 }
 
-Json json_of(const TunnelAim& aim) {
-  return {{"distance_mm", aim.distance_mm},
-          {"distance_sigma_mm", aim.distance_sigma_mm},
-          {"angle_deg", aim.angle_deg},
-          {"angle_sigma_deg", aim.angle_sigma_deg},
-          {"depth_mm", aim.depth_mm},
-          {"depth_sigma_mm", aim.depth_sigma_mm},
-          {"length_mm", aim.length_mm},
-          {"to_axis_mm", geometry::json_list(aim.to_axis_mm)},
-          {"axis", geometry::json_list(aim.axis)}};
-}
-
 }  // namespace
 
-std::string_view Guidance::decision() const { return why_not ? code(why_not->reason) : "on_target"; }
+std::string_view Guidance::decision() const { return why_not ? code(why_not->reason) : on_target; }
 
 Json to_json(const Guidance& guidance) {
-  const auto& moved = guidance.bone_moved;
-  return {{"decision", guidance.decision()},
-          {"message", guidance.why_not ? Json(guidance.why_not->message) : Json()},
-          {"age_s", guidance.age_s ? Json(*guidance.age_s) : Json()},
-          {"aim", guidance.aim ? json_of(*guidance.aim) : Json()},
-          {"bone_moved_mm", moved ? Json(moved->distance_mm) : Json()},
-          {"bone_moved_deg", moved ? Json(moved->turn_deg) : Json()}};
+  ToJson codec(ToJson::Unset::null);
+  describe_guidance(codec, guidance);
+  return std::move(codec.json);
+}
+
+void read_decision(JsonReader& reader, std::optional<Failure>& why_not) {
+  const std::string decision = reader.text("decision");
+  const auto message = reader.optional_text("message", 10000);
+  why_not.reset();
+  if (decision == on_target) return;
+  const auto reason = std::ranges::find(all_reasons(), decision, code);
+  if (reason == all_reasons().end())
+    reader.refuse(Reason::bad_value, "decision", fmt::format("\"{}\" is none", decision));
+  why_not = Failure{*reason, message.value_or("")};
 }
 
 Expected<FreehandGuide> FreehandGuide::begin(const OperationPlan& plan, LiveTool live,

@@ -2,7 +2,6 @@
 // Orders move the robot only while the poses that they were planned on hold.
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/operation.h"
-#include "helicarm/operation/records.h"
 #include "helicarm/xray/digest.h"
 
 namespace helicarm::operation {
@@ -78,16 +77,14 @@ Expected<void> Operation::withdraw(const robot::RobotOrder& order, const robot::
     notify_(Step::navigate, order.name + ": withdraw");
     const PlannedTunnel& tunnel = tunnel_named(order.name);
     if (!result_ || !hand_eye_) throw BadInput(Reason::usage, "no measurement or no registration yet");
-    const PoseWindow window = look("withdraw");
+    const PoseWindow window = look(record::Look::withdraw);
     const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
     const PlanWatch watch(plan_.limits, plan_.tracker, basis_of(tunnel, window, present));
     const Withdrawal from{present.base_from_tcp, rest.base_from_tcp};
-    record("withdraw", {{"digest", xray::digest(to_text(robot::to_json(order)))},
-                        {"base_from_tcp", geometry::json_rows(from.base_from_tcp.matrix())},
-                        {"base_from_rest", geometry::json_rows(from.base_from_rest.matrix())}});
+    record(record::Withdraw{xray::digest(to_text(robot::to_json(order))), from});
     const robot::RobotOrder back = withdraw_order(order, from, present.joints, plan_.robot.approach.limits);
-    record("robot", joints_json(present.joints));
-    record("order", robot::to_json(back));
+    record(record::Robot{present.joints});
+    record(record::Order::of(back));
     const std::string token = value_or_throw(confirm(back));
     value_or_throw(watch.holds(board_, robot().track(), tracker::monotonic_seconds()));
     carry_out(back, token, {}, in_place(watch));

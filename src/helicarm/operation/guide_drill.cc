@@ -41,11 +41,11 @@ Expected<void> Operation::guide(const std::string& name, std::optional<double> o
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");
     check_registered(tunnel);
     notify_(Step::navigate, name);
-    const PoseWindow window = look("guide");
+    const PoseWindow window = look(record::Look::guide);
     if (tunnel.of_model)
       value_or_throw(check_error_at_tip(plan_, tunnel, *result_,
                                         value_or_throw(poses_now(window, plan_.tracker)), tool()));
-    record("guide", {{"tunnel", name}, {"oldest_pose_s", oldest_pose_s}, {"window", to_json(window)}});
+    record(record::Guide{name, oldest_pose_s, window});
     guide_ =
         value_or_throw(FreehandGuide::begin(plan_, value_or_throw(live_tool()), name,
                                             value_or_throw(poses_now(window, plan_.tracker)), oldest_pose_s));
@@ -65,8 +65,7 @@ Expected<Guidance> Operation::guidance() {
     if (is_stale) {
       now.why_not = guided_->why_not;
     } else if (!guided_ || guided_->decision() != now.decision()) {
-      record("guided",
-             {{"tunnel", guide_->tunnel().name}, {"window", to_json(recent)}, {"guidance", to_json(now)}});
+      record(record::Guided{guide_->tunnel().name, recent, now});
       if (now.decision() == code(Reason::plan_stale)) in_place_.clear();
       guided_ = now;
     }

@@ -13,7 +13,6 @@
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/hand_eye_tour.h"
 #include "helicarm/operation/models.h"
-#include "helicarm/operation/records.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/xray/digest.h"
 
@@ -79,8 +78,8 @@ Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const 
                                  folder.string()));
     operation->files_ = value_or_throw(files_of(operation->plan_));
     const Digests models = value_or_throw(keep_models(operation->plan_, folder));
-    operation->record("plan", to_json(operation->plan_));
-    if (!models.empty()) operation->record("models", {{"folder", "models"}, {"files", models}});
+    operation->record(record::Plan{operation->plan_});
+    if (!models.empty()) operation->record(record::Models{"models", models});
     return operation;
   });
 }
@@ -93,41 +92,38 @@ std::vector<std::string> Operation::views_to_come() const {
   return names;
 }
 
-void Operation::record(const std::string& kind, Json content) {
-  value_or_throw(log_->append(kind, std::move(content)));
+void Operation::record(const Record& what) {
+  value_or_throw(log_->append(std::string(kind_of(what)), content_of(what)));
 }
 
-PoseWindow Operation::look(const char* why) {
+PoseWindow Operation::look(record::Look why) {
   PoseWindow window = window_now(board_, plan_.tracker, end_.get_token());
-  record("poses", {{"why", why}, {"window", to_json(window)}});
+  record(record::Poses{why, window});
   return window;
 }
 
 void Operation::record_halt(const robot::RobotOrder& order, const Failure& why) {
-  record(
-      "halted",
-      {{"order", order.name}, {"why", code(why.reason)}, {"message", why.message}, {"figures", why.figures}});
+  record(record::Halted{order.name, std::string(code(why.reason)), why.message, why.figures});
 }
 
 std::vector<robot::Miss> Operation::carry_out(const robot::RobotOrder& order, const std::string& token,
                                               const robot::Measure& measure, const robot::Watch& watch) {
-  const Json confirmed = {
-      {"order", order.name}, {"digest", xray::digest(to_text(robot::to_json(order)))}, {"by", who_}};
-  record("confirmed", confirmed);
+  const record::Confirmed confirmed{order.name, xray::digest(to_text(robot::to_json(order))), who_};
+  record(confirmed);
   auto misses = robot().execute(order, token, measure, watch);
   if (!misses) {
     // The first reason is reported, also where it cannot be recorded.
     static_cast<void>(guarded([&] { record_halt(order, misses.error()); }));
     throw BadInput(misses.error());
   }
-  record("carried_out", confirmed);
+  record(record::CarriedOut{confirmed});
   return *std::move(misses);
 }
 
 Expected<void> Operation::finish(const std::optional<Failure>& why) {
   return guarded([&] {
     if (std::exchange(finished_, true)) return;
-    record("end", why ? Json{{"why", code(why->reason)}, {"message", why->message}} : Json::object());
+    record(why ? record::End{std::string(code(why->reason)), why->message} : record::End{});
   });
 }
 
@@ -143,10 +139,8 @@ pipeline::Result Operation::run(const guidance::Poses& now,
   const pipeline::Case given =
       value_or_throw(operation_case(folder_ / name, plan_, files_, images, now, of_picks));
   const Digests files = value_or_throw(write_operation_case(given, files_, images));
-  record("case", {{"folder", name},
-                  {"case", pipeline::to_json(given)},
-                  {"files", files},
-                  {"verifies", tool_lines.empty() ? Json() : Json(tool_lines.front().tunnel)}});
+  record(record::CaseBegun{name, pipeline::to_json(given), files,
+                           tool_lines.empty() ? std::string() : tool_lines.front().tunnel});
   const auto earlier = measurement_ ? measurement_->calibration : nullptr;
   measurement_ = value_or_throw(measure_case(given, plan_, measurement_));
   if (measurement_->calibration != earlier || !earlier) ++calibrations_;
@@ -155,7 +149,7 @@ pipeline::Result Operation::run(const guidance::Poses& now,
     result = value_or_throw(with_registration(result, *registration_, plan_, given, of_models));
   const Digests written = value_or_throw(write_result(result, given.folder));
   value_or_throw(check_digests(given.folder, files));
-  record("result", {{"folder", name}, {"digest", digest_of(pipeline::to_json(result))}, {"files", written}});
+  record(record::Measured{name, digest_of(pipeline::to_json(result)), written});
   if (tool_lines.empty()) measured_ = given;
   newest_ = std::move(result);
   if (newest_->failure) throw BadInput(*newest_->failure);
@@ -195,12 +189,13 @@ tracker::HandEyePair Operation::pair_at(const geometry::RigidTransform& pose, co
   const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
   const robot::RobotOrder order = tour_order(plan_.robot, present, pose);
   const PlanWatch age(plan_.limits, plan_.tracker, {.time_s = tracker::monotonic_seconds()});
-  record("robot", joints_json(present.joints));
-  record("order", robot::to_json(order));
+  record(record::Robot{present.joints});
+  record(record::Order::of(order));
   const std::string token = value_or_throw(confirm(order));
   value_or_throw(age.young(tracker::monotonic_seconds()));
   carry_out(order, token, {}, sees_tool());
-  const SeenPose seen = value_or_throw(see_tool(look("hand-eye"), plan_.tracker, plan_.tracker.tool));
+  const SeenPose seen =
+      value_or_throw(see_tool(look(record::Look::hand_eye), plan_.tracker, plan_.tracker.tool));
   const robot::RobotState at_rest = value_or_throw(robot().wait_connected(robot_patience));
   return {at_rest.base_from_tcp * plan_.robot.tool.flange_from_tcp.inverse(), seen.tracker_from_marker};
 }
@@ -211,7 +206,7 @@ Expected<void> Operation::register_robot(const Confirm& confirm, const Again& ag
     std::vector<tracker::HandEyePair> pairs;
     const robot::RobotState begin = value_or_throw(robot().wait_connected(robot_patience));
     const std::vector<geometry::RigidTransform> tour = hand_eye_tour(begin.base_from_tcp);
-    record("tour", {{"base_from_tcp", geometry::json_rows(begin.base_from_tcp.matrix())}});
+    record(record::Tour{begin.base_from_tcp});
     while (pairs.size() < tour.size()) {
       const auto pair = guarded([&] { return pair_at(tour[pairs.size()], confirm); });
       if (!pair) {
@@ -222,7 +217,7 @@ Expected<void> Operation::register_robot(const Confirm& confirm, const Again& ag
       notify_(Step::register_robot, fmt::format("pose {} of {}", pairs.size(), tour.size()));
     }
     hand_eye_ = value_or_throw(tracker::calibrate_hand_eye(pairs));
-    record("hand_eye", {{"pairs", to_json(pairs)}, {"found", to_json(*hand_eye_)}});
+    record(record::HandEye{pairs, *hand_eye_});
   });
 }
 
@@ -242,7 +237,7 @@ Expected<robot::RobotOrder> Operation::plan_tunnel(const std::string& name) {
     check_registered(tunnel);
     if (!hand_eye_) throw BadInput(Reason::usage, "the robot is not registered; register it first");
     notify_(Step::plan, name);
-    const PoseWindow window = look("plan");
+    const PoseWindow window = look(record::Look::plan);
     const guidance::Poses now = value_or_throw(poses_now(window, plan_.tracker));
     if (tunnel.of_model) value_or_throw(check_error_at_tip(plan_, tunnel, *result_, now, tool()));
     const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
@@ -253,8 +248,8 @@ Expected<robot::RobotOrder> Operation::plan_tunnel(const std::string& name) {
     planned_.insert_or_assign(name, Planned{to_text(robot::to_json(order)),
                                             target_in_bone(order, tunnel.bone, now, *hand_eye_),
                                             {plan_.limits, plan_.tracker, basis}});
-    record("robot", joints_json(present.joints));
-    record("order", robot::to_json(order));
+    record(record::Robot{present.joints});
+    record(record::Order::of(order));
     draw_preview(order);
     return order;
   });
@@ -270,7 +265,7 @@ void Operation::draw_preview(const robot::RobotOrder& order) {
       value_or_throw(write_private_file(folder_ / name, png));
       files[name] = xray::digest(png);
     }
-  record("preview", {{"order", order.name}, {"files", files}});
+  record(record::Preview{order.name, files});
 }
 
 std::map<std::string, fs::path> Operation::images() const {
@@ -331,13 +326,13 @@ Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std:
     const robot::Measure measure = [&] {
       return guarded([&] {
         return value_or_throw(
-            measure_tool(look("correct"), plan_, *hand_eye_, tunnel.bone, plan.bone_from_target));
+            measure_tool(look(record::Look::correct), plan_, *hand_eye_, tunnel.bone, plan.bone_from_target));
       });
     };
     const auto loop = guarded([&] { return carry_out(order, token, measure, in_place(plan.watch)); });
     if (!loop && loop.error().reason == Reason::plan_stale) plan.stale = loop.error();
     value_or_throw(loop);
-    record("navigated", {{"tunnel", order.name}, {"loop", to_json(*loop)}});
+    record(record::Navigated{order.name, *loop});
     notify_(Step::verify, order.name);
     auto outcome = guarded([&] { return check(tunnel); });
     if (!outcome) static_cast<void>(guarded([&] { record_halt(order, outcome.error()); }));
@@ -349,13 +344,13 @@ Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std:
 }
 
 TunnelOutcome Operation::check(const PlannedTunnel& tunnel) {
-  const guidance::Poses now = value_or_throw(poses_now(look("verify"), plan_.tracker));
+  const guidance::Poses now = value_or_throw(poses_now(look(record::Look::verify), plan_.tracker));
   const TrackedTool tracked = tool();
   const guidance::ToolLine line =
       value_or_throw(tool_line(tunnel.name, tunnel.bone, views_.front().poses, now, tracked.marker_from_tip));
   const pipeline::Result checked = run(now, {line});
   TunnelOutcome outcome = value_or_throw(outcome_of(tunnel, checked, tracked));
-  record("outcome", to_json(outcome));
+  record(record::Outcome{outcome.tunnel, outcome.start, outcome.end});
   return outcome;
 }
 

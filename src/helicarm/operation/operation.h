@@ -19,7 +19,7 @@
 #include "helicarm/operation/live_tool.h"
 #include "helicarm/operation/orders.h"
 #include "helicarm/operation/plan_watch.h"
-#include "helicarm/operation/session_log.h"
+#include "helicarm/operation/session_records.h"
 #include "helicarm/xray/xray_image.h"
 
 namespace helicarm::operation {
@@ -200,13 +200,13 @@ class Operation {
   robot::RobotLink& robot() const;
   TrackedTool tool() const;
   const PlannedTunnel& tunnel_named(const std::string& name) const;
-  void record(const std::string& kind, Json content);
-  PoseWindow look(const char* why);
+  void record(const Record& what);
+  PoseWindow look(record::Look why);
   xray::Acquisition acquisition_of(std::string& view, const receiver::Arrival& arrival, double arrival_s);
   void refuse_other_views(const std::string& view, const xray::Acquisition& shown) const;
   void weigh_delay(const std::string& view, const xray::Acquisition& shown, double arrival_s);
   double held_s(const xray::Acquisition& shown, double arrival_s) const;
-  Json inbox_of(const std::filesystem::path& image) const;
+  std::optional<std::string> inbox_of(const std::filesystem::path& image) const;
   void notify_once(const std::string& warning);
   robot::Watch sees_tool() const;
   robot::Watch in_place(PlanWatch watch) const;

@@ -30,7 +30,7 @@ struct Pointer {
 struct PlannedCheck {
   std::string name;
   guidance::Bone bone;
-  double limit_mm;
+  double limit_mm = tracker::CheckPoint{}.limit_mm;
 };
 
 /// Address of the tracker and its names for the markers.
@@ -75,7 +75,7 @@ struct HandDrill {
   double tolerance_deg = 2;      ///< of the angle between drill and axis
 };
 
-enum class TunnelEnd { start, end };
+using pipeline::TunnelEnd;
 
 struct PlannedTunnel {
   std::string name;
@@ -123,6 +123,8 @@ pipeline::RunOptions run_options(const OperationPlan& plan);
 Expected<OperationPlan> plan_from(const Json& json, const std::string& origin,
                                   const std::filesystem::path& folder = {});
 Json to_json(const OperationPlan& plan);
+/// JSON Schema of plan.json.
+Json plan_schema();
 
 /// Picks in the plan's views, as case.json's. Fails as `picks_from`.
 Expected<std::vector<pipeline::Pick>> picks_of(const OperationPlan& plan, const Json& picks,

@@ -45,7 +45,7 @@ Expected<void> Operation::plan_again(const std::string& order, const Failure& wh
     const bool may = replans < most_replans && (is_of_poses(why) || is_late(why));
     if (!may || !(answers_again() || is_of_poses(why)) || !again(why)) throw BadInput(why);
     answers_again();  // a person may have taken minutes; the unlock needs a fresh state
-    record("replanned", {{"order", order}, {"number", ++replans}, {"why", code(why.reason)}, {"by", who_}});
+    record(record::Replanned{order, ++replans, std::string(code(why.reason)), who_});
     value_or_throw(robot().unlock(who_));
   });
 }

@@ -55,7 +55,7 @@ Expected<void> Operation::register_models() {
     const std::string folder = measured_->folder.filename().string() + "/" + registration_folder;
     const Digests files = write_with_digests(found, folder_ / folder);
     registered_digest_ = xray::digest(to_text(operation::recorded(found)));
-    record("registered", {{"folder", folder}, {"digest", registered_digest_}, {"files", files}});
+    record(record::Registered{folder, registered_digest_, files});
     registration_ = std::move(found);
     if (const auto refusal = refusal_of(*registration_)) throw BadInput(*refusal);
   });
@@ -70,7 +70,7 @@ Expected<void> Operation::confirm_registration() {
     pipeline::Result with_models =
         value_or_throw(with_registration(*result_, *registration_, plan_, *measured_));
     if (with_models.failure) throw BadInput(*with_models.failure);
-    record("registration_confirmed", {{"digest", registered_digest_}, {"by", who_}});
+    record(record::RegistrationConfirmed{registered_digest_, who_});
     registration_confirmed_ = true;
     result_ = newest_ = std::move(with_models);
   });

@@ -12,11 +12,8 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/case_of.h"
-#include "helicarm/operation/freehand.h"
 #include "helicarm/operation/models.h"
-#include "helicarm/operation/records.h"
 #include "helicarm/operation/replay_orders.h"
-#include "helicarm/operation/session_log.h"
 #include "helicarm/pipeline/poses_json.h"
 #include "helicarm/xray/digest.h"
 
@@ -85,24 +82,13 @@ class Replay {
       : session_(std::move(session)),
         orders_([this](const std::string& origin, const std::string& how) { differ(origin, how); }) {}
 
-  void take(const SessionRecord& record) {
-    const std::string origin = fmt::format("record {}", record.number);
+  void take(const SessionRecord& written) {
+    const std::string origin = fmt::format("record {}", written.number);
     if (report.finished) differ(origin, "a record after the end of the operation");
-    if (record.kind == "plan") plan_ = value_or_throw(plan_from(record.content, origin, session_));
-    if (record.kind == "exposure") exposure(record, origin);
-    if (record.kind == "touched") touched(record, origin);
-    if (record.kind == "refused") refused(record);
-    if (record.kind == "case") images(record, origin);
-    if (record.kind == "end") end(record);
-    if (record.kind == "result") result(record, origin);
-    if (record.kind == "preview") list_files(record, "", origin);
-    if (record.kind == "models") list_files(record, record.content.at("folder").get<std::string>(), origin);
-    if (record.kind == "registered") registered(record, origin);
-    if (record.kind == "registration_confirmed") registration_confirmed(record, origin);
-    if (record.kind == "hand_eye") ++report.hand_eyes;
-    if (record.kind == "guide") guide(record, origin);
-    if (record.kind == "guided") guided(record, origin);
-    orders_.take(record, plan_, result_, newest_);
+    const auto record = record_from(written, session_);
+    if (!record) return report.differences.push_back(record.error().message);
+    std::visit([&](const auto& one) { take(one, origin); }, *record);
+    orders_.take(*record, {origin, plan_, result_, newest_});
     report.orders = orders_.orders;
     report.confirmations = orders_.confirmations;
     report.outcomes = orders_.outcomes;
@@ -115,7 +101,7 @@ class Replay {
     try {
       take(record);
     } catch (const Json::exception&) {
-      differ(origin, "a field that its kind requires is missing");
+      differ(origin, "a key that its case requires is missing");
     } catch (const BadInput& error) {
       differ(origin, error.failure().message);
     }
@@ -138,7 +124,7 @@ class Replay {
 
  private:
   struct ListedFile {
-    Json digest;
+    std::string digest;
     std::string origin;
   };
 
@@ -151,30 +137,38 @@ class Replay {
                                  differing_fields(then, now)));
   }
 
-  void exposure(const SessionRecord& record, const std::string& origin) {
+  template <class Other>
+  void take(const Other&, const std::string&) {}
+
+  void take(const record::Plan& record, const std::string&) { plan_ = record.plan; }
+  void take(const record::HandEye&, const std::string&) { ++report.hand_eyes; }
+  void take(const record::Models& models, const std::string& origin) {
+    list_files(models.files, models.folder, origin);
+  }
+  void take(const record::Preview& preview, const std::string& origin) {
+    list_files(preview.files, {}, origin);
+  }
+
+  void take(const record::Exposure& then, const std::string& origin) {
     ++report.exposures;
-    const std::string view = record.content.at("view").get<std::string>();
-    const std::string digest = record.content.at("picture").get<std::string>();
-    const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
-    const auto poses = poses_of_exposure(window, plan_.tracker);
-    compare(pipeline::in_present_form(record.content.at("poses")), poses ? pipeline::to_json(*poses) : Json(),
-            origin, "pose");
-    if (const Json inbox = record.content.value("inbox", Json()); inbox.is_string())
-      if (!received(inbox.get<std::string>()).contains(digest))
-        differ(origin,
-               fmt::format("{}: the image of {} is missing or was changed", inbox.get<std::string>(), view));
+    const auto poses = poses_of_exposure(then.window, plan_.tracker);
+    record::Exposure now = then;
+    now.poses = poses ? std::optional(*poses) : std::nullopt;
+    compare(content_of(then), content_of(now), origin, "pose");
+    if (then.inbox && !received(*then.inbox).contains(then.picture))
+      differ(origin, fmt::format("{}: the image of {} is missing or was changed", *then.inbox, then.view));
     const bool accepted = poses && std::ranges::all_of(plan_.tunnels, [&](const PlannedTunnel& tunnel) {
                             return poses->tracker_from(tunnel.bone).has_value();
                           });
     if (!accepted) return;
-    views_[view] = {view, {}, digest, *poses};
+    views_[then.view] = {then.view, {}, then.picture, *poses};
     forget_measurement();
   }
 
   /// An earlier image that turned out to be delayed has no digest.
-  void refused(const SessionRecord& record) {
-    if (record.content.contains("picture")) return;
-    views_.erase(record.content.at("view").get<std::string>());
+  void take(const record::Refused& refused, const std::string&) {
+    if (refused.picture) return;
+    views_.erase(refused.view);
     forget_measurement();
   }
 
@@ -190,59 +184,49 @@ class Replay {
     return entry->second;
   }
 
-  void end(const SessionRecord& record) {
+  void take(const record::End& end, const std::string&) {
     report.finished = true;
-    report.ended_by = record.content.value("why", "");
+    report.ended_by = end.why.value_or("");
   }
 
-  /// The files that a record lists, in this folder of the session; a later preview replaces an earlier one's.
-  void list_files(const SessionRecord& record, const std::string& folder, const std::string& origin) {
-    if (!record.content.contains("files")) return differ(origin, "the digests of its files are missing");
-    for (const auto& [name, digest] : record.content.at("files").items())
+  /// In this folder of the session; a later preview replaces an earlier one's.
+  void list_files(const Digests& files, const std::string& folder, const std::string& origin) {
+    for (const auto& [name, digest] : files)
       files_.insert_or_assign(folder.empty() ? name : folder + "/" + name, ListedFile{digest, origin});
   }
 
-  void touched(const SessionRecord& record, const std::string& origin) {
-    const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
-    const auto check = std::ranges::find(
-        plan_.check_points, record.content.at("check_point").get<std::string>(), &PlannedCheck::name);
+  void take(const record::Touched& then, const std::string& origin) {
+    const auto check = std::ranges::find(plan_.check_points, then.check_point, &PlannedCheck::name);
     if (check == plan_.check_points.end()) return differ(origin, "its check point is not in the plan");
-    const auto tip = touched_in_bone(window, plan_.tracker, check->bone);
-    compare(record.content.at("in_bone"), tip ? geometry::json_list(*tip) : Json(), origin, "touched point");
+    const Eigen::Vector3d tip = value_or_throw(touched_in_bone(then.window, plan_.tracker, check->bone));
+    compare(content_of(then), content_of(record::Touched{then.check_point, then.window, tip}), origin,
+            "touched point");
   }
 
   /// The case must equal the recorded one, which holds the accepted images with their poses.
-  void images(const SessionRecord& record, const std::string& origin) {
-    const std::string folder = record.content.at("folder").get<std::string>();
-    list_files(record, folder, origin);
-    const Json& recorded = record.content.at("case");
+  void take(const record::CaseBegun& record, const std::string& origin) {
+    const std::string& folder = record.folder;
+    list_files(record.files, folder, origin);
+    const Json& recorded = record.given;
     const std::string name = folder + "/case.json";
     if (const auto now = read_json(value_or_throw(path_inside(session_, name))); now && *now != recorded)
       differ(origin, fmt::format("{} was changed{}", name, differing_fields(recorded, *now)));
     for (const auto& [view, image] : views_) {
       ++report.images;
       const std::string file = fmt::format("{}.dcm", view);
-      if (record.content.value("files", Json::object()).value(file, Json()) != Json(image.digest))
+      const auto listed = record.files.find(file);
+      if (listed == record.files.end() || listed->second != image.digest)
         differ(origin, fmt::format("{}/{} is not the recorded image", folder, file));
     }
     derived_.reset();
     const auto derived = guarded([&] {
-      return derived_case(recorded, verified_tunnel(record.content),
-                          value_or_throw(path_inside(session_, folder)));
+      return derived_case(recorded, record.verifies, value_or_throw(path_inside(session_, folder)));
     });
     if (!derived) return differ(origin, fmt::format("{}: {}", name, derived.error().message));
     earlier_ = recorded.value("format", "") == earlier_format;
     derived_ = earlier_ ? as_read_earlier(*derived) : *derived;
     const Json now_written = pipeline::to_json(*derived);
     compare(case_in_present_form(recorded, now_written, plan_), now_written, origin, "case");
-  }
-
-  /// The tunnel whose verification a case is; empty: of a measurement.
-  static std::string verified_tunnel(const Json& content) {
-    if (content.contains("verifies"))
-      return content.at("verifies").is_null() ? "" : content.at("verifies").get<std::string>();
-    const Json& lines = content.at("case").at("tool_lines");  // of an earlier version
-    return lines.empty() ? "" : lines.at(0).at("tunnel").get<std::string>();
   }
 
   /// From the records before it; the picks are the user's.
@@ -273,10 +257,10 @@ class Replay {
     return value_or_throw(operation_case(folder, plan, files, images, now, lines));
   }
 
-  void result(const SessionRecord& record, const std::string& origin) {
+  void take(const record::Measured& record, const std::string& origin) {
     ++report.results;
-    const std::string folder = record.content.at("folder").get<std::string>();
-    list_files(record, folder, origin);
+    const std::string& folder = record.folder;
+    list_files(record.files, folder, origin);
     const std::filesystem::path inside = value_or_throw(path_inside(session_, folder));
     if (!derived_) return differ(origin, fmt::format("{}: its case does not follow from the record", folder));
     const auto measured = measure_case(*derived_, plan_, measurement_);
@@ -294,7 +278,7 @@ class Replay {
     if (!then) return differ(origin, then.error().message);
     Json now = without_timing(pipeline::to_json(*newest_));
     if (earlier_) now = in_keys_of(*then, now);
-    if (record.content.at("digest") != digest_of(now))
+    if (record.digest != digest_of(now))
       differ(origin, fmt::format("{}: the result differs from the recorded one on recomputation", folder));
     if (const Json written = without_timing(*then); written != now)
       differ(origin, fmt::format("{}/result.json differs from the recomputed result{}", folder,
@@ -308,46 +292,43 @@ class Replay {
   }
 
   /// From the model files, images and picks before it.
-  void registered(const SessionRecord& record, const std::string& origin) {
+  void take(const record::Registered& record, const std::string& origin) {
     ++report.registrations;
-    list_files(record, record.content.at("folder").get<std::string>(), origin);
+    list_files(record.files, record.folder, origin);
     registration_.reset(), is_confirmed_ = false;
     if (!measured_ || !measurement_) return differ(origin, "a registration without a measurement");
     auto now = register_models(plan_, *measured_, *measurement_, {});
     if (!now) return differ(origin, now.error().message);
     registered_digest_ = xray::digest(to_text(recorded(*now)));
-    if (record.content.at("digest") != registered_digest_)
+    if (record.digest != registered_digest_)
       differ(origin, "the registration differs from the recorded one on recomputation");
     registration_ = *std::move(now);
   }
 
   /// Before it no tunnel of a model is known to the records that follow.
-  void registration_confirmed(const SessionRecord& record, const std::string& origin) {
-    if (!registration_ || registration_->refused() || !result_ ||
-        record.content.at("digest") != registered_digest_)
+  void take(const record::RegistrationConfirmed& record, const std::string& origin) {
+    if (!registration_ || registration_->refused() || !result_ || record.digest != registered_digest_)
       return differ(origin, "the confirmation is of no registration, or of one that was refused");
     is_confirmed_ = true;
     result_ = newest_ = value_or_throw(with_registration(*result_, *registration_, plan_, *measured_));
   }
 
-  void guide(const SessionRecord& record, const std::string& origin) {
+  void take(const record::Guide& record, const std::string& origin) {
     guide_.reset();
-    const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
     if (!plan_.drill || !result_) return differ(origin, "guidance without a drill or a measurement");
     const auto begun = guarded([&] {
       return value_or_throw(FreehandGuide::begin(
-          plan_, LiveTool(plan_, *result_, {}, tracked_tool(*plan_.drill)),
-          record.content.at("tunnel").get<std::string>(), value_or_throw(poses_now(window, plan_.tracker)),
-          record.content.at("oldest_pose_s").get<double>()));
+          plan_, LiveTool(plan_, *result_, {}, tracked_tool(*plan_.drill)), record.tunnel,
+          value_or_throw(poses_now(record.window, plan_.tracker)), record.oldest_pose_s));
     });
     if (begun) guide_ = *begun;  // the operation refused it as well and recorded no decision
   }
 
-  void guided(const SessionRecord& record, const std::string& origin) {
+  void take(const record::Guided& then, const std::string& origin) {
     ++report.decisions;
     if (!guide_) return differ(origin, "a decision before guidance began");
-    const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
-    compare(record.content.at("guidance"), to_json(guide_->at(window)), origin, "decision");
+    compare(content_of(then), content_of(record::Guided{then.tunnel, then.window, guide_->at(then.window)}),
+            origin, "decision");
   }
 
   std::map<std::string, ListedFile> files_;

@@ -8,23 +8,27 @@
 #include <string>
 #include <vector>
 
-#include "helicarm/operation/orders.h"
-#include "helicarm/operation/session_log.h"
+#include "helicarm/operation/session_records.h"
 
 namespace helicarm::operation {
 
 /// Derives every order of a record, and what came of it, from the records before it.
 class OrderReplay {
  public:
+  /// A record's origin, and what those before it gave; `newest` is `measured`, or the verification after it.
+  struct Context {
+    std::string origin;
+    const OperationPlan& plan;
+    const std::optional<pipeline::Result>& measured;
+    const std::optional<pipeline::Result>& newest;
+  };
   /// Called with the record's origin and what differs.
   using Differ = std::function<void(const std::string& origin, const std::string& how)>;
 
   explicit OrderReplay(Differ differ) : differ_(std::move(differ)) {}
 
-  /// The records that concern orders; `newest` is `measured`, or the verification after it. Throws BadInput
-  /// for a malformed record.
-  void take(const SessionRecord& record, const OperationPlan& plan,
-            const std::optional<pipeline::Result>& measured, const std::optional<pipeline::Result>& newest);
+  /// The records that concern orders. Throws BadInput.
+  void take(const Record& record, const Context& at);
 
   /// The tracker's samples for the verification that the next case holds, once.
   std::optional<PoseWindow> take_verify_look() { return std::exchange(verify_look_, std::nullopt); }
@@ -43,25 +47,23 @@ class OrderReplay {
     std::string digest;  ///< of the order to the tunnel that is left
     Withdrawal from;
   };
-  using Record = SessionRecord;
-
-  void poses(const Record& record, const std::string& origin);
-  void tour(const Record& record, const std::string& origin);
-  void hand_eye(const Record& record, const OperationPlan& plan, const std::string& origin);
-  void withdraw(const Record& record, const std::string& origin);
-  void order(const Record& record, const OperationPlan& plan, const std::optional<pipeline::Result>& result,
-             const std::string& origin);
-  robot::RobotOrder derived(const std::string& name, const OperationPlan& plan,
-                            const std::optional<pipeline::Result>& result, std::optional<Planned>& planned);
-  void confirmed(const Record& record, const std::string& origin);
-  void carried_out(const Record& record, const std::string& origin);
-  void halted(const Record& record);
-  void replanned(const Record& record, const OperationPlan& plan, const std::string& origin);
-  void navigated(const Record& record, const OperationPlan& plan, const std::string& origin);
-  void outcome(const Record& record, const OperationPlan& plan, const std::optional<pipeline::Result>& result,
-               const std::string& origin);
-  void end(const Record& record, const std::string& origin);
-  void compare(const Json& then, const Json& now, const std::string& origin, const char* what);
+  template <class Other>
+  void take(const Other&, const Context&) {}
+  void take(const record::Poses& poses, const Context& at);
+  void take(const record::Robot& robot, const Context& at);
+  void take(const record::Tour& tour, const Context& at);
+  void take(const record::HandEye& hand_eye, const Context& at);
+  void take(const record::Withdraw& withdraw, const Context& at);
+  void take(const record::Order& order, const Context& at);
+  void take(const record::Confirmed& confirmed, const Context& at);
+  void take(const record::CarriedOut& carried_out, const Context& at);
+  void take(const record::Halted& halted, const Context& at);
+  void take(const record::Replanned& replanned, const Context& at);
+  void take(const record::Navigated& navigated, const Context& at);
+  void take(const record::Outcome& outcome, const Context& at);
+  void take(const record::End& end, const Context& at);
+  robot::RobotOrder derived(const std::string& name, const Context& at, std::optional<Planned>& planned);
+  void compare(const Json& then, const Json& now, const Context& at, const char* what);
 
   Differ differ_;
   std::optional<tracker::HandEye> hand_eye_;
@@ -74,11 +76,11 @@ class OrderReplay {
   std::vector<PoseWindow> corrections_;     ///< since the last confirmation
   std::map<std::string, Planned> planned_;  ///< orders to a tunnel, by digest
   std::map<std::string, std::string> to_,
-      other_;                           ///< by name: digest of the last order to a tunnel, of others
-  std::map<std::string, int> replans_;  ///< by order
-  std::optional<Json> open_;            ///< a confirmation whose motion has not ended
-  std::optional<Planned> reached_;      ///< by the last order that was carried out
-  std::string unverified_;              ///< tunnel that the tool has reached
+      other_;                              ///< by name: digest of the last order to a tunnel, of others
+  std::map<std::string, int> replans_;     ///< by order
+  std::optional<record::Confirmed> open_;  ///< a confirmation whose motion has not ended
+  std::optional<Planned> reached_;         ///< by the last order that was carried out
+  std::string unverified_;                 ///< tunnel that the tool has reached
 };
 
 /// Names of the first differing fields, for a message.

@@ -61,8 +61,9 @@ Expected<guidance::ToolLine> tool_line(const std::string& tunnel, const guidance
 
 /// Distance of a tunnel's end from the tool's axis, perpendicular to it.
 struct EndMiss {
-  Eigen::Vector2d across_mm;   ///< along x and y of the tool
-  Eigen::Matrix2d covariance;  ///< of X-ray measurement, tracker and hand-eye calibration
+  Eigen::Vector2d across_mm = Eigen::Vector2d::Zero();  ///< along x and y of the tool
+  Eigen::Matrix2d covariance =
+      Eigen::Matrix2d::Zero();  ///< of X-ray measurement, tracker and hand-eye calibration
   double distance_mm() const { return across_mm.norm(); }
   /// Root mean square of the true distance, with all errors.
   double predicted_mm() const { return std::sqrt(across_mm.squaredNorm() + covariance.trace()); }

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/pipeline/case_description.h"
+#include "helicarm/pipeline/model_description.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -143,12 +143,17 @@ Json case_schema() {
   const Case shape;
   Json schema = schema_of("case.json",
                           [&](ToSchema& codec) { description::describe_case(codec, shape, Purpose::run); });
+  ToSchema models, line;
+  std::vector<CaseModel> of_case;
+  ModelTunnelPlan of_model;
+  description::describe_models(models, of_case, false, {}, {});
+  description::describe_model_line(line, of_model, of_case, {});
+  schema["properties"]["models"] = models.json["properties"]["models"];
   // A tunnel is one of picks, or a line of a model's plan.
   Json& tunnel = schema["properties"]["tunnels"]["items"];
   tunnel["anyOf"] = Json::array({{{"required", tunnel["required"]}}, {{"required", {"name", "model"}}}});
   tunnel.erase("required");
-  for (const char* key : {"model", "line", "bone", "diameter_mm", "bridge_mm", "enter_at"})
-    tunnel["properties"][key] = {{"description", "of a line of a model's plan, see below"}};
+  tunnel["properties"].update(line.json["properties"]);
   return schema;
 }
 

@@ -6,15 +6,13 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/geometry/rotation.h"
-#include "helicarm/geometry/view_json.h"
+#include "helicarm/geometry/pose_codec.h"
 
 namespace helicarm::pipeline {
 namespace {
 
 constexpr std::size_t most_name_characters = 100;
 constexpr std::array other_frames{"calibrator", "tool", "tracker", "robot_base", "camera", "image", "world"};
-constexpr Range pose_range{-100000, 100000};
 
 const char* key_of(OtherMarker marker) {
   return marker == OtherMarker::tool ? "tracker_from_tool" : "tracker_from_calibrator";
@@ -23,14 +21,8 @@ const char* key_of(OtherMarker marker) {
 std::string key_of_bone(const guidance::Bone& bone) { return "tracker_from_" + bone; }
 
 std::optional<geometry::RigidTransform> pose_from(JsonReader& reader, const std::string& key) {
-  const Json& rows = reader.raw(key.c_str());
-  if (rows.is_null()) return std::nullopt;
-  const std::size_t count = rows.is_array() && rows.size() == 3 ? 3 : 4;
-  const auto numbers = reader.matrix(key.c_str(), count, 4, pose_range);
-  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  for (std::size_t i = 0; i < numbers.size(); ++i)
-    matrix(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) = numbers[i];
-  return value_or_throw(pose_as_written(matrix, fmt::format("{}: \"{}\"", reader.where(), key)));
+  if (reader.raw(key.c_str()).is_null()) return std::nullopt;
+  return geometry::written_pose(reader, key.c_str());
 }
 
 Json pose_json(const std::optional<geometry::RigidTransform>& pose) {
@@ -97,14 +89,6 @@ guidance::Poses poses_from(JsonReader reader, const std::vector<guidance::Bone>&
   if (by_name) by_name->finish();
   reader.finish();
   return poses;
-}
-
-Expected<geometry::RigidTransform> pose_as_written(const Eigen::Matrix4d& matrix, const std::string& what) {
-  constexpr double rounding = 1e-9;
-  return geometry::rigid_transform_from(matrix, what).map([&](const geometry::RigidTransform& corrected) {
-    return (corrected.matrix() - matrix).cwiseAbs().maxCoeff() > rounding ? corrected
-                                                                          : geometry::exact_pose(matrix);
-  });
 }
 
 Json to_json(const guidance::Poses& poses) {

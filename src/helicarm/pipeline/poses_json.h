@@ -25,10 +25,6 @@ enum class OtherMarker { calibrator, tool };
 /// marker.
 guidance::Poses poses_from(JsonReader reader, const std::vector<guidance::Bone>& bones, OtherMarker other);
 
-/// A rigid motion, corrected to one if it is written with few digits, else unchanged to the last bit, so that
-/// what is written from it is the same again. Fails as `rigid_transform_from`.
-Expected<geometry::RigidTransform> pose_as_written(const Eigen::Matrix4d& matrix, const std::string& what);
-
 Json to_json(const guidance::Poses& poses);
 /// Without the readings that it does not have.
 Json to_json(const guidance::Poses& poses, OtherMarker other);

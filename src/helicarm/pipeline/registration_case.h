@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "helicarm/core/json.h"
 #include "helicarm/geometry/rigid_transform.h"
 #include "helicarm/pipeline/case.h"
 
@@ -22,7 +22,7 @@ struct CaseModel {
   std::optional<Eigen::Vector3d> voxel_mm;  ///< of a TIFF stack
   double tiff_offset_hu = 0;                ///< added to a TIFF stack's values
   std::optional<double> scale_sigma;        ///< relative, of the model's size
-  std::optional<std::string> side;          ///< left or right; not used
+  std::optional<Side> side;                 ///< not used
   std::optional<guidance::Bone> moves_with;
   std::optional<geometry::RigidTransform> world_from_model;  ///< start
   std::optional<std::filesystem::path> landmarks;            ///< start: CSV of points that are also picked
@@ -32,14 +32,17 @@ struct CaseModel {
 /// Bird et al. (2011): the least bridge of bone between a tunnel and the bone's surface, mm.
 inline constexpr double usual_bridge_mm = 2;
 
+enum class TunnelEnd { start, end };
+inline constexpr std::array<std::string_view, 2> tunnel_end_words{"start", "end"};
+
 /// An element of "tunnels" that names a model: a line of its plan as a tunnel with a diameter.
 struct ModelTunnelPlan {
   std::string name;
   std::string model;
-  std::string line;                    ///< in the model's plan; its name unless given
-  std::optional<double> diameter_mm;   ///< nothing: only the axis is compared with the bone
-  double bridge_mm = usual_bridge_mm;  ///< below it is warned
-  bool enters_at_end = false;          ///< the drill enters at the line's end
+  std::string line;                       ///< in the model's plan; its name unless given
+  std::optional<double> diameter_mm;      ///< nothing: only the axis is compared with the bone
+  double bridge_mm = usual_bridge_mm;     ///< below it is warned
+  TunnelEnd enter_at = TunnelEnd::start;  ///< of the line, where the drill enters
 };
 
 /// A case with models. Either all views have cameras of other programs, then the world is theirs and the
@@ -60,20 +63,6 @@ Expected<RegistrationCase> read_registration_case(const std::filesystem::path& p
 
 /// Reads a case that is measured by its calibrator, and its models if it names any. Fails as `read_case`.
 Expected<RegistrationCase> read_measured_case(const std::filesystem::path& path);
-
-/// The list "models"; `folder`: of their files, which may not lie outside. Throws BadInput as
-/// `read_registration_case` fails.
-std::vector<CaseModel> models_from(JsonReader& reader, const std::filesystem::path& folder,
-                                   const std::vector<guidance::Bone>& bones);
-
-/// An element of "models"; its files relative to `folder`.
-Json to_json(const CaseModel& model, const std::filesystem::path& folder);
-
-/// An element of "tunnels" that names a model: model, line, diameter_mm, bridge_mm, enter_at, and bone, with
-/// which a model moves that names none. Throws BadInput: bad_value, also for another bone than the model's,
-/// and for a model without an outline where a diameter is given.
-ModelTunnelPlan model_tunnel_from(JsonReader& reader, const std::string& name, std::vector<CaseModel>& models,
-                                  const std::vector<guidance::Bone>& bones);
 
 /// Whether an image's name holds {frame}.
 bool is_sequence(const RegistrationCase& given);

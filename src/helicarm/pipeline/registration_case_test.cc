@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/pipeline/registration_case.h"
-
 #include <gtest/gtest.h>
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
+#include "helicarm/pipeline/model_description.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -40,7 +39,10 @@ Expected<ModelTunnelPlan> tunnel_from(const char* tunnel, bool outlined = true) 
   return guarded([&] {
     JsonReader reader(json, "tunnels[0]");
     std::vector<CaseModel> models{model};
-    ModelTunnelPlan read = model_tunnel_from(reader, reader.text("name"), models, guidance::knee_bones());
+    ModelTunnelPlan read;
+    read.name = reader.text("name");
+    FromJson codec(reader);
+    description::describe_model_line(codec, read, models, guidance::knee_bones());
     reader.finish();
     return read;
   });
@@ -54,7 +56,7 @@ TEST(ModelTunnel, ALineOfAPlanBecomesATunnelWithADiameter) {
   EXPECT_EQ(tunnel->line, "F");
   EXPECT_EQ(tunnel->diameter_mm, 8);
   EXPECT_EQ(tunnel->bridge_mm, 3);
-  EXPECT_TRUE(tunnel->enters_at_end);
+  EXPECT_EQ(tunnel->enter_at, TunnelEnd::end);
 }
 
 TEST(ModelTunnel, TheUsualBridgeIsAskedForAndNoDiameterIsAssumed) {

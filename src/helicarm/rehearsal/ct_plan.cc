@@ -116,7 +116,7 @@ operation::OperationPlan with_ct_plan(operation::OperationPlan plan,
     model.world_from_model = *simulated.calibrator_from_knee * off * model_from_knee().inverse();
     plan.models.push_back(std::move(model));
     pipeline::ModelTunnelPlan tunnel{bone, bone, bone, options.diameter_mm};
-    tunnel.enters_at_end = starts_in_joint;
+    tunnel.enter_at = enter;
     plan.tunnels.push_back(
         {bone, bone, fmt::format("{}_start", bone), fmt::format("{}_end", bone), enter, tunnel});
   }

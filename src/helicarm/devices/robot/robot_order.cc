@@ -4,10 +4,9 @@
 #include <limits>
 #include <numbers>
 
-#include <fmt/format.h>
-
+#include "helicarm/core/codec.h"
+#include "helicarm/geometry/pose_codec.h"
 #include "helicarm/geometry/rotation.h"
-#include "helicarm/geometry/view_json.h"
 
 namespace helicarm::robot {
 namespace {
@@ -28,82 +27,58 @@ geometry::RigidTransform pose_of(JsonReader& reader, const char* key) {
   return geometry::exact_pose(given);
 }
 
-RobotTool tool_of(JsonReader reader) {
-  RobotTool tool{pose_of(reader, "flange_from_tcp"), reader.number("payload_kg", any)};
-  reader.finish();
-  return tool;
-}
-
-Waypoint waypoint_of(JsonReader& reader) {
-  Waypoint waypoint{pose_of(reader, "base_from_tcp"), reader.number("speed_mm_s", any),
-                    reader.number("acceleration_mm_s2", any)};
-  reader.finish();
-  return waypoint;
-}
-
-Corrections corrections_of(JsonReader reader) {
-  Corrections corrections{reader.integer("most", 0, 20), reader.number("longest_mm", any),
-                          reader.number("widest_deg", any), reader.number("tolerance_mm", any),
-                          reader.number("tolerance_deg", any)};
-  reader.finish();
-  return corrections;
+template <class Codec, class Order>
+void describe(Codec& codec, Order& order) {
+  using geometry::describe_pose;
+  codec.custom(
+      "format", true, {{"const", order_format}}, "of this file",
+      [](JsonReader& reader) { reader.choice("format", {order_format}); },
+      [] { return std::optional<Json>(order_format); });
+  codec.text("name", order.name, "of the order: the tunnel");
+  codec.text("model", order.model, "of the robot");
+  codec.required_object("tool", order.tool, "mounted on the flange", [](auto& inner, auto& tool) {
+    describe_pose(inner, "flange_from_tcp", tool.flange_from_tcp, pose_of, "origin at the tip, z out of it");
+    inner.number("payload_kg", tool.payload_kg, any, "total at the flange");
+  });
+  codec.custom(
+      "start_deg", true, {{"type", "array"}}, "joints at planning",
+      [&](JsonReader& reader) {
+        if constexpr (!std::is_const_v<Order>)
+          order.start = Eigen::Map<const Joints>(reader.numbers("start_deg", 6, any).data()) / in_degrees;
+      },
+      [&] { return std::optional(geometry::json_list(order.start * in_degrees)); });
+  codec.list("waypoints", order.waypoints, true, 100, "in order", [](auto& inner, auto& waypoint) {
+    describe_pose(inner, "base_from_tcp", waypoint.base_from_tcp, pose_of, "of the tip, mm");
+    inner.number("speed_mm_s", waypoint.speed_mm_s, any, "of the tip");
+    inner.number("acceleration_mm_s2", waypoint.acceleration_mm_s2, any, "of the tip");
+  });
+  codec.list("keep_outs", order.keep_outs, false, 100, "forbidden half-spaces",
+             [](auto& inner, auto& plane) { describe_keep_out(inner, plane, any); });
+  codec.required_object("corrections", order.corrections, "by the tracker, at the last waypoint",
+                        [](auto& inner, auto& allowed) {
+                          inner.integer("most", allowed.most, 0, 20, "0: none, the robot's own pose decides");
+                          inner.number("longest_mm", allowed.longest_mm, any,
+                                       "translation of one correction");
+                          inner.number("widest_deg", allowed.widest_deg, any, "rotation of one correction");
+                          inner.number("tolerance_mm", allowed.tolerance_mm, any, "of the tip");
+                          inner.number("tolerance_deg", allowed.tolerance_deg, any, "of the tip");
+                        });
 }
 
 }  // namespace
 
-Json to_json(const KeepOut& keep_out) {
-  return {{"point_in_base", geometry::json_list(keep_out.point_in_base)},
-          {"normal", geometry::json_list(keep_out.normal)}};
-}
-
-KeepOut keep_out_from(JsonReader& reader, Range range) {
-  const KeepOut keep_out{Eigen::Vector3d(reader.numbers("point_in_base", 3, range).data()),
-                         Eigen::Vector3d(reader.numbers("normal", 3, {-1, 1}).data())};
-  if (!(std::abs(keep_out.normal.norm() - 1) < 1e-6))
-    reader.refuse(Reason::bad_value, "normal", "must be of unit length");
-  reader.finish();
-  return keep_out;
-}
-
 Json to_json(const RobotOrder& order) {
-  Json waypoints = Json::array(), keep_outs = Json::array();
-  for (const Waypoint& waypoint : order.waypoints)
-    waypoints.push_back({{"base_from_tcp", geometry::json_rows(waypoint.base_from_tcp.matrix())},
-                         {"speed_mm_s", waypoint.speed_mm_s},
-                         {"acceleration_mm_s2", waypoint.acceleration_mm_s2}});
-  for (const KeepOut& keep_out : order.keep_outs) keep_outs.push_back(to_json(keep_out));
-  const Corrections& corrections = order.corrections;
-  return {{"format", order_format},
-          {"name", order.name},
-          {"model", order.model},
-          {"tool",
-           {{"flange_from_tcp", geometry::json_rows(order.tool.flange_from_tcp.matrix())},
-            {"payload_kg", order.tool.payload_kg}}},
-          {"start_deg", geometry::json_list(order.start * in_degrees)},
-          {"waypoints", waypoints},
-          {"keep_outs", keep_outs},
-          {"corrections",
-           {{"most", corrections.most},
-            {"longest_mm", corrections.longest_mm},
-            {"widest_deg", corrections.widest_deg},
-            {"tolerance_mm", corrections.tolerance_mm},
-            {"tolerance_deg", corrections.tolerance_deg}}}};
+  ToJson codec;
+  describe(codec, order);
+  return std::move(codec.json);
 }
 
 Expected<RobotOrder> robot_order_from(const Json& json, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(json, origin);
-    reader.choice("format", {order_format});
+    FromJson codec(reader);
     RobotOrder order;
-    order.name = reader.text("name");
-    order.model = reader.text("model");
-    order.tool = tool_of(reader.object("tool"));
-    order.start = Eigen::Map<const Joints>(reader.numbers("start_deg", 6, any).data()) / in_degrees;
-    for (JsonReader& waypoint : reader.objects("waypoints", true, 100))
-      order.waypoints.push_back(waypoint_of(waypoint));
-    for (JsonReader& keep_out : reader.objects("keep_outs", false, 100))
-      order.keep_outs.push_back(keep_out_from(keep_out, any));
-    order.corrections = corrections_of(reader.object("corrections"));
+    describe(codec, order);
     reader.finish();
     return order;
   });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -28,9 +29,16 @@ struct KeepOut {
   Eigen::Vector3d normal;         ///< unit
 };
 
-Json to_json(const KeepOut& keep_out);
-/// Coordinates in this range; a normal without unit length is bad_value. Throws as JsonReader.
-KeepOut keep_out_from(JsonReader& reader, Range range);
+/// Coordinates in this range; a normal without unit length is bad_value.
+template <class Codec, class Plane>
+void describe_keep_out(Codec& codec, Plane& plane, Range range) {
+  codec.vector("point_in_base", plane.point_in_base, range, "on the plane, mm");
+  codec.vector("normal", plane.normal, {-1, 1}, "of unit length, towards where arm and tool may be");
+  codec.check([&](JsonReader& reader) {
+    if (!(std::abs(plane.normal.norm() - 1) < 1e-6))
+      reader.refuse(Reason::bad_value, "normal", "must be of unit length");
+  });
+}
 
 /// Limits and tolerances of corrections by the tracker at the last waypoint.
 struct Corrections {
