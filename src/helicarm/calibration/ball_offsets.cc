@@ -4,8 +4,6 @@
 #include <cmath>
 #include <map>
 
-#include <Eigen/Cholesky>
-
 #include "helicarm/core/statistics.h"
 
 namespace helicarm::calibration {
@@ -40,13 +38,9 @@ std::vector<ViewProblem> with_tolerance(std::vector<ViewProblem> problems, doubl
   return problems;
 }
 
-double log_determinant(const Eigen::MatrixXd& covariance) {
-  return 2 * covariance.llt().matrixLLT().diagonal().array().log().sum();
-}
-
 /// Laplace approximation, up to a common constant.
 double log_likelihood(const Refinement& fit) {
-  return -0.5 * fit.chi2 + 0.5 * log_determinant(fit.covariance);
+  return -0.5 * fit.chi2 + 0.5 * fit.covariance.log_determinant;
 }
 
 /// For independent errors of the image points, all inflated by one factor.
@@ -89,7 +83,7 @@ double rms_offset_mm(const std::vector<ViewProblem>& problems, const Refinement&
       if (!observation.offset_root.isZero(0))
         squared[observation.ball] =
             (observation.offset_root *
-             fit.variations.segment(observation.first_offset, observation.offset_root.cols()))
+             fit.common.segment(observation.first_offset, observation.offset_root.cols()))
                 .squaredNorm();
   double sum = 0;
   for (const auto& [ball, squared_length] : squared) sum += squared_length / double(squared.size());

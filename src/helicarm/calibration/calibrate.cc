@@ -184,11 +184,15 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
   const Refinement& fit = clean->fit;
   result.chi2 = fit.chi2;
   result.dof = fit.dof;
-  const Eigen::Index parameters = view_parameters * Eigen::Index(views.size());
-  Eigen::MatrixXd by_step = Eigen::MatrixXd::Zero(parameters, parameters);
-  for (std::size_t i = 0; i < views.size(); ++i) block_of(by_step, i) = parameters_by_step(fit.views[i]);
-  result.joint_covariance =
-      by_step * fit.covariance.topLeftCorner(parameters, parameters) * by_step.transpose();
+  result.joint_covariance = fit.covariance_of_steps();
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const auto of_view = parameters_by_step(fit.views[i]);
+    const auto at = view_parameters * Eigen::Index(i);
+    auto rows = result.joint_covariance.middleRows<view_parameters>(at);
+    rows = (of_view * rows).eval();
+    auto columns = result.joint_covariance.middleCols<view_parameters>(at);
+    columns = (columns * of_view.transpose()).eval();
+  }
   for (const auto& [view, observation] : clean->removed) mark_rejected(result.fiducials[view], observation);
 
   result.image_residuals = image_residuals(clean->problems, fit);

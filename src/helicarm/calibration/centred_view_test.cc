@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/calibration/centred_view.h"
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include "helicarm/calibration/priors.h"
@@ -102,37 +103,50 @@ TEST(ShrunkToPrior, TakesTheKnownIntrinsicsAndKeepsTheImages) {
 }
 
 TEST(PriorRows, JacobianAgreesWithDifferences) {
-  geometry::View other = example;
-  other.intrinsics = {6100, 6150, 515, 505, 0};
-  const std::vector<CentredView> views{centred(example, centre), centred(other, centre)};
+  const CentredView view = centred(example, centre);
   const geometry::IntrinsicsPrior prior{6000, Eigen::Vector2d(512, 512), 5, geometry::NormalPrior{1, 0.01},
                                         geometry::NormalPrior{0, 0.01}};
-  const std::vector<geometry::IntrinsicsPrior> priors{prior, prior};
   const CArmPrior c_arm{IntrinsicsVariation{10, 2}, IntrinsicsVariation{7, 4}};
-  const PriorRows rows = prior_rows(views, priors, c_arm);
-  EXPECT_EQ(rows.residuals.size(), 2 * (2 + 1 + 2));
-  for (int i = 0; i < 2 * view_parameters; ++i) {
-    const double size = step_sizes(i % view_parameters);
-    auto up = views, down = views;
-    up[std::size_t(i / view_parameters)] =
-        moved(views[std::size_t(i / view_parameters)], size * ViewStep::Unit(i % view_parameters));
-    down[std::size_t(i / view_parameters)] =
-        moved(views[std::size_t(i / view_parameters)], -size * ViewStep::Unit(i % view_parameters));
-    const Eigen::VectorXd slope =
-        (prior_rows(up, priors, c_arm).residuals - prior_rows(down, priors, c_arm).residuals) / (2 * size);
-    EXPECT_LT((slope - rows.jacobian.col(i)).norm(), 1e-5 * (1 + rows.jacobian.col(i).norm())) << i;
+  const CArmDeviation deviation(0.5, -1, 2);
+  const PriorRows rows = prior_rows(view, prior, c_arm, deviation);
+  EXPECT_EQ(rows.residuals.size(), 2 + 1 + 2);
+  const auto expect_slope = [](const PriorRows& up, const PriorRows& down, double size, const auto& column) {
+    const Eigen::VectorXd slope = (up.residuals - down.residuals) / (2 * size);
+    EXPECT_LT((slope - column).norm(), 1e-5 * (1 + column.norm()));
+  };
+  for (int i = 0; i < view_parameters; ++i) {
+    const double size = step_sizes(i);
+    expect_slope(prior_rows(moved(view, size * ViewStep::Unit(i)), prior, c_arm, deviation),
+                 prior_rows(moved(view, -size * ViewStep::Unit(i)), prior, c_arm, deviation), size,
+                 rows.by_step.col(i));
   }
+  for (int i = 0; i < 3; ++i)
+    expect_slope(prior_rows(view, prior, c_arm, deviation + 0.1 * CArmDeviation::Unit(i)),
+                 prior_rows(view, prior, c_arm, deviation - 0.1 * CArmDeviation::Unit(i)), 0.1,
+                 rows.by_c_arm.col(i));
+}
+
+/// Least sum of squares over the C-arm's deviation, its own prior included.
+double least_squares_of(const std::vector<PriorRows>& views) {
+  Eigen::Matrix3d information = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  double chi2 = 0;
+  for (const PriorRows& rows : views) {
+    information += rows.by_c_arm.transpose() * rows.by_c_arm;
+    gradient += rows.by_c_arm.transpose() * rows.residuals;
+    chi2 += rows.residuals.squaredNorm();
+  }
+  return chi2 - gradient.dot(information.inverse() * gradient);
 }
 
 TEST(PriorRows, CommonVariationOfTwoViewsCountsOnce) {
-  const std::vector<CentredView> views{centred(example, centre), centred(example, centre)};
   geometry::IntrinsicsPrior prior{6200, std::nullopt, 4};
   prior.skew.reset();
   const double first = (6100 - 6200) / 4.0;
-  const PriorRows rows =
-      prior_rows(views, std::vector{prior, prior}, {IntrinsicsVariation{10, 2}, std::nullopt});
+  const PriorRows rows = prior_rows(centred(example, centre), prior,
+                                    {IntrinsicsVariation{10, 2}, std::nullopt}, CArmDeviation::Zero());
   // Both deviate by the same amount: one common cause.
-  EXPECT_NEAR(rows.residuals.squaredNorm(), first * first / (100 + 4.0 / 2), 1e-9);
+  EXPECT_NEAR(least_squares_of({rows, rows}), first * first / (100 + 4.0 / 2), 1e-9);
 }
 
 TEST(PriorRows, MirroredViewReversesTheVariation) {
@@ -143,9 +157,11 @@ TEST(PriorRows, MirroredViewReversesTheVariation) {
   plain.intrinsics.v0 = mirrored.intrinsics.v0 = 512;
   geometry::IntrinsicsPrior prior{std::nullopt, Eigen::Vector2d(512, 512), 4};
   prior.skew.reset();
-  const PriorRows rows = prior_rows(std::vector{centred(plain, centre), centred(mirrored, centre)},
-                                    std::vector{prior, prior}, {std::nullopt, IntrinsicsVariation{7, 4}});
-  EXPECT_NEAR(rows.residuals.squaredNorm(), 7.5 * 7.5 / (49 + 16.0 / 2), 1e-9);
+  const CArmPrior c_arm{std::nullopt, IntrinsicsVariation{7, 4}};
+  const auto rows_of = [&](const geometry::View& view) {
+    return prior_rows(centred(view, centre), prior, c_arm, CArmDeviation::Zero());
+  };
+  EXPECT_NEAR(least_squares_of({rows_of(plain), rows_of(mirrored)}), 7.5 * 7.5 / (49 + 16.0 / 2), 1e-9);
 }
 
 }  // namespace

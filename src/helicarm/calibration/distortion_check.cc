@@ -43,30 +43,26 @@ Extent extent_of(const ViewProblem& problem) {
   return extent;
 }
 
-/// The modes of all views as columns of the fit's rows.
-Eigen::MatrixXd distortion_columns(const std::vector<ViewProblem>& problems, const Refinement& fit) {
-  Eigen::MatrixXd columns =
-      Eigen::MatrixXd::Zero(fit.jacobian.rows(), modes_of_view * Eigen::Index(problems.size()));
+/// The view's modes as columns of all views'.
+Eigen::MatrixXd distortion_columns(const std::vector<ViewProblem>& problems, std::size_t view) {
+  const std::vector<Observation>& observations = problems[view].observations;
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(2 * Eigen::Index(observations.size()),
+                                                  modes_of_view * Eigen::Index(problems.size()));
+  const Extent extent = extent_of(problems[view]);
   Eigen::Index row = 0;
-  for (std::size_t i = 0; i < problems.size(); ++i) {
-    const Extent extent = extent_of(problems[i]);
-    for (const Observation& observation : problems[i].observations) {
-      columns.block<2, modes_of_view>(row, modes_of_view * Eigen::Index(i)) =
-          modes_at((observation.pixel - extent.middle) / extent.radius) / observation.sigma_px;
-      row += 2;
-    }
+  for (const Observation& observation : observations) {
+    columns.block<2, modes_of_view>(row, modes_of_view * Eigen::Index(view)) =
+        modes_at((observation.pixel - extent.middle) / extent.radius) / observation.sigma_px;
+    row += 2;
   }
   return columns;
 }
 
 /// Decrease of chi2 by the columns, to first order; `prior_sigma_px` of each amount.
-double chi2_gain(const Refinement& fit, const Eigen::MatrixXd& columns, double prior_sigma_px) {
-  // Only the part that views and other unknowns cannot absorb counts.
-  const Eigen::MatrixXd own =
-      columns - fit.jacobian * (fit.covariance * (fit.jacobian.transpose() * columns));
-  Eigen::MatrixXd information = columns.transpose() * own;
+double chi2_gain(const Refinement& fit, const std::vector<Eigen::MatrixXd>& columns, double prior_sigma_px) {
+  Eigen::MatrixXd information = information_beyond(fit, columns);
   information.diagonal().array() += 1 / (prior_sigma_px * prior_sigma_px);
-  const Eigen::VectorXd slope = own.transpose() * fit.residuals;
+  const Eigen::VectorXd slope = slope_along(fit, columns);
   return slope.dot(geometry::solve_spd(information, slope).solution.col(0));
 }
 
@@ -89,7 +85,9 @@ std::optional<Warning> check_distortion(const std::vector<ViewFiducials>& views,
   const auto modes = double(modes_of_view) * double(views.size());
   const double dof = fit->dof - modes;
   if (dof < least_dof) return std::nullopt;
-  const double gain = chi2_gain(*fit, distortion_columns(problems, *fit), prior_sigma_px);
+  std::vector<Eigen::MatrixXd> columns;
+  for (std::size_t i = 0; i < problems.size(); ++i) columns.push_back(distortion_columns(problems, i));
+  const double gain = chi2_gain(*fit, columns, prior_sigma_px);
   const double left = fit->chi2 - gain;
   if (gain / modes < least_ratio * std::max(1.0, left / dof)) return std::nullopt;
   return Warning{

@@ -30,59 +30,41 @@ Quantities quantities_of(const CentredView& view) {
 
 class Rows {
  public:
-  explicit Rows(std::span<const CentredView> views) : columns_(view_parameters * Eigen::Index(views.size())) {
-    for (const CentredView& view : views) quantities_.push_back(quantities_of(view));
-  }
+  explicit Rows(const CentredView& view) : quantities_(quantities_of(view)) {}
 
-  void add_own(std::size_t view, Eigen::Index which, const geometry::NormalPrior& normal_prior) {
-    residuals_.push_back((quantities_[view].values(which) - normal_prior.value) / normal_prior.sigma);
-    rows_.emplace_back(Eigen::RowVectorXd::Zero(columns_))
-        .segment<view_parameters>(view_parameters * Eigen::Index(view)) =
-        quantities_[view].by_step.row(which) / normal_prior.sigma;
+  void add_own(Eigen::Index which, const geometry::NormalPrior& normal_prior) {
+    add(which, normal_prior.value, normal_prior.sigma);
   }
-
-  /// Deviations of a quantity from nominal in several views, of covariance common^2 + of_view^2 [i = j].
-  struct Nominal {
-    std::size_t view;
-    double value;
-    double unit;
-  };
-  void add_common(const std::vector<Nominal>& nominal, Eigen::Index which,
-                  const IntrinsicsVariation& variation) {
-    const auto count = Eigen::Index(nominal.size());
-    Eigen::VectorXd residuals(count);
-    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(count, columns_);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const auto& [view, value, unit] = nominal[std::size_t(i)];
-      residuals(i) = (quantities_[view].values(which) - value) / unit;
-      rows.row(i).segment<view_parameters>(view_parameters * Eigen::Index(view)) =
-          quantities_[view].by_step.row(which) / unit;
-    }
-    // The covariance has two eigenvalues: one along equal deviations, one across them.
-    const double along = 1 / std::hypot(variation.of_view, std::sqrt(double(count)) * variation.common);
-    const double across = 1 / variation.of_view;
-    Eigen::MatrixXd whitens = Eigen::MatrixXd::Constant(count, count, (along - across) / double(count));
-    whitens.diagonal().array() += across;
-    residuals = (whitens * residuals).eval();
-    rows = (whitens * rows).eval();
-    for (Eigen::Index i = 0; i < count; ++i) {
-      residuals_.push_back(residuals(i));
-      rows_.emplace_back(rows.row(i));
-    }
+  /// `unit`: of the view, per mm on the detector; `share`: the C-arm's deviation of this quantity.
+  void add_of_c_arm(Eigen::Index which, double nominal, double unit, const IntrinsicsVariation& variation,
+                    const CArmDeviation& deviation, Eigen::Index share) {
+    add(which, nominal, unit * variation.of_view);
+    by_c_arm_.back()[share] = -variation.common / variation.of_view;
+    residuals_.back() += by_c_arm_.back()[share] * deviation[share];
   }
 
   PriorRows finish() const {
-    PriorRows result{Eigen::Map<const Eigen::VectorXd>(residuals_.data(), Eigen::Index(residuals_.size())),
-                     Eigen::MatrixXd(Eigen::Index(rows_.size()), columns_)};
-    for (std::size_t i = 0; i < rows_.size(); ++i) result.jacobian.row(Eigen::Index(i)) = rows_[i];
-    return result;
+    const auto count = Eigen::Index(residuals_.size());
+    PriorRows rows{Eigen::VectorXd(count), {count, view_parameters}, {count, 3}};
+    for (Eigen::Index i = 0; i < count; ++i) {
+      rows.residuals[i] = residuals_[std::size_t(i)];
+      rows.by_step.row(i) = by_step_[std::size_t(i)];
+      rows.by_c_arm.row(i) = by_c_arm_[std::size_t(i)];
+    }
+    return rows;
   }
 
  private:
-  Eigen::Index columns_;
-  std::vector<Quantities> quantities_;
+  void add(Eigen::Index which, double value, double sigma) {
+    residuals_.push_back((quantities_.values[which] - value) / sigma);
+    by_step_.emplace_back(quantities_.by_step.row(which) / sigma);
+    by_c_arm_.emplace_back(Eigen::RowVector3d::Zero());
+  }
+
+  Quantities quantities_;
   std::vector<double> residuals_;
-  std::vector<Eigen::RowVectorXd> rows_;
+  std::vector<Eigen::RowVector<double, view_parameters>> by_step_;
+  std::vector<Eigen::RowVector3d> by_c_arm_;
 };
 
 }  // namespace
@@ -104,26 +86,19 @@ CentredView shrunk_to_prior(CentredView view, const geometry::IntrinsicsPrior& p
   return view;
 }
 
-PriorRows prior_rows(std::span<const CentredView> views, std::span<const geometry::IntrinsicsPrior> priors,
-                     const CArmPrior& c_arm) {
-  Rows rows(views);
-  std::vector<Rows::Nominal> focals, principals_u, principals_v;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const geometry::IntrinsicsPrior& prior = priors[i];
-    if (prior.aspect) rows.add_own(i, aspect, *prior.aspect);
-    if (prior.skew) rows.add_own(i, skew, *prior.skew);
-    if (prior.focal_px) focals.push_back({i, *prior.focal_px, prior.unit_px});
-    if (!prior.principal_px) continue;
-    // A mirrored image reverses the C-arm's deviation along u.
-    const double hand = views[i].ax < 0 ? -1 : 1;
-    principals_u.push_back({i, prior.principal_px->x(), hand * prior.unit_px});
-    principals_v.push_back({i, prior.principal_px->y(), prior.unit_px});
-  }
-  if (c_arm.focal) rows.add_common(focals, focal, *c_arm.focal);
-  if (c_arm.principal) {
-    rows.add_common(principals_u, principal_u, *c_arm.principal);
-    rows.add_common(principals_v, principal_v, *c_arm.principal);
-  }
+PriorRows prior_rows(const CentredView& view, const geometry::IntrinsicsPrior& prior, const CArmPrior& c_arm,
+                     const CArmDeviation& deviation) {
+  Rows rows(view);
+  if (prior.aspect) rows.add_own(aspect, *prior.aspect);
+  if (prior.skew) rows.add_own(skew, *prior.skew);
+  if (c_arm.focal && prior.focal_px)
+    rows.add_of_c_arm(focal, *prior.focal_px, prior.unit_px, *c_arm.focal, deviation, 0);
+  if (!c_arm.principal || !prior.principal_px) return rows.finish();
+  // A mirrored image reverses the C-arm's deviation along u.
+  const double hand = view.ax < 0 ? -1 : 1;
+  rows.add_of_c_arm(principal_u, prior.principal_px->x(), hand * prior.unit_px, *c_arm.principal, deviation,
+                    1);
+  rows.add_of_c_arm(principal_v, prior.principal_px->y(), prior.unit_px, *c_arm.principal, deviation, 2);
   return rows.finish();
 }
 

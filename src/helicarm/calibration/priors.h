@@ -2,7 +2,6 @@
 #pragma once
 
 #include <optional>
-#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -39,13 +38,18 @@ struct CommonPrior {
 /// whose intrinsics are poorly constrained.
 CentredView shrunk_to_prior(CentredView view, const geometry::IntrinsicsPrior& prior);
 
-/// The priors as whitened rows of a least-squares problem in the steps of all views.
+/// Deviations from nominal that all views of a C-arm share, in their standard deviations: of the focal length
+/// and of the principal point along u and v.
+using CArmDeviation = Eigen::Vector3d;
+
+/// A view's priors as whitened rows of a least-squares problem in its step and the C-arm's deviation.
 struct PriorRows {
   Eigen::VectorXd residuals;
-  Eigen::MatrixXd jacobian;
+  Eigen::Matrix<double, Eigen::Dynamic, view_parameters> by_step;
+  Eigen::Matrix<double, Eigen::Dynamic, 3> by_c_arm;
 };
 
-PriorRows prior_rows(std::span<const CentredView> views, std::span<const geometry::IntrinsicsPrior> priors,
-                     const CArmPrior& c_arm);
+PriorRows prior_rows(const CentredView& view, const geometry::IntrinsicsPrior& prior, const CArmPrior& c_arm,
+                     const CArmDeviation& deviation);
 
 }  // namespace helicarm::calibration

@@ -7,6 +7,7 @@
 
 #include "helicarm/calibration/priors.h"
 #include "helicarm/core/failure.h"
+#include "helicarm/geometry/arrow.h"
 
 namespace helicarm::calibration {
 
@@ -32,18 +33,37 @@ struct ViewProblem {
 /// Number of the map's independent unit errors per axis.
 Eigen::Index map_modes(const ViewProblem& problem);
 
-/// The joint fit of all views. Rows, each over its standard deviation: u and v of the observations, view by
-/// view, then the priors. Columns: the steps of all views, then, in standard deviations, the fiducials'
-/// offsets from the file if there is a tolerance, and each view's map errors in u and in v.
+/// A view's rows, each over its standard deviation: u and v of the observations, then its priors.
+struct ViewRows {
+  Eigen::VectorXd residuals;
+  Eigen::MatrixXd by_own;     ///< its step, then its map's unit errors in u and in v
+  Eigen::MatrixXd by_common;  ///< as `Refinement::common`
+};
+
+/// The joint fit of all views: an arrow of blocks, a view each. Its unknowns but the views' steps are errors
+/// in standard deviations, which have unit priors beside the rows.
 struct Refinement {
   std::vector<CentredView> views;
-  Eigen::VectorXd variations;  ///< offsets of fiducials, errors of maps
-  Eigen::VectorXd residuals;
-  Eigen::MatrixXd jacobian;
-  Eigen::MatrixXd covariance;  ///< of all columns, for the given sigmas
+  std::vector<Eigen::VectorXd> map_errors;  ///< of each view, in u and in v
+  Eigen::VectorXd common;  ///< the fiducials' offsets from the file, then the `CArmDeviation`
+  std::vector<ViewRows> rows;
+  geometry::ArrowCovariance covariance;  ///< of all unknowns, for the given sigmas
   double chi2 = 0;
   int dof = 0;
+
+  Eigen::Index offsets() const { return common.size() - CArmDeviation::SizeAtCompileTime; }
+  /// Of the views' steps.
+  Eigen::MatrixXd covariance_of_steps() const;
+  /// Of rows of a view, `by_own` and `by_common`: their part that follows the common unknowns.
+  Eigen::MatrixXd by_common_alone(std::size_t view, const Eigen::MatrixXd& by_own,
+                                  const Eigen::MatrixXd& by_common) const;
 };
+
+/// M^T (I - H) M for columns M of further effects on the observations, given view by view, with H the
+/// projection onto all unknowns of the fit: what these cannot absorb counts.
+Eigen::MatrixXd information_beyond(const Refinement& fit, const std::vector<Eigen::MatrixXd>& columns);
+/// M^T r, at the optimum.
+Eigen::VectorXd slope_along(const Refinement& fit, const std::vector<Eigen::MatrixXd>& columns);
 
 /// Maximum likelihood by Levenberg-Marquardt. Refuses `uncertain` if the observations do not constrain the
 /// views.

@@ -40,22 +40,21 @@ Eigen::Vector3d centre_of(const std::vector<ViewProblem>& problems) {
 Strain strain_of(const std::vector<ViewProblem>& problems, const Refinement& fit) {
   const auto modes = strain_modes();
   const Eigen::Vector3d centre = centre_of(problems);
-  Eigen::MatrixXd by_strain = Eigen::MatrixXd::Zero(fit.jacobian.rows(), 5);
-  Eigen::Index row = 0;
-  for (std::size_t i = 0; i < problems.size(); ++i)
+  std::vector<Eigen::MatrixXd> by_strain;  // of each view's observations
+  for (std::size_t i = 0; i < problems.size(); ++i) {
+    Eigen::MatrixXd& columns = by_strain.emplace_back(2 * problems[i].observations.size(), modes.size());
+    Eigen::Index row = 0;
     for (const Observation& observation : problems[i].observations) {
       const ImageCoordinates image = image_of(fit.views[i], observation.point_in_world);
       for (std::size_t k = 0; k < modes.size(); ++k)
-        by_strain.block<2, 1>(row, Eigen::Index(k)) =
+        columns.block<2, 1>(row, Eigen::Index(k)) =
             image.by_point * (modes[k] * (observation.point_in_world - centre)) / observation.sigma_px;
       row += 2;
     }
-  // Only the part of a strain that views and other unknowns cannot absorb counts.
-  const Eigen::MatrixXd own =
-      by_strain - fit.jacobian * (fit.covariance * (fit.jacobian.transpose() * by_strain));
-  Eigen::Matrix<double, 5, 5> information = by_strain.transpose() * own;
+  }
+  Eigen::Matrix<double, 5, 5> information = information_beyond(fit, by_strain);
   information.diagonal().array() += 1 / (prior_sigma * prior_sigma);
-  const Eigen::Vector<double, 5> slope = own.transpose() * fit.residuals;
+  const Eigen::Vector<double, 5> slope = slope_along(fit, by_strain);
   const Eigen::Vector<double, 5> amounts = -geometry::solve_spd(information, slope).solution;
   Strain result;
   for (std::size_t k = 0; k < modes.size(); ++k) result.strain += amounts[Eigen::Index(k)] * modes[k];

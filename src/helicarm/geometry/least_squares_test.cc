@@ -43,7 +43,7 @@ Equations linearise_misra1a(const Eigen::Vector2d& b) {
 Eigen::Vector2d added(const Eigen::Vector2d& b, const Eigen::Vector2d& step) { return b + step; }
 
 TEST(LeastSquares, CertifiedParametersAreFoundFromADistantStart) {
-  const auto fit = fit_least_squares<2>(Eigen::Vector2d(500, 1e-4), linearise_misra1a, added);
+  const auto fit = fit_least_squares(Eigen::Vector2d(500, 1e-4), linearise_misra1a, added);
   ASSERT_TRUE(fit);
   EXPECT_TRUE(fit->converged);
   EXPECT_NEAR(fit->state[0], 2.3894212918e2, 1e-6);
@@ -52,7 +52,7 @@ TEST(LeastSquares, CertifiedParametersAreFoundFromADistantStart) {
 }
 
 TEST(LeastSquares, StandardErrorsFollowFromTheInformation) {
-  const auto fit = fit_least_squares<2>(Eigen::Vector2d(250, 5e-4), linearise_misra1a, added);
+  const auto fit = fit_least_squares(Eigen::Vector2d(250, 5e-4), linearise_misra1a, added);
   ASSERT_TRUE(fit);
   const Eigen::Matrix2d covariance = fit->equations.information.inverse() * fit->equations.chi2 / 12;
   EXPECT_NEAR(std::sqrt(covariance(0, 0)), 2.7070075241, 1e-6);
@@ -60,7 +60,7 @@ TEST(LeastSquares, StandardErrorsFollowFromTheInformation) {
 }
 
 TEST(LeastSquares, AStartThatIsNotAllowedGivesNothing) {
-  EXPECT_FALSE(fit_least_squares<2>(
+  EXPECT_FALSE(fit_least_squares(
       Eigen::Vector2d::Zero().eval(), [](const Eigen::Vector2d&) { return Equations{}; }, added));
 }
 
@@ -73,7 +73,7 @@ TEST(LeastSquares, AStepToAStateThatIsNotAllowedIsShortened) {
                               Eigen::Matrix<double, 1, 1>(slope * residual), residual * residual};
   };
   const auto moved = [](double x, const Eigen::Matrix<double, 1, 1>& step) { return x + step[0]; };
-  const auto fit = fit_least_squares<1>(5.0, linearise, moved);
+  const auto fit = fit_least_squares(5.0, linearise, moved);
   ASSERT_TRUE(fit);
   EXPECT_TRUE(fit->converged);
   EXPECT_NEAR(fit->state, 1, 1e-6);
@@ -82,7 +82,7 @@ TEST(LeastSquares, AStepToAStateThatIsNotAllowedIsShortened) {
 TEST(LeastSquares, TheIterationLimitIsReported) {
   LeastSquaresOptions options;
   options.max_iterations = 2;
-  const auto fit = fit_least_squares<2>(Eigen::Vector2d(500, 1e-4), linearise_misra1a, added, options);
+  const auto fit = fit_least_squares(Eigen::Vector2d(500, 1e-4), linearise_misra1a, added, options);
   ASSERT_TRUE(fit);
   EXPECT_FALSE(fit->converged);
 }

@@ -125,7 +125,7 @@ Expected<Intersection> intersect(std::span<const RayObservation> ray_observation
     return NormalEquations<3>{jacobian.transpose().lazyProduct(jacobian),
                               jacobian.transpose().lazyProduct(residual), residual.squaredNorm()};
   };
-  const auto fit = fit_least_squares<3>(
+  const auto fit = fit_least_squares(
       *start, linearise,
       [](const Eigen::Vector3d& point, const Eigen::Vector3d& step) { return point + step; });
   if (!fit->converged)

@@ -56,7 +56,7 @@ FusedPose fuse(const std::vector<SeenFacet>& seen) {
     }
     return std::optional(equations);
   };
-  const auto fit = geometry::fit_least_squares<6>(
+  const auto fit = geometry::fit_least_squares(
       seen[0].tracker_from_facet * seen[0].calibrator_from_facet.inverse(), linearise, geometry::moved);
   if (!fit->converged)
     throw BadInput(Reason::uncertain, "the mean pose of the calibrator's facets does not converge");

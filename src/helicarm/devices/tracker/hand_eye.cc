@@ -131,7 +131,7 @@ Expected<HandEye> refined(std::span<const HandEyePair> pairs, double sigma_mm, d
     to.tracker_from_base = geometry::moved(from.tracker_from_base, step.tail<6>());
     return to;
   };
-  auto fit = geometry::fit_least_squares<12>(start, linearise, stepped);
+  auto fit = geometry::fit_least_squares(start, linearise, stepped);
   if (!fit->converged) return fail(Reason::uncertain, "the hand-eye calibration does not converge");
   fit->state.covariance = fit->equations.information.ldlt().solve(Matrix12::Identity());
   return fit->state;

@@ -147,7 +147,7 @@ Fit fit_from(const geometry::RigidTransform& start, const Places& places, const 
     return Mount{geometry::moved(mount.calibrator_from_facet, step.head<6>()),
                  mount.tip_shift + step.tail<3>()};
   };
-  const auto found = geometry::fit_least_squares<parameters>(Mount{start}, linearise, moved);
+  const auto found = geometry::fit_least_squares(Mount{start}, linearise, moved);
   return {found->state, found->equations.information, found->equations.chi2};
 }
 
