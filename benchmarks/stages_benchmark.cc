@@ -5,9 +5,13 @@
 
 #include <benchmark/benchmark.h>
 
+#include "helicarm/calibration/calibrate.h"
 #include "helicarm/core/failure.h"
+#include "helicarm/core/random.h"
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/label_fiducials.h"
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/phantom/calibrator.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/locate_case.h"
 #include "helicarm/pipeline/measure.h"
@@ -96,6 +100,36 @@ void run_whole_case(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(pipeline::measure(simulated_case(), options));
 }
 BENCHMARK(run_whole_case)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+/// Joint calibration of labelled views about the calibrator, with noise and the priors of a C-arm.
+void calibrate_views(benchmark::State& state) {
+  const phantom::Calibrator calibrator = phantom::udcsc();
+  calibration::CalibrationOptions options;
+  options.common.c_arm = {calibration::IntrinsicsVariation{2, 0.5}, calibration::IntrinsicsVariation{2, 0.5}};
+  std::vector<calibration::ViewFiducials> views;
+  RandomStream random(1, 0);
+  const Eigen::Vector3d middle = phantom::middle_of(calibrator);
+  for (int i = 0; i < state.range(0); ++i) {
+    const Eigen::Matrix3d rotation = geometry::rotation_from_euler(0.06 * i, 0.1, 0);
+    const geometry::View view{{6000, 6000, 512, 512, 0},
+                              {rotation, Eigen::Vector3d(0, 0, 800) - rotation * middle}};
+    calibration::ViewFiducials& of_view = views.emplace_back();
+    of_view.name = "V" + std::to_string(i);
+    of_view.prior.focal_px = 6000;
+    of_view.prior.unit_px = 6.7;
+    for (const phantom::CalibratorBall& ball : calibrator.balls) {
+      fiducials::Fiducial& fiducial = of_view.fiducials.emplace_back();
+      fiducial.label = ball.label;
+      fiducial.centre_in_calibrator = ball.centre_in_calibrator;
+      fiducial.status = fiducials::FiducialStatus::used;
+      fiducial.sigma_px = 0.05;
+      fiducial.uv =
+          view.project(ball.centre_in_calibrator) + 0.05 * Eigen::Vector2d(random.normal(), random.normal());
+    }
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(calibration::calibrate(views, options));
+}
+BENCHMARK(calibrate_views)->Arg(2)->Arg(10)->Arg(50)->Arg(100)->Arg(400)->Unit(benchmark::kMillisecond);
 
 /// Ten picked points against a held calibration: observation, intersection and covariance.
 void locate_ten_picks(benchmark::State& state) {

@@ -168,12 +168,11 @@ class Reduced {
   std::vector<std::vector<std::size_t>> indices_;  ///< in the problems before any removal
 };
 
-/// The outliers of a fit, to first order; at most `most` removals are tried.
-std::vector<ObservationIndex> outliers_of(const CleanFit& at, double probability, std::size_t least_kept,
-                                          std::size_t most) {
+/// The observations up to the first significant removal, to first order; none, if none of `most` is.
+std::vector<ObservationIndex> next_outliers(const CleanFit& at, double probability, std::size_t least_kept,
+                                            std::size_t most) {
   Removals removals(at.problems, at.fit, least_kept);
   std::vector<ObservationIndex> removed;
-  std::size_t significant = 0;
   double chi2 = at.fit.chi2;
   int dof = at.fit.dof;
   while (removed.size() < most) {
@@ -182,11 +181,10 @@ std::vector<ObservationIndex> outliers_of(const CleanFit& at, double probability
     removed.push_back(removals.index(worst->observation));
     chi2 -= worst->decrease;
     dof -= 2;
-    if (p_value(worst->decrease, chi2, dof) < probability) significant = removed.size();
+    if (p_value(worst->decrease, chi2, dof) < probability) return removed;
     if (!removals.remove(worst->observation)) break;
   }
-  removed.resize(significant);
-  return removed;
+  return {};
 }
 
 }  // namespace
@@ -201,7 +199,7 @@ Expected<CleanFit> refine_without_outliers(const std::vector<ViewProblem>& probl
   for (const ViewProblem& problem : problems) left += problem.observations.size();
   left /= 3;
   while (probability > 0 && left > 0) {
-    const auto outliers = outliers_of(reduced.clean(), probability, least_kept, left);
+    const auto outliers = next_outliers(reduced.clean(), probability, least_kept, left);
     if (outliers.empty() || !reduced.remove(outliers, common)) break;
     left -= outliers.size();
   }

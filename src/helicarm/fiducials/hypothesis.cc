@@ -92,13 +92,21 @@ std::vector<int> assign(const Scene& scene, const geometry::View& view, double g
     int ball;
     int candidate;
   };
+  // By column: those within the gate lie side by side.
+  std::vector<std::pair<double, std::size_t>> columns;
+  columns.reserve(scene.candidates.size());
+  for (std::size_t i = 0; i < scene.candidates.size(); ++i)
+    columns.emplace_back(scene.candidates[i].uv.x(), i);
+  std::sort(columns.begin(), columns.end());
   std::vector<Pair> pairs;
   pairs.reserve(scene.balls.size() + scene.candidates.size());
   for (std::size_t k = 0; k < scene.balls.size(); ++k) {
     const double depth = view.depth(scene.balls[k].centre);
     if (depth <= 0) continue;
     const Eigen::Vector2d uv = view.project(scene.balls[k].centre);
-    for (std::size_t i = 0; i < scene.candidates.size(); ++i) {
+    auto near = std::lower_bound(columns.begin(), columns.end(), std::pair(uv.x() - gate_px, std::size_t{0}));
+    for (; near != columns.end() && near->first < uv.x() + gate_px; ++near) {
+      const std::size_t i = near->second;
       const auto& candidate = scene.candidates[i];
       const Eigen::Vector2d off = candidate.uv - uv;
       if (!(off.squaredNorm() < gate_px * gate_px)) continue;
