@@ -13,6 +13,13 @@ SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
+Eigen::MatrixXd gram(const Eigen::MatrixXd& matrix) {
+  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(matrix.cols(), matrix.cols());
+  product.selfadjointView<Eigen::Lower>().rankUpdate(matrix.transpose());
+  product.triangularView<Eigen::StrictlyUpper>() = product.transpose();
+  return product;
+}
+
 RightSingular right_singular(const Eigen::MatrixXd& matrix) {
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(matrix, Eigen::ComputeThinV);
   return {svd.singularValues(), svd.matrixV()};

@@ -18,6 +18,9 @@ struct SymmetricEigen {
 /// Of a symmetric matrix, of which the lower triangle is read.
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix);
 
+/// A^T A, at half the cost of the product.
+Eigen::MatrixXd gram(const Eigen::MatrixXd& matrix);
+
 /// Singular values, descending, and right singular vectors, the columns.
 struct RightSingular {
   Eigen::VectorXd values;

@@ -21,6 +21,11 @@ TEST(SymmetricEigen, AscendingValuesAndOrthonormalVectorsRebuildTheMatrix) {
   EXPECT_TRUE((vectors * values.asDiagonal() * vectors.transpose()).isApprox(matrix, 1e-14));
 }
 
+TEST(Gram, IsTheProductOfTheTransposeAndTheMatrix) {
+  const Eigen::MatrixXd matrix = tall_matrix();
+  EXPECT_TRUE(gram(matrix).isApprox(matrix.transpose() * matrix, 1e-14));
+}
+
 TEST(RightSingular, DescendingValuesAndOrthonormalVectorsRebuildTheNormalMatrix) {
   const Eigen::MatrixXd matrix = tall_matrix();
   const auto [values, vectors] = right_singular(matrix);

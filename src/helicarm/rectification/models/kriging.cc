@@ -43,8 +43,19 @@ VectorXd basis_row(const Vector2d& t, int order, const MatrixX2d& knots, double 
   return row;
 }
 
+/// `basis_row` of every dot, column by column.
 MatrixXd rows_of_dots(const PlateDots& dots, int order, const MatrixX2d& knots, double length) {
-  return rows_for(dots, [&](const Vector2d& t) { return basis_row(t, order, knots, length); });
+  const Index terms = term_count(order);
+  MatrixXd rows(dots.raw.rows(), terms + knots.rows());
+  rows.leftCols(terms) = rows_for(dots, [&](const Vector2d& t) { return monomials(t, order); });
+  const auto places = Eigen::Map<const Eigen::Matrix2Xd>(dots.points.front().data(), 2, rows.rows());
+  const Eigen::ArrayXd x = places.row(0).transpose(), y = places.row(1).transpose();
+  for (Index k = 0; k < knots.rows(); ++k) {
+    const Eigen::ArrayXd s =
+        ((x - knots(k, 0)).square() + (y - knots(k, 1)).square()).sqrt() * (std::sqrt(3.0) / length);
+    rows.col(terms + k) = (1 + s) * (-s).exp();
+  }
+  return rows;
 }
 
 MatrixXd gram_of(const MatrixX2d& knots, double length) {
@@ -75,12 +86,13 @@ Roughness roughness_of(const PlateDots& data, const MatrixXd& rows, const Matrix
   const MatrixXd trend = geometry::orthonormal_columns(weighted.leftCols(terms));
   const auto whitens = geometry::whitening(gram);
   if (!whitens) return {};
-  MatrixXd kernels = weighted.rightCols(knots) * whitens->transpose();
+  MatrixXd kernels = weighted.rightCols(knots);
   kernels -= trend * (trend.transpose() * kernels);
   MatrixX2d raw = root.asDiagonal() * data.raw;
   raw -= trend * (trend.transpose() * raw);
-  const geometry::SymmetricEigen modes = geometry::symmetric_eigen(kernels.transpose() * kernels);
-  const MatrixX2d along = modes.vectors.transpose() * (kernels.transpose() * raw);
+  const geometry::SymmetricEigen modes =
+      geometry::symmetric_eigen(*whitens * geometry::gram(kernels) * whitens->transpose());
+  const MatrixX2d along = modes.vectors.transpose() * (*whitens * (kernels.transpose() * raw));
   const double freedom = 2.0 * double(rows.rows() - terms);
   Roughness best;
   for (double gain = 1e-2; gain < 1e6; gain *= 1.5) {

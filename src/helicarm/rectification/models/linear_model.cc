@@ -83,7 +83,7 @@ LinearFit fit_linear(const PlateDots& dots, const MatrixXd& rows, const MatrixXd
   const MatrixX2d& raw = dots.raw;
   const Eigen::VectorXd& weights = dots.weights;
   const MatrixXd weighted = weights.asDiagonal() * rows;
-  MatrixXd system = rows.transpose() * weighted;
+  MatrixXd system = geometry::gram(weights.cwiseSqrt().asDiagonal() * rows);
   system.bottomRightCorner(penalty.rows(), penalty.cols()) += penalty;
   const Index size = system.rows();
   MatrixXd right(size, size + 2);
