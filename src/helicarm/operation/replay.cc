@@ -2,16 +2,14 @@
 #include "helicarm/operation/replay.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <set>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/geometry/rotation.h"
-#include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/case_of.h"
+#include "helicarm/operation/earlier_versions.h"
 #include "helicarm/operation/models.h"
 #include "helicarm/operation/replay_orders.h"
 #include "helicarm/pipeline/poses_json.h"
@@ -22,60 +20,6 @@ namespace {
 
 constexpr std::uintmax_t most_image_bytes = std::uintmax_t{256} << 20;
 constexpr std::uintmax_t most_listed_bytes = std::uintmax_t{1} << 31;  // of a model's volume
-constexpr const char* earlier_format = "helicarm-case/1";
-
-/// The case of an operation of an earlier version in the present form; `present` has its format and bones.
-Json case_in_present_form(const Json& recorded, const Json& present, const OperationPlan& plan) {
-  if (recorded.value("format", "") != earlier_format) return recorded;
-  Json json = present;
-  for (const auto& [key, value] : recorded.items())
-    if (key != "format" && (key != "tracker" || present.contains(key))) json[key] = value;
-  for (Json& view : json.at("views")) view.at("poses") = pipeline::in_present_form(view.at("poses"));
-  json.at("picks") = Json::array();
-  for (const pipeline::Pick& pick : value_or_throw(picks_of(plan, recorded.at("picks"), "case.json")))
-    json.at("picks").push_back(pipeline::to_json(pick));
-  if (present.contains("poses_now"))
-    json.at("poses_now") = pipeline::in_present_form(recorded.at("poses_now"));
-  else
-    json.erase("poses_now");
-  return json;
-}
-
-/// Earlier versions made every pose that they read a rotation again, which changes last bits.
-pipeline::Case as_read_earlier(pipeline::Case given) {
-  const auto read = [](auto& pose) {
-    pose = value_or_throw(geometry::rigid_transform_from(pose.matrix(), "pose"));
-  };
-  const auto read_all = [&](guidance::Poses& poses) {
-    if (poses.tracker_from_calibrator) read(*poses.tracker_from_calibrator);
-    for (auto& [bone, pose] : poses.tracker_from_bone) read(pose);
-    if (poses.tracker_from_tool) read(*poses.tracker_from_tool);
-  };
-  for (pipeline::CaseView& view : given.views) read_all(view.poses);
-  read_all(given.poses_now);
-  return given;
-}
-
-/// What an earlier version wrote of a result too: the keys of `then`, and its numbers where only rounding,
-/// which the compiler decides, differs.
-Json in_keys_of(const Json& then, const Json& now) {
-  constexpr double rounding = 1e-9;
-  if (then.is_number_float() && now.is_number_float()) {
-    const double a = then.get<double>(), b = now.get<double>();
-    return std::abs(a - b) <= rounding * std::max(1.0, std::abs(a)) ? then : now;
-  }
-  if (then.is_object() && now.is_object()) {
-    Json kept = Json::object();
-    for (const auto& [key, value] : then.items())
-      if (const auto found = now.find(key); found != now.end()) kept[key] = in_keys_of(value, *found);
-    return kept;
-  }
-  if (!then.is_array() || !now.is_array() || then.size() != now.size()) return now;
-  Json kept = Json::array();
-  for (std::size_t i = 0; i < then.size(); ++i) kept.push_back(in_keys_of(then[i], now[i]));
-  return kept;
-}
-
 class Replay {
  public:
   explicit Replay(std::filesystem::path session)
@@ -223,7 +167,7 @@ class Replay {
       return derived_case(recorded, record.verifies, value_or_throw(path_inside(session_, folder)));
     });
     if (!derived) return differ(origin, fmt::format("{}: {}", name, derived.error().message));
-    earlier_ = recorded.value("format", "") == earlier_format;
+    earlier_ = is_of_earlier_version(recorded);
     derived_ = earlier_ ? as_read_earlier(*derived) : *derived;
     const Json now_written = pipeline::to_json(*derived);
     compare(case_in_present_form(recorded, now_written, plan_), now_written, origin, "case");

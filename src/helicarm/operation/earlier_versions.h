@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "helicarm/operation/plan.h"
+
+/// Records of operations that earlier versions made, with helicarm-case/1.
+namespace helicarm::operation {
+
+bool is_of_earlier_version(const Json& recorded_case);
+
+/// The case of an operation of an earlier version in the present form; `present` has its format and bones.
+Json case_in_present_form(const Json& recorded, const Json& present, const OperationPlan& plan);
+
+/// Earlier versions made every pose that they read a rotation again, which changes last bits.
+pipeline::Case as_read_earlier(pipeline::Case given);
+
+/// What an earlier version wrote of a result too: the keys of `then`, and its numbers where only rounding,
+/// which the compiler decides, differs.
+Json in_keys_of(const Json& then, const Json& now);
+
+}  // namespace helicarm::operation
