@@ -167,7 +167,7 @@ pipeline::OrRefusal<std::vector<pipeline::LabelledView>> labelled_views(
   auto rectification = rectification_of(*image, map);
   if (!rectification) {
     rectification.error().view = image->name;
-    return tl::unexpected(pipeline::Refusal{rectification.error(), {}});
+    return tl::unexpected(pipeline::Refusal{rectification.error(), pipeline::Stage::rectify, {}});
   }
   pipeline::RectifiedView view;
   view.name = image->name;

@@ -170,7 +170,7 @@ Controller::Change Controller::measured(Equipment& equipment, const std::vector<
           return view.calibrated.has_value();
         });
     if (result->failure)
-      state.refusals.insert_or_assign(state.measured ? Phase::plan : phase_of(*result->failure),
+      state.refusals.insert_or_assign(phase_of(result->refused_at.value_or(pipeline::Stage::calibrate)),
                                       *result->failure);
     live_tool_ = live;
   };

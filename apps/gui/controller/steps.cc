@@ -23,23 +23,6 @@ QString doubts(const std::vector<Warning>& warnings) {
   return warnings.size() == 1 ? first : tr("%1 (and %2 more)").arg(first).arg(warnings.size() - 1);
 }
 
-Phase phase_of(pipeline::Stage stage) {
-  switch (stage) {
-    case pipeline::Stage::read:
-      return Phase::acquire;
-    case pipeline::Stage::rectify:
-      return Phase::rectify;
-    case pipeline::Stage::label:
-    case pipeline::Stage::calibrate:
-      return Phase::calibrate;
-    case pipeline::Stage::locate:
-      return Phase::plan;
-    case pipeline::Stage::registration:
-      return Phase::registration;
-  }
-  return Phase::acquire;
-}
-
 std::vector<Warning> warnings_of(const ApplicationState& state, Phase phase) {
   std::vector<Warning> of_it;
   for (const pipeline::Finding& warning : state.result->warnings)
@@ -232,24 +215,21 @@ void registered(StepCard& card, const ApplicationState& state) {
 
 }  // namespace
 
-Phase phase_of(const Failure& failure) {
-  switch (failure.reason) {
-    case Reason::blank_image:
-    case Reason::saturated:
-    case Reason::plate_not_found:
-    case Reason::plate_mismatch:
-      return Phase::rectify;
-    case Reason::patient_mismatch:
+Phase phase_of(pipeline::Stage stage) {
+  switch (stage) {
+    case pipeline::Stage::read:
       return Phase::acquire;
-    case Reason::bad_tunnel:
-    case Reason::not_seen:
-    case Reason::target_not_found:
-    case Reason::parallel_rays:
-    case Reason::uncertain:
-      return Phase::plan;
-    default:
+    case pipeline::Stage::rectify:
+      return Phase::rectify;
+    case pipeline::Stage::label:
+    case pipeline::Stage::calibrate:
       return Phase::calibrate;
+    case pipeline::Stage::locate:
+      return Phase::plan;
+    case pipeline::Stage::registration:
+      return Phase::registration;
   }
+  return Phase::acquire;
 }
 
 QString sentence_of(const Failure& failure) {

@@ -27,8 +27,8 @@ struct LiveState;
 /// With a warning where a step is good or waits, and a device that it needs is not seen or not connected.
 StepCards with_devices(StepCards cards, const ApplicationState& state, const LiveState& live);
 
-/// The step that a refused measurement concerns.
-Phase phase_of(const Failure& failure);
+/// The step that shows this stage of a measurement.
+Phase phase_of(pipeline::Stage stage);
 
 /// Whether a person ended the work, which is no refusal of the data; a stopped robot is one.
 bool is_cancelled(Phase phase, const Failure& refusal);

@@ -39,7 +39,8 @@ pipeline::Result with_models(pipeline::Result result, const CaseRegistration& re
     append(result.notes, found.notes);
     // A breach is of the plan: its tunnels are shown at their places.
     if (!found.failure || found.failure->reason == Reason::tunnel_breach) add_plan(model, result);
-    if (found.failure && !result.failure) result.failure = found.failure;
+    if (found.failure && !result.failure)
+      result.failure = found.failure, result.refused_at = pipeline::Stage::registration;
   }
   return result;
 }

@@ -137,7 +137,7 @@ OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& give
             return with_explanations(std::move(done), views, given, options);
           });
   if (!calibration) {
-    Refusal refusal{calibration.error(), {}};
+    Refusal refusal{calibration.error(), Stage::calibrate, {}};
     for (const LabelledView& view : views) refusal.views.push_back(reported(view));
     return tl::unexpected(std::move(refusal));
   }

@@ -131,7 +131,7 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
                         .map([&](const std::vector<Warning>& warnings) {
                           append(result.warnings, warnings, Stage::locate);
                         });
-  if (!done) result.failure = done.error();
+  if (!done) result.failure = done.error(), result.refused_at = Stage::locate;
   return result;
 }
 
@@ -139,6 +139,7 @@ Expected<Result> result_of_refusal(const Case& given, Refusal refusal, const Run
   if (exit_code(refusal.failure.reason) == 2) return tl::unexpected<Failure>(refusal.failure);
   Result result = initial_result(given, options, std::move(refusal.views));
   result.failure = std::move(refusal.failure);
+  result.refused_at = refusal.stage;
   result.timing_ms = refusal.timing_ms;
   return result;
 }

@@ -82,6 +82,7 @@ TEST_F(SimulatedNavigation, MirroredCalibratorFileIsRefused) {
   ASSERT_TRUE(result.has_value());
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::ambiguous_handedness);
+  EXPECT_EQ(result->refused_at, Stage::calibrate);
   EXPECT_NE(result->failure->message.find("\"mirrored\": true"), std::string::npos);
 }
 
@@ -292,6 +293,7 @@ TEST_F(SimulatedNavigation, PlateOfTheOtherKindIsRefused) {
   ASSERT_TRUE(result.has_value());
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::plate_mismatch) << result->failure->message;
+  EXPECT_EQ(result->refused_at, Stage::rectify);
 }
 
 TEST_F(SimulatedNavigation, ExchangedImagesAreWarnedOf) {
@@ -364,6 +366,7 @@ TEST_F(SimulatedNavigation, TunnelFromAPointToItselfIsRefused) {
   const auto result = result_of(given_, {});
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::bad_tunnel);
+  EXPECT_EQ(result->refused_at, Stage::locate);
 }
 
 TEST_F(SimulatedNavigation, ClickOutsideTheImageIsBadInput) {

@@ -12,7 +12,6 @@
 #include "helicarm/core/private_files.h"
 #include "helicarm/core/text.h"
 #include "helicarm/phantom/calibrator.h"
-#include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/stages.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/xray/read_xray_image.h"
@@ -130,7 +129,7 @@ void set_calibrator(NewCase& made, const std::string& name, const fs::path& fold
   const bool is_file = fs::is_regular_file(name);
   const phantom::Calibrator calibrator =
       value_or_throw(is_file ? phantom::read_calibrator(name) : phantom::calibrator_named(name, folder));
-  made.json["calibrator"] = is_file ? brought(made, name, folder, "calibrator.json") : name;
+  made.given.calibrator_name = is_file ? brought(made, name, folder, "calibrator.json") : name;
   made.findings.push_back(fmt::format("calibrator: {}, {} balls, {} targets",
                                       without_control_characters(calibrator.name), calibrator.balls.size(),
                                       calibrator.targets.size()));
@@ -152,28 +151,26 @@ void set_plate(NewCase& made, const std::vector<InspectedImage>& images, const N
                     "distortion",
                     choice.why));
   made.findings.push_back(fmt::format("plate: {} ({})", printable(*choice.plate), choice.why));
-  if (*choice.plate == "none") {
-    made.json["plate"] = nullptr;
-    return;
-  }
+  if (*choice.plate == "none") return;
   const bool is_file = fs::is_regular_file(*choice.plate);
   value_or_throw(is_file ? phantom::read_plate(*choice.plate) : phantom::plate_named(*choice.plate, folder));
-  made.json["plate"] = is_file ? brought(made, *choice.plate, folder, "plate.json") : *choice.plate;
+  made.given.plate_name = is_file ? brought(made, *choice.plate, folder, "plate.json") : *choice.plate;
 }
 
 void set_views(NewCase& made, const std::vector<InspectedImage>& images, const NewCaseOptions& options,
                const fs::path& folder) {
-  made.json["views"] = Json::array();
   for (const InspectedImage& image : images) {
-    Json view = {{"name", image.view}, {"image", brought_image(made, image.file, folder, image.view)}};
-    if (image.frame) view["frame"] = *image.frame;
-    if (options.stated.pixel_mm) view["pixel_mm"] = *options.stated.pixel_mm;
-    if (options.stated.source_detector_mm) view["source_detector_mm"] = *options.stated.source_detector_mm;
+    CaseView& view = made.given.views.emplace_back();
+    view.name = image.view;
+    view.image = folder / brought_image(made, image.file, folder, image.view);
+    view.frame = image.frame;
+    view.pixel_mm = options.stated.pixel_mm;
+    view.source_detector_mm = options.stated.source_detector_mm;
     for (const auto& [name, file] : options.plate_images)
-      if (name == image.view) view["plate_image"] = brought_image(made, file, folder, image.view + "_plate");
+      if (name == image.view)
+        view.plate_image = folder / brought_image(made, file, folder, image.view + "_plate");
     for (const auto& [name, file] : options.maps)
-      if (name == image.view) view["map"] = brought(made, file, folder, plain(name) + "_map.json");
-    made.json["views"].push_back(std::move(view));
+      if (name == image.view) view.map = folder / brought(made, file, folder, plain(name) + "_map.json");
   }
   for (const auto& [name, file] : options.plate_images) image_named(images, name, "--plate-image");
   for (const auto& [name, file] : options.maps) image_named(images, name, "--map");
@@ -276,12 +273,11 @@ Expected<NewCase> new_case(std::vector<InspectedImage> images, const NewCaseOpti
     check_images(images);
     NewCase made;
     for (const InspectedImage& image : images) made.findings.push_back(description_of(image));
-    made.json = {{"format", "helicarm-case/2"}, {"notes", ""}};
+    made.given.folder = folder;
     set_calibrator(made, options.calibrator, folder);
     set_plate(made, images, options, folder);
     set_views(made, images, options, folder);
-    made.json["picks"] = Json::array();
-    made.json["notes"] = fmt::format("{}", fmt::join(made.findings, "; "));
+    made.given.notes = fmt::format("{}", fmt::join(made.findings, "; "));
     warn(made, images);
     return made;
   });
@@ -300,7 +296,7 @@ Expected<void> write_new_case(const NewCase& made, const fs::path& folder) {
       value_or_throw(
           write_private_file(folder / copy.to, value_or_throw(read_file(copy.from, most_copied_bytes))));
     }
-    value_or_throw(write_file(folder / "case.json", to_text(made.json) + "\n"));
+    value_or_throw(write_file(folder / "case.json", to_text(to_json(made.given)) + "\n"));
     value_or_throw(read_case(folder));
   });
 }

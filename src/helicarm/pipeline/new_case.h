@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "helicarm/core/json.h"
+#include "helicarm/pipeline/case.h"
 #include "helicarm/rectification/round_field.h"
 #include "helicarm/xray/sidecar.h"
 #include "helicarm/xray/xray_image.h"
@@ -59,7 +59,7 @@ struct NewCase {
   struct Copy {
     std::filesystem::path from, to;  ///< `to` is relative to the case's folder
   };
-  Json json;
+  Case given;  ///< without the contents of its calibrator and plate
   std::vector<Copy> copies;
   std::vector<std::string> findings;
   std::vector<Warning> warnings;

@@ -113,6 +113,7 @@ struct CalibratorSource {
 struct Result {
   RunOptions options;
   std::optional<Failure> failure;
+  std::optional<Stage> refused_at;  ///< whose result the failure concerns
   std::vector<Finding> warnings;
   std::vector<Finding> notes;  ///< valid for all data of this kind
   CalibratorSource calibrator;

@@ -29,11 +29,12 @@ auto of_each(std::size_t count, const RunOptions& options, const Progress& progr
 
 /// Every view with the stage's result; if it failed for one, a refusal with all results.
 template <class Next, class View, class Added>
-OrRefusal<std::vector<Next>> joined(std::vector<View> views, std::vector<Expected<Added>> added) {
+OrRefusal<std::vector<Next>> joined(Stage stage, std::vector<View> views,
+                                    std::vector<Expected<Added>> added) {
   std::vector<Next> next;
   const auto failed = std::ranges::find_if(added, [](const auto& one) { return !one; });
   if (failed != added.end()) {
-    Refusal refusal{failed->error(), {}};
+    Refusal refusal{failed->error(), stage, {}};
     refusal.failure.view = views[std::size_t(failed - added.begin())].name;
     for (std::size_t i = 0; i < views.size(); ++i)
       refusal.views.push_back(added[i] ? reported(Next{std::move(views[i]), *std::move(added[i])})
@@ -159,11 +160,11 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
       return std::make_shared<const xray::XrayImage>(std::move(xray_image));
     });
   });
-  return joined<ReadView>(std::move(views), std::move(images))
+  return joined<ReadView>(Stage::read, std::move(views), std::move(images))
       .and_then([](std::vector<ReadView> read) -> OrRefusal<std::vector<ReadView>> {
         const auto together = check_images_belong_together(read);
         if (together) return read;
-        Refusal refusal{together.error(), {}};
+        Refusal refusal{together.error(), Stage::read, {}};
         for (const ReadView& view : read) refusal.views.push_back(reported(view));
         return tl::unexpected(std::move(refusal));
       });
@@ -174,7 +175,7 @@ OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views,
   auto rectified = of_each(views.size(), options, progress, [&](std::size_t i) {
     return rectify_view(*views[i].xray_image, given.views[i], given.plate, options);
   });
-  return joined<RectifiedView>(std::move(views), std::move(rectified));
+  return joined<RectifiedView>(Stage::rectify, std::move(views), std::move(rectified));
 }
 
 OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case& given,
@@ -184,7 +185,7 @@ OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> 
         return fiducials::detect_candidates(*views[i].xray_image, views[i].rectification,
                                             least_radius_px(given, views[i].rectification.map));
       });
-  return joined<DetectedView>(std::move(views), std::move(candidates));
+  return joined<DetectedView>(Stage::label, std::move(views), std::move(candidates));
 }
 
 OrRefusal<std::vector<DetectedView>> detected_views(const Case& given, const RunOptions& options,
@@ -228,7 +229,11 @@ OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views
     labels = of_each(views.size(), options, progress, [&](std::size_t i) {
       return is_ambiguous(labels[i]) ? label(i, radius_bias) : std::move(labels[i]);
     });
-  return joined<LabelledView>(std::move(views), std::move(labels));
+  const bool contradict_plate = std::ranges::any_of(labels, [](const auto& of_view) {
+    return !of_view && of_view.error().reason == Reason::plate_mismatch;
+  });
+  return joined<LabelledView>(contradict_plate ? Stage::rectify : Stage::label, std::move(views),
+                              std::move(labels));
 }
 
 }  // namespace helicarm::pipeline

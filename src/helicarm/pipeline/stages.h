@@ -41,6 +41,7 @@ ViewResult reported(const LabelledView& view);
 /// Reason of a refusal, and the results of all stages before it.
 struct Refusal {
   Failure failure;
+  Stage stage;  ///< whose result it concerns
   std::vector<ViewResult> views;
   Timing timing_ms = {};
 };
