@@ -104,36 +104,6 @@ std::optional<double> common_radius_bias(const std::vector<Expected<fiducials::L
 
 }  // namespace
 
-ViewResult reported(const NamedView& view) {
-  ViewResult result;
-  result.name = view.name;
-  return result;
-}
-
-ViewResult reported(const ReadView& view) {
-  ViewResult result = reported(static_cast<const NamedView&>(view));
-  result.xray_image = view.xray_image;
-  return result;
-}
-
-ViewResult reported(const RectifiedView& view) {
-  ViewResult result = reported(static_cast<const ReadView&>(view));
-  result.rectification = view.rectification;
-  return result;
-}
-
-ViewResult reported(const DetectedView& view) {
-  ViewResult result = reported(static_cast<const RectifiedView&>(view));
-  result.candidates = view.candidates;
-  return result;
-}
-
-ViewResult reported(const LabelledView& view) {
-  ViewResult result = reported(static_cast<const DetectedView&>(view));
-  result.found = view.fiducials;
-  return result;
-}
-
 Expected<void> check_images_belong_together(const std::vector<ReadView>& views) {
   for (std::size_t i = 0; i < views.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {

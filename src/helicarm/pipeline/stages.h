@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <concepts>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,12 +32,17 @@ struct LabelledView : DetectedView {
   fiducials::LabelledFiducials fiducials;
 };
 
-/// As reported in a result.
-ViewResult reported(const NamedView& view);
-ViewResult reported(const ReadView& view);
-ViewResult reported(const RectifiedView& view);
-ViewResult reported(const DetectedView& view);
-ViewResult reported(const LabelledView& view);
+/// As reported in a result: what its stage has reached.
+template <std::derived_from<NamedView> View>
+ViewResult reported(const View& view) {
+  ViewResult result;
+  result.name = view.name;
+  if constexpr (std::derived_from<View, ReadView>) result.xray_image = view.xray_image;
+  if constexpr (std::derived_from<View, RectifiedView>) result.rectification = view.rectification;
+  if constexpr (std::derived_from<View, DetectedView>) result.candidates = view.candidates;
+  if constexpr (std::derived_from<View, LabelledView>) result.found = view.fiducials;
+  return result;
+}
 
 /// Reason of a refusal, and the results of all stages before it.
 struct Refusal {
