@@ -18,6 +18,8 @@ struct OperateArguments {
   int cases = 4;  ///< pairs of bones
   int size = 1024;
   double rate_hz = 60;
+  bool ct = false;       ///< planned in a CT, not picked
+  bool by_hand = false;  ///< a drill in a person's hand, not a robot
   std::filesystem::path out = "operate";
 };
 
@@ -65,6 +67,7 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
       rehearsal::RehearsalOptions options;
       options.image_size = arguments.size;
       options.tracker_rate_hz = arguments.rate_hz;
+      options.ct_plan = arguments.ct;
       const auto say = [&](const std::string& what) {
         if (console.quiet) return;
         const std::lock_guard lock(telling);
@@ -78,8 +81,9 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
         const std::string folder =
             attempt == 1 ? fmt::format("case-{}", i + 1) : fmt::format("case-{}-{}", i + 1, attempt);
         done[i] = guarded([&] {
+          const auto carry_out = arguments.by_hand ? rehearsal::rehearse_freehand : rehearsal::rehearse;
           rehearsal::Rehearsal whole =
-              value_or_throw(rehearsal::rehearse(console.seed + i, arguments.out / folder, options));
+              value_or_throw(carry_out(console.seed + i, arguments.out / folder, options));
           whole.attempts = attempt;
           return whole;
         });
@@ -90,7 +94,9 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
     check();
     std::vector<rehearsal::Rehearsal> rehearsals;
     for (Expected<rehearsal::Rehearsal>& each : done) rehearsals.push_back(value_or_throw(std::move(each)));
-    const Json json = rehearsal::to_json(rehearsals);
+    Json json = rehearsal::to_json(rehearsals);
+    json["plan"] = arguments.ct ? "ct" : "picks";
+    json["tool"] = arguments.by_hand ? "drill" : "robot";
     value_or_throw(write_file(arguments.out / "operate.json", to_text(json)));
     value_or_throw(write_file(arguments.out / "operate.csv", rehearsal::to_csv(rehearsals)));
     if (console.json)
@@ -101,15 +107,22 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
 }
 
 void add_operate(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, group::operation, "operate", "Table 2's experiment with virtual devices, end to end",
-                  "helicarm operate --cases 4 --out operate");
+  auto* command = add_command(
+      app, group::operation, "operate", "Table 2's experiment with virtual devices, end to end",
+      "helicarm operate --cases 4 --out operate\n"
+      "helicarm operate --cases 4 --ct --by-hand --out by-ct\n\n"
+      "Each case is a whole operation over the real protocols: images, measurement, registration of "
+      "the robot,\norders, closed loop, verification. The tool's axis is compared with the balls at "
+      "the ends of the tunnels.");
   auto& a = arguments_of(command, action, operate_command);
   command->add_option("--cases", a.cases, "Number of simulated pairs of bones, with four points each")
       ->check(within(1, 1000))
       ->capture_default_str();
   command->add_option("--out", a.out, "Folder for operate.csv, operate.json and the sessions")
       ->capture_default_str();
+  command->add_flag("--ct", a.ct,
+                    "The tunnels are lines in a CT of the knee, which is registered, not picked points");
+  command->add_flag("--by-hand", a.by_hand, "A virtual person guides a drill; without a robot");
   command->add_option("--size", a.size, "Pixels per side: 512 or 1024")->capture_default_str();
   command->add_option("--rate", a.rate_hz, "Rate of the tracker, Hz")
       ->check(within(5, 1000))
