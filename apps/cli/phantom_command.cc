@@ -23,6 +23,7 @@
 #include "helicarm/phantom_calibration/measure_phantom.h"
 #include "helicarm/phantom_calibration/phantom_report.h"
 #include "helicarm/phantom_calibration/verify_phantom.h"
+#include "helicarm/sweep/sweep_case.h"
 #include "named_files.h"
 #include "phantom_check_command.h"
 
@@ -200,7 +201,7 @@ phantom_calibration::PhantomOptions options_of(const PhantomArguments& arguments
 /// A case whose calibrator allows no answer is refused like any other.
 phantom_calibration::PhantomResult measured(const PhantomArguments& arguments, const Console& console) {
   const phantom_calibration::PhantomOptions options = options_of(arguments, console);
-  const auto given = pipeline::read_phantom_case(arguments.name_or_file);
+  const auto given = sweep::read_phantom_case(arguments.name_or_file);
   if (!given && exit_code(given.error().reason) == 3) {
     phantom_calibration::PhantomResult refused;
     refused.failure = given.error();

@@ -7,6 +7,7 @@
 #include "helicarm/phantom_calibration/measure_phantom.h"
 #include "helicarm/phantom_calibration/phantom_report.h"
 #include "helicarm/phantom_calibration/verify_phantom.h"
+#include "helicarm/sweep/sweep_case.h"
 #include "module.h"
 #include "signals.h"
 
@@ -40,7 +41,7 @@ PhantomResult measured(const std::filesystem::path& folder, const std::vector<Di
   options.on_stage = hooks.on_stage;
   options.on_view = hooks.on_view;
   PhantomResult result = value_or_raise(without_gil([&] {
-    return pipeline::read_phantom_case(folder).and_then(
+    return sweep::read_phantom_case(folder).and_then(
         [&](const pipeline::Case& given) { return phantom_calibration::measure_phantom(given, options); });
   }));
   if (result.failure) raise(*result.failure, py::cast(result));

@@ -140,16 +140,32 @@ void add_frames(SweepCase& read, const pipeline::CaseView& view, const std::stri
 
 }  // namespace
 
-Expected<SweepCase> read_sweep_case(const fs::path& path) {
+namespace {
+
+Expected<SweepCase> read_runs(const fs::path& path, pipeline::Purpose purpose) {
   return guarded([&] {
     const fs::path file = fs::absolute(pipeline::case_file(path));
     const std::string origin = file.filename().string();
     Json json = value_or_throw(read_json(file));
     const std::vector<std::string> frames = take_frames(json, origin);
     SweepCase read;
-    read.base = pipeline::case_of(json, origin, file.parent_path(), pipeline::Purpose::sweep);
+    read.base = pipeline::case_of(json, origin, file.parent_path(), purpose);
     for (std::size_t i = 0; i < read.base.views.size(); ++i) add_frames(read, read.base.views[i], frames[i]);
     return read;
+  });
+}
+
+}  // namespace
+
+Expected<SweepCase> read_sweep_case(const fs::path& path) {
+  return read_runs(path, pipeline::Purpose::sweep);
+}
+
+Expected<pipeline::Case> read_phantom_case(const fs::path& path) {
+  return read_runs(path, pipeline::Purpose::phantom).map([](SweepCase read) {
+    read.base.views.clear();
+    for (Frame& frame : read.frames) read.base.views.push_back(std::move(frame.view));
+    return std::move(read.base);
   });
 }
 

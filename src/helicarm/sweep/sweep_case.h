@@ -32,4 +32,7 @@ struct SweepCase {
 /// frames, for frames that a file does not have and for angles of another number of frames.
 Expected<SweepCase> read_sweep_case(const std::filesystem::path& path);
 
+/// As `pipeline::read_phantom_case`, of runs too: each of their images is a view of the case.
+Expected<pipeline::Case> read_phantom_case(const std::filesystem::path& path);
+
 }  // namespace helicarm::sweep

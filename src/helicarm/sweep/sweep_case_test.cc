@@ -57,6 +57,15 @@ TEST_F(SweepCaseFile, ARangeMayHaveAStep) {
   EXPECT_THAT(names("2-4:2"), testing::ElementsAre("RUN/2", "RUN/4"));
 }
 
+TEST_F(SweepCaseFile, AllItsImagesAreViewsOfAPhantomsCase) {
+  ASSERT_TRUE(read("1-4:3"));
+  const auto given = read_phantom_case(folder_.path());
+  ASSERT_TRUE(given) << given.error().message;
+  ASSERT_EQ(given->views.size(), 2U);
+  EXPECT_EQ(given->views[1].name, "RUN/4");
+  EXPECT_EQ(given->views[1].image.filename(), "run_004.png");
+}
+
 TEST_F(SweepCaseFile, MissingFilesAreNamed) {
   const auto failed = read("3-6");
   ASSERT_FALSE(failed);
