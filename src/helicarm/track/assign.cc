@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "helicarm/geometry/triangulation.h"
+#include "helicarm/track/contrast_model.h"
 
 namespace helicarm::track {
 namespace {
@@ -37,9 +38,10 @@ struct Option {
 double appearance_cost(const MarkerImage& image, const ExpectedImage& expected) {
   const double size = std::log(image.radius_px / expected.radius_px) / 0.3;
   double cost = 0.5 * size * size;
-  if (expected.contrast > 0) {
-    const double contrast = std::log(std::abs(image.contrast) / expected.contrast) / expected.spread;
-    cost += 0.5 * contrast * contrast + std::log(expected.spread / usual_spread);
+  if (expected.contrast.is_known) {
+    const double spread = std::hypot(expected.contrast.spread, contrast_sigma(image));
+    const double off = std::log(std::abs(image.contrast) / expected.contrast.at(image.background)) / spread;
+    cost += 0.5 * off * off + std::log(spread / usual_spread);
   }
   return cost;
 }

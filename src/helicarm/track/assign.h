@@ -14,8 +14,8 @@ namespace helicarm::track {
 /// What is expected of a marker in one view.
 struct ExpectedImage {
   double radius_px = 0;
-  double contrast = 0;                                 ///< absolute; 0: unknown
-  double spread = 0.35;                                ///< of the contrast's logarithm
+  ContrastModel contrast = {};  ///< its spread is that of the contrast's logarithm
+  double visible = 0;           ///< absolute contrast when it was seen last; 0: unknown
   Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();  ///< by the camera's delay
   double shift_sigma = 0;                              ///< of it, px
 };

@@ -14,7 +14,7 @@ ExpectedMarker expected_at(const Eigen::Vector3d& place, double sigma_mm) {
   ExpectedMarker marker;
   marker.place = place;
   marker.covariance = sigma_mm * sigma_mm * Eigen::Matrix3d::Identity();
-  marker.images.assign(2, ExpectedImage{2, 80});
+  marker.images.assign(2, ExpectedImage{2, {80, 0, 0.35, true}});
   return marker;
 }
 

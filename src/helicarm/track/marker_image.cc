@@ -93,8 +93,19 @@ std::vector<Peak> peaks_in(const image::Image<float>& grey, const Eigen::Vector2
   return peaks;
 }
 
-MarkerImage marker_from(const Dot& dot) {
-  return {dot.centre_px, dot.error_px(), dot.radius_px, dot.contrast};
+/// Mean grey level of the ring around a disc.
+double ring_level(const image::Image<float>& grey, const Eigen::Vector2d& at, double radius_px) {
+  const int u = int(std::lround(at.x())), v = int(std::lround(at.y()));
+  double sum = 0;
+  int count = 0;
+  for (const Eigen::Vector2i& off : rings_of(radius_px).ring)
+    if (grey.contains(u + off.x(), v + off.y())) sum += double(grey(u + off.x(), v + off.y())), ++count;
+  return count > 0 ? sum / count : 0;
+}
+
+MarkerImage marker_from(const image::Image<float>& grey, const Dot& dot) {
+  return {dot.centre_px, dot.error_px(), dot.radius_px, dot.contrast,
+          ring_level(grey, dot.centre_px, dot.radius_px)};
 }
 
 Dot start_at(const Eigen::Vector2d& at, double radius_px) {
@@ -114,7 +125,7 @@ std::optional<MarkerImage> fitted_at(const image::Image<float>& grey, const Eige
     if (!dot || dot->contrast * appearance.polarity <= 0 || (dot->centre_px - at).norm() > radius_px + 1)
       continue;
     if (misfit) *misfit = dot->misfit;
-    return marker_from(*dot);
+    return marker_from(grey, *dot);
   }
   return std::nullopt;
 }
@@ -141,7 +152,7 @@ void fit_overlapping(const image::Image<float>& grey, std::vector<MarkerImage>& 
     const std::vector<detection::BallProfile> profiles(starts.size(), appearance.profile);
     const auto together = detection::fit_dots_together(grey, starts, profiles, {}, appearance.options);
     if (!together || together->front().contrast * appearance.polarity <= 0) continue;
-    const MarkerImage joint = marker_from(together->front());
+    const MarkerImage joint = marker_from(grey, together->front());
     if ((joint.uv_raw - alone[i].uv_raw).norm() < farthest_px && has_marker_size(joint, alone[i].radius_px) &&
         joint.sigma_px < 3 * alone[i].sigma_px)
       found[i] = joint;
@@ -223,7 +234,7 @@ std::vector<MarkerImage> find_markers(const xray::XrayImage& image, std::span<co
       const auto both = detection::fit_dots_together(image.pixels, starts, profiles, {}, options);
       if (!both) continue;
       for (const Dot& dot : *both)
-        if (dot.contrast * appearance.polarity > 0) found.push_back(marker_from(dot));
+        if (dot.contrast * appearance.polarity > 0) found.push_back(marker_from(image.pixels, dot));
     }
   return found;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 #include <span>
 #include <vector>
@@ -17,14 +19,26 @@ struct MarkerImage {
   Eigen::Vector2d uv_raw = Eigen::Vector2d::Zero();
   double sigma_px = 0;  ///< per axis
   double radius_px = 0;
-  double contrast = 0;  ///< grey levels, background minus marker: negative where markers are bright
+  double contrast = 0;    ///< grey levels, background minus marker: negative where markers are bright
+  double background = 0;  ///< grey level around it
+};
+
+/// The absolute contrast that is likely for a marker on a background: a line over its grey level.
+struct ContrastModel {
+  double at_zero = 0, share = 0;
+  double spread = 0.35;  ///< relative
+  bool is_known = false;
+  double at(double background) const {
+    return std::max(at_zero + share * background, 0.01 * std::abs(background) + 1e-6);
+  }
 };
 
 /// What markers of one size look like in one view.
 struct MarkerAppearance {
   detection::BallProfile profile{0.4, 0.7};
   detection::DotFitOptions options = {};
-  double polarity = 1;  ///< 1: dark, -1: bright
+  double polarity = 1;       ///< 1: dark, -1: bright
+  double radius_factor = 1;  ///< of the fitted radius over the stated one
 };
 
 /// Where to look.

@@ -79,7 +79,9 @@ std::string body_row(int frame, const std::string& names, const TrackedBody& bod
   return row + "," + (body.reason ? std::string(code(*body.reason)) : "") + "\n";
 }
 
-std::string sights_header() { return "frame,marker,view,u_raw,v_raw,sigma_px,radius_px,contrast,repaired\n"; }
+std::string sights_header() {
+  return "frame,marker,view,u_raw,v_raw,sigma_px,radius_px,contrast,background,repaired\n";
+}
 
 std::string sights_rows(const FrameSights& sights, const TrackCase& given) {
   std::string rows;
@@ -88,10 +90,10 @@ std::string sights_rows(const FrameSights& sights, const TrackCase& given) {
       rows += fmt::format("{},{},{}", sights.frame, csv_field(given.markers[m]),
                           csv_field(given.views[k].images.name));
       if (const auto& image = sights.of[m][k])
-        rows += fmt::format(",{},{},{},{},{}", image->uv_raw.x(), image->uv_raw.y(), image->sigma_px,
-                            image->radius_px, image->contrast);
+        rows += fmt::format(",{},{},{},{},{},{}", image->uv_raw.x(), image->uv_raw.y(), image->sigma_px,
+                            image->radius_px, image->contrast, image->background);
       else
-        rows += ",,,,,";
+        rows += ",,,,,,";
       rows += fmt::format(",{}\n", sights.repaired);
     }
   return rows;
@@ -114,18 +116,18 @@ std::vector<FrameSights> sights_from(const std::string& text, const TrackCase& g
         const std::string_view line(text.data() + at, end - at);
         if (!line.starts_with(begin)) return read;
         const auto fields = fields_of(line.substr(begin.size()));
-        if (fields.size() != 6) return read;
-        const auto repaired = number_from(fields[5]);
+        if (fields.size() != 7) return read;
+        const auto repaired = number_from(fields[6]);
         if (!repaired) return read;
         sights.repaired = int(*repaired);
         if (!fields[0].empty()) {
-          double values[5];
-          for (std::size_t i = 0; i < 5; ++i) {
+          double values[6];
+          for (std::size_t i = 0; i < 6; ++i) {
             const auto value = number_from(fields[i]);
             if (!value) return read;
             values[i] = *value;
           }
-          of[k] = MarkerImage{{values[0], values[1]}, values[2], values[3], values[4]};
+          of[k] = MarkerImage{{values[0], values[1]}, values[2], values[3], values[4], values[5]};
         }
         at = end + 1;
       }

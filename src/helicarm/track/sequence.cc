@@ -18,26 +18,6 @@ namespace {
 
 constexpr double sight_floor_px = 0.02;
 
-/// The place after more images, linearised where they put it.
-FramePlace with_sights(FramePlace prior, const std::vector<Sight>& seen) {
-  for (const Sight& sight : seen) {
-    FramePlace next = prior;
-    for (int i = 0; i < 3; ++i) {
-      if (!(sight.view->depth(next.place) > 1)) return prior;
-      const auto slope = geometry::projection_jacobian(*sight.view, next.place);
-      Eigen::Matrix2d spread = slope * prior.covariance * slope.transpose();
-      spread.diagonal().array() += sight.sigma_px * sight.sigma_px;
-      const Eigen::Matrix<double, 3, 2> gain = prior.covariance * slope.transpose() * spread.inverse();
-      const Eigen::Vector2d off =
-          sight.uv - sight.view->project(next.place) - slope * (prior.place - next.place);
-      next.place = prior.place + gain * off;
-      next.covariance = prior.covariance - gain * slope * prior.covariance;
-    }
-    prior = next;
-  }
-  return prior;
-}
-
 /// By the cameras' own covariance, common to all frames.
 Eigen::Matrix3d by_cameras(const SequenceData& work, const Eigen::Vector3d& place) {
   if (work.given.camera_covariance.size() == 0) return Eigen::Matrix3d::Zero();

@@ -32,21 +32,6 @@ double mean_square(double rms, double squares, double count) {
 
 }  // namespace
 
-std::optional<SightedPoint> sighted_point(std::span<const Sight> sights) {
-  std::vector<geometry::RayObservation> rays;
-  Eigen::MatrixXd covariance =
-      Eigen::MatrixXd::Zero(2 * Eigen::Index(sights.size()), 2 * Eigen::Index(sights.size()));
-  for (const Sight& sight : sights) {
-    covariance.diagonal()
-        .segment<2>(2 * Eigen::Index(rays.size()))
-        .setConstant(sight.sigma_px * sight.sigma_px);
-    rays.push_back({*sight.view, sight.uv});
-  }
-  const auto met = geometry::intersect(rays, covariance);
-  if (!met) return std::nullopt;
-  return SightedPoint{met->point, met->covariance, met->ray_gap_mm, met->chi2};
-}
-
 double Tracker::Delay::sigma() const { return 1 / std::sqrt(information); }
 
 Eigen::Vector2d Tracker::rectified(std::size_t view, const Eigen::Vector2d& raw) const {
@@ -96,8 +81,10 @@ void Tracker::expect_images(ExpectedMarker& marker, std::size_t index,
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
     ExpectedImage image;
     image.radius_px = radius_px(k, marker.place);
-    image.contrast = markers_[index].contrast[k];
-    image.spread = std::min(1.2, 0.35 * (1 + 0.25 * markers_[index].age[k]));
+    image.contrast = contrast_of(index, k);
+    // Discs are fitted with a free radius, which their contrast depends on.
+    image.contrast.spread = std::clamp(image.contrast.spread * (1 + 0.1 * markers_[index].age[k]), 0.25, 0.8);
+    image.visible = markers_[index].contrast[k] * std::exp(-0.15 * markers_[index].age[k]);
     if (k > 0 && cameras_[k].depth(marker.place) > 1) {
       const Eigen::Vector2d speed = geometry::projection_jacobian(cameras_[k], marker.place) * velocity;
       image.shift_px = delays_[k].mean() * speed;
@@ -146,8 +133,8 @@ std::vector<std::vector<Candidate>> Tracker::search(const std::vector<xray::Xray
       const double sigma = std::sqrt(spread.trace() / 2) + marker.images[k].shift_sigma;
       const Eigen::Vector2d at = raw(k, cameras_[k].project(marker.place) + marker.images[k].shift_px);
       if (!at.allFinite()) continue;
-      windows.push_back({at, reach_px.value_or(window_reach(sigma)), marker.images[k].radius_px,
-                         marker.images[k].contrast * std::exp(1.5 * (0.35 - marker.images[k].spread))});
+      windows.push_back(
+          {at, reach_px.value_or(window_reach(sigma)), marker.images[k].radius_px, marker.images[k].visible});
     }
     for (const MarkerImage& image : find_markers(images[k], windows, appearance_[k]))
       discs[k].push_back({image, rectified(k, image.uv_raw)});
@@ -292,7 +279,10 @@ FrameSights Tracker::look(int frame, const std::vector<xray::XrayImage>& images)
       alone.push_back(expected(m));
       alone.back().covariance += 0.7 * 0.7 * Eigen::Matrix3d::Identity();
     }
-  if (lost.empty()) return sights;
+  if (lost.empty()) {
+    seek_evidence(sights, again, images);
+    return sights;
+  }
   auto left = search(images, alone, std::nullopt);
   for (std::size_t k = 0; k < cameras_.size(); ++k)
     std::erase_if(left[k], [&](const Candidate& disc) {
@@ -314,6 +304,7 @@ FrameSights Tracker::look(int frame, const std::vector<xray::XrayImage>& images)
     for (std::size_t k = 0; k < cameras_.size(); ++k)
       if (found[i][k] != not_seen) sights.of[lost[i]][k] = left[k][std::size_t(found[i][k])].image;
   }
+  seek_evidence(sights, again, images);
   return sights;
 }
 
@@ -345,6 +336,7 @@ void Tracker::absorb(const FrameSights& sights) {
     bool located = false;
   };
   std::vector<Absorbed> now(markers_.size());
+  for (ContrastLearner& learner : contrasts_) learner.forget();
   std::vector<Eigen::Vector3d> velocities;
   for (std::size_t m = 0; m < markers_.size(); ++m) {
     ExpectedMarker guess = expected(m);
@@ -368,6 +360,15 @@ void Tracker::absorb(const FrameSights& sights) {
         double& contrast = markers_[m].contrast[k];
         contrast =
             contrast > 0 ? 0.7 * contrast + 0.3 * std::abs(image->contrast) : std::abs(image->contrast);
+        if (const ContrastModel model = contrasts_[k].model(); model.is_known) {
+          const double sigma = contrast_sigma(*image),
+                       at = std::abs(image->contrast) / model.at(image->background);
+          constexpr double of_ratios = 0.1;  // their spread between the frames
+          const double gain = 0.3 * of_ratios * of_ratios / (of_ratios * of_ratios + sigma * sigma);
+          double& ratio = markers_[m].ratio[k];
+          ratio = std::clamp(ratio + gain * (at - ratio), 0.5, 2.0);
+        }
+        contrasts_[k].add(*image, markers_[m].ratio[k]);
       }
     }
   }
@@ -496,7 +497,9 @@ Expected<Tracker> Tracker::begin(const TrackCase& given, int frame,
     for (MarkerState& marker : tracker.markers_) {
       marker.contrast.assign(given.views.size(), 0);
       marker.age.assign(given.views.size(), 0);
+      marker.ratio.assign(given.views.size(), 1);
     }
+    tracker.contrasts_.resize(given.views.size());
     tracker.delays_.assign(given.views.size(), {1 / (delay_spread * delay_spread), 0});
     tracker.body_of_.resize(given.markers.size());
     for (std::size_t b = 0; b < given.bodies.size(); ++b) {
@@ -508,6 +511,7 @@ Expected<Tracker> Tracker::begin(const TrackCase& given, int frame,
     tracker.find_first(frame, images);
     tracker.check_rays();
     tracker.check_geometry();
+    tracker.seek_first(images);
     tracker.absorb(tracker.first_);
     return tracker;
   });
@@ -541,6 +545,7 @@ void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
           if (misfits.size() > most + 1 || misfit < least) {
             least = misfit;
             best = tried;
+            best.radius_factor = std::exp(median(sizes));
           }
           most = std::max(most, misfits.size());
         }

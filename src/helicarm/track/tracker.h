@@ -6,6 +6,8 @@
 
 #include "helicarm/track/assign.h"
 #include "helicarm/track/body_pose.h"
+#include "helicarm/track/contrast_model.h"
+#include "helicarm/track/sighted_point.h"
 #include "helicarm/track/track_case.h"
 #include "helicarm/track/tracked.h"
 
@@ -49,6 +51,7 @@ class Tracker {
     int hidden = 0;              // frames since it was seen in two views
     bool known = false;
     std::vector<double> contrast;  // absolute, per view; 0: unknown
+    std::vector<double> ratio;     // of its contrast to that of the view's markers, per view
     std::vector<int> age;          // frames since it was seen, per view
   };
   struct BodyState {
@@ -85,9 +88,15 @@ class Tracker {
   std::vector<Sight> sights_of(std::size_t marker, const FrameSights& sights, const Eigen::Vector3d& place,
                                const Eigen::Vector3d& velocity) const;
   Eigen::Vector3d velocity_of(std::size_t marker) const;
+  std::optional<ExpectedMarker> narrowed(const ExpectedMarker& marker, std::size_t index,
+                                         const FrameSights& sights) const;
+  void seek_evidence(FrameSights& sights, const std::vector<ExpectedMarker>& expected,
+                     const std::vector<xray::XrayImage>& images) const;
+  ContrastModel contrast_of(std::size_t marker, std::size_t view) const;
   void learn_appearance(const std::vector<xray::XrayImage>& images);
   void find_first(int frame, const std::vector<xray::XrayImage>& images);
   void check_rays();
+  void seek_first(const std::vector<xray::XrayImage>& images);
   void check_geometry() const;
   void update_delay(std::size_t marker, const FrameSights& sights, const Eigen::Vector3d& place,
                     const Eigen::Vector3d& velocity);
@@ -95,6 +104,7 @@ class Tracker {
   const TrackCase* given_;
   std::vector<geometry::View> cameras_;
   std::vector<MarkerAppearance> appearance_;  // per view
+  std::vector<ContrastLearner> contrasts_;    // per view
   std::vector<MarkerState> markers_;
   std::vector<BodyState> bodies_;
   std::vector<std::optional<std::size_t>> body_of_;  // of each marker
@@ -102,15 +112,5 @@ class Tracker {
   FrameSights first_;
   std::vector<Warning> warnings_;
 };
-
-/// Point of least weighted squares of two or more sights with its covariance; nothing for parallel rays or a
-/// point behind a source.
-struct SightedPoint {
-  Eigen::Vector3d place;
-  Eigen::Matrix3d covariance;
-  double ray_gap_mm = 0;
-  double chi2 = 0;
-};
-std::optional<SightedPoint> sighted_point(std::span<const Sight> sights);
 
 }  // namespace helicarm::track

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "helicarm/geometry/triangulation.h"
+#include "helicarm/track/marker_fit.h"
+#include "helicarm/track/tracker.h"
+
+namespace helicarm::track {
+
+ContrastModel Tracker::contrast_of(std::size_t marker, std::size_t view) const {
+  ContrastModel model = contrasts_[view].model();
+  model.at_zero *= markers_[marker].ratio[view];
+  model.share *= markers_[marker].ratio[view];
+  return model;
+}
+
+/// By the images that show it already.
+std::optional<ExpectedMarker> Tracker::narrowed(const ExpectedMarker& marker, std::size_t index,
+                                                const FrameSights& sights) const {
+  if (!marker.place.allFinite()) return std::nullopt;
+  ExpectedMarker made = marker;
+  const auto seen = sights_of(index, sights, marker.place, velocity_of(index));
+  const FramePlace place = with_sights({marker.place, marker.covariance}, seen);
+  made.place = place.place;
+  made.covariance = place.covariance;
+  return made;
+}
+
+/// Fits each disc again as that of a marker of known size and contrast, beside its neighbours, and looks for
+/// markers without a disc where they are expected. What background alone explains as well is none.
+void Tracker::seek_evidence(FrameSights& sights, const std::vector<ExpectedMarker>& expected,
+                            const std::vector<xray::XrayImage>& images) const {
+  constexpr double widest_px = 2, enough = 3, nearest_px = 1.2;
+  const std::size_t count = markers_.size();
+  for (const bool is_search : {false, true}) {
+    std::vector<std::optional<ExpectedMarker>> at(count);
+    for (std::size_t m = 0; m < count; ++m) at[m] = narrowed(expected[m], m, sights);
+    const FrameSights before = sights;
+    for (std::size_t k = 0; k < cameras_.size(); ++k) {
+      struct Where {
+        Eigen::Vector2d uv;
+        Eigen::Matrix2d covariance;
+      };
+      std::vector<std::optional<Where>> where(count);
+      for (std::size_t m = 0; m < count; ++m) {
+        if (const auto& image = before.of[m][k]) {
+          where[m] = Where{image->uv_raw, Eigen::Matrix2d::Zero()};
+          continue;
+        }
+        if (!at[m] || !(cameras_[k].depth(at[m]->place) > 1)) continue;
+        const auto slope = geometry::projection_jacobian(cameras_[k], at[m]->place);
+        Eigen::Matrix2d spread = slope * at[m]->covariance * slope.transpose();
+        spread.diagonal().array() += std::pow(at[m]->images[k].shift_sigma, 2) + 0.01;
+        const Eigen::Vector2d uv = raw(k, cameras_[k].project(at[m]->place) + at[m]->images[k].shift_px);
+        if (uv.allFinite() && std::sqrt(spread.trace() / 2) < widest_px) where[m] = Where{uv, spread};
+      }
+      for (std::size_t m = 0; m < count; ++m) {
+        auto& image = sights.of[m][k];
+        if (!where[m] || image.has_value() == is_search) continue;
+        const auto radius_of = [&](std::size_t i) {
+          const Eigen::Vector3d& place = at[i] ? at[i]->place : markers_[i].place;
+          return appearance_[k].radius_factor * radius_px(k, place);
+        };
+        std::vector<KnownNeighbour> others;
+        for (std::size_t i = 0; i < count; ++i)
+          if (i != m && where[i]) others.push_back({where[i]->uv, radius_of(i)});
+        const KnownMarker known{where[m]->uv, where[m]->covariance, radius_of(m), contrast_of(m, k)};
+        const auto fit = fit_known_marker(images[k].pixels, known, others, appearance_[k]);
+        if (!is_search) {
+          if (fit) image = fit->image;
+          continue;
+        }
+        if (!fit || fit->evidence < enough) continue;
+        bool is_taken = false;
+        for (std::size_t i = 0; i < count; ++i)
+          is_taken = is_taken ||
+                     (sights.of[i][k] && (sights.of[i][k]->uv_raw - fit->image.uv_raw).norm() < nearest_px);
+        if (!is_taken) image = fit->image;
+      }
+    }
+  }
+}
+
+/// Likewise in the first frame, where the picks place the markers.
+void Tracker::seek_first(const std::vector<xray::XrayImage>& images) {
+  constexpr double click_px = 2;
+  for (std::size_t k = 0; k < cameras_.size(); ++k)
+    for (const auto& of : first_.of)
+      if (of[k]) contrasts_[k].add(*of[k], 1);
+  std::vector<ExpectedMarker> expected;
+  for (std::size_t m = 0; m < markers_.size(); ++m) {
+    ExpectedMarker& made = expected.emplace_back();
+    made.place = markers_[m].place;
+    double sigma_mm = 0;
+    for (const geometry::View& camera : cameras_)
+      sigma_mm = std::max(sigma_mm, click_px * camera.depth(made.place) / std::abs(camera.intrinsics.fy));
+    made.covariance *= sigma_mm * sigma_mm;
+    expect_images(made, m, Eigen::Vector3d::Zero());
+    // One that is picked in one view has no place yet.
+    if (std::ranges::count(given_->picks, m, &MarkerPick::marker) < 2)
+      made.place.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  seek_evidence(first_, expected, images);
+  contrasts_.assign(cameras_.size(), {});
+}
+
+}  // namespace helicarm::track
