@@ -87,7 +87,7 @@ void pose_frames(const SequenceData& work, const BodyPlan& plan, Estimated& at, 
   }
 }
 
-/// Poses against the first frame: the first one's error is in every other.
+/// Poses against the first frame's, whose error is in every other.
 void against_first(std::vector<TrackedBody>& frames, const std::vector<std::optional<FramePose>>& poses,
                    const Eigen::Vector3d& centre_in_body, const FramePose& first) {
   for (std::size_t f = 0; f < frames.size(); ++f) {
@@ -193,10 +193,8 @@ void smooth_body(const SequenceData& work, Estimated& at, BodySequence& body, co
       frame.decision = at.poses[f] ? own.decision : PoseDecision::warn;
     }
   }
-  // The first frame's own pose, or, where it has none, the smooth one.
-  if (const auto first = at.poses.front() ? at.poses.front()
-                         : motion         ? std::optional(motion->frames.front())
-                                          : std::nullopt)
+  // Against the smooth one of the first frame, which its neighbours' images determine too.
+  if (const auto first = motion ? std::optional(motion->frames.front()) : at.poses.front())
     against_first(body.frames, at.poses, centre, *first);
   for (TrackedBody& frame : body.frames)
     if (!frame.pose) frame.decision = PoseDecision::refuse;
@@ -262,7 +260,8 @@ void estimate_body(const SequenceData& work, const BodyPlan& plan, Estimated& at
 }
 
 std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan& plan, const Estimated& at,
-                                        const BodySequence& body, std::size_t i, std::size_t f) {
+                                        const BodySequence& body, std::size_t i, std::size_t f,
+                                        bool by_others) {
   if (!at.shape.in_body[i] || body.markers[i].moved_at) return std::nullopt;
   std::vector<SeenMarker> others;
   std::size_t full = 0;
@@ -273,13 +272,14 @@ std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan
     }
   std::optional<FramePose> pose;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  bool by_others = false;
+  bool is_by_others = false;
   if (full >= 3 && at.poses[f])
     if (const auto fit = fit_pose(at.poses[f]->pose, others, std::nullopt, {.loose_mm = body.deviation_mm})) {
       pose = FramePose{fit->world_from_body, covariance_of(*fit, others, 0)};
       centre = fit->centre;
-      by_others = true;
+      is_by_others = true;
     }
+  if (!pose && by_others) return std::nullopt;
   if (!pose && at.motion) {
     pose = at.motion->frames[f];
     std::vector<Eigen::Vector3d> in_body;
@@ -293,7 +293,7 @@ std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan
   const Eigen::Matrix3d turn = pose->pose.rotation;
   // Fewer others than usual carry their own deviations farther.
   const double usual = double(std::ranges::count(at.counts, 1)) - 1;
-  const double fewer = by_others ? std::max(1.0, usual / double(full)) : 1;
+  const double fewer = is_by_others ? std::max(1.0, usual / double(full)) : 1;
   return FramePlace{place, slope * pose->covariance * slope.transpose() +
                                fewer * fewer * turn * at.spread[i] * turn.transpose()};
 }

@@ -22,8 +22,10 @@ struct Estimated {
 void estimate_body(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
                    Sequence& sequence);
 
-/// The place of a marker by the other markers of its body in this frame.
+/// The place of a marker by the other markers of its body in this frame; or, unless `by_others`, by the
+/// body's smooth motion where they are too few.
 std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan& plan, const Estimated& at,
-                                        const BodySequence& body, std::size_t i, std::size_t f);
+                                        const BodySequence& body, std::size_t i, std::size_t f,
+                                        bool by_others);
 
 }  // namespace helicarm::track

@@ -42,13 +42,15 @@ void ContrastLearner::add(const MarkerImage& image, double ratio) {
   constexpr double vague = 0.4;
   const double contrast = std::abs(image.contrast) / ratio, relative = contrast_sigma(image);
   if (relative > vague) return;
+  double usual = contrast;
   if (const ContrastModel now = model(); now.is_known) {
     const double expected = now.at(image.background);
+    usual = expected;
     const double off = std::clamp((contrast - expected) / expected, -1.0, 1.0);
     squares_ += std::max(0.0, off * off - relative * relative);
     ++count_;
   }
-  const double sigma = contrast * std::hypot(relative, least_spread);
+  const double sigma = usual * std::hypot(relative, least_spread);
   const Eigen::Vector2d row(1, image.background);
   normal_ += row * row.transpose() / (sigma * sigma);
   right_ += row * contrast / (sigma * sigma);

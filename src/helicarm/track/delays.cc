@@ -74,13 +74,19 @@ void take_out_delays(SequenceData& work, const std::vector<ViewDelay>& delays) {
         if (!sight || !delays[k].is_known) continue;
         const auto &before = work.sights[f > 0 ? f - 1 : 0][m][k],
                    &after = work.sights[std::min(f + 1, work.frames - 1)][m][k];
-        Eigen::Vector2d speed = Eigen::Vector2d::Zero();
+        Eigen::Vector2d speed = Eigen::Vector2d::Zero(), bend = speed;
         if (velocity && work.points[f][m])
           speed = geometry::projection_jacobian(work.cameras[k], work.points[f][m]->place) * *velocity;
         else if (f > 0 && f + 1 < work.frames && before && after)
           speed = (after->uv - before->uv) / (work.times[f + 1] - work.times[f - 1]);
-        sight->uv -= delays[k].frames * speed;
-        sight->sigma_px = std::hypot(sight->sigma_px, delays[k].sigma * speed.norm());
+        if (f > 0 && f + 1 < work.frames && before && after) {
+          const double dt = 0.5 * (work.times[f + 1] - work.times[f - 1]);
+          bend = (after->uv - 2 * work.sights[f][m][k]->uv + before->uv) / (dt * dt);
+        }
+        // Between frames a motion is anything from uniform to uniformly accelerated.
+        const double by = std::abs(delays[k].frames), open = by < 1 ? by * (1 - by) / 4 : 0;
+        sight->uv -= delays[k].frames * speed + (by * by / 2 + open) * bend;
+        sight->sigma_px = std::hypot(sight->sigma_px, delays[k].sigma * speed.norm(), open * bend.norm());
       }
     }
   work.sights = std::move(corrected);

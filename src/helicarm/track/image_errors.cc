@@ -12,10 +12,52 @@ namespace {
 
 constexpr double median_of_chi2 = 0.4549;  // one degree of freedom
 
+/// Squares of ray gaps in image units, beside the variances that the fits state.
+struct Gap {
+  double square, variance;
+};
+
+/// What texture behind the markers and their motion displace a sharp image by, which its fit does not show:
+/// factor and floor of the fits' standard deviations with the largest likelihood.
+double floor_of(const std::vector<Gap>& gaps) {
+  constexpr double least_factor = 0.7, most_factor = 3, most_px = 0.2, farthest = 16;
+  double best = 0, most = -1e300;
+  for (double floor = 0; floor <= most_px; floor = 1.15 * floor + 0.005)
+    for (double factor = least_factor; factor <= most_factor; factor *= 1.1) {
+      double likelihood = 0;
+      for (const Gap& gap : gaps) {
+        const double variance = factor * factor * gap.variance + 2 * floor * floor;
+        likelihood -= 0.5 * (std::log(variance) + std::min(farthest, gap.square / variance));
+      }
+      if (likelihood > most) most = likelihood, best = floor;
+    }
+  return best;
+}
+
+/// The floor is in the sights afterwards.
+void raise_to_floor(SequenceData& work) {
+  constexpr std::size_t least_gaps = 50;
+  std::vector<Gap> gaps;
+  for (std::size_t f = 0; f < work.frames; ++f)
+    for (std::size_t m = 0; m < work.markers; ++m)
+      if (const auto seen = work.seen(f, m); work.points[f][m] && seen.size() == 2) {
+        const double variance = std::pow(seen[0].sigma_px, 2) + std::pow(seen[1].sigma_px, 2);
+        gaps.push_back({work.points[f][m]->chi2 * variance, variance});
+      }
+  if (gaps.size() < least_gaps) return;
+  const double floor = floor_of(gaps);
+  for (auto& frame : work.sights)
+    for (auto& marker : frame)
+      for (auto& sight : marker)
+        if (sight) sight->sigma_px = std::hypot(sight->sigma_px, floor);
+  locate_all(work);
+}
+
 }  // namespace
 
 std::vector<double> sigma_factors(SequenceData& work) {
   constexpr double shared_frames = 30, least = 0.7, most = 10;
+  raise_to_floor(work);
   std::vector<std::vector<double>> ratios(work.markers);
   std::vector<double> all;
   for (std::size_t f = 0; f < work.frames; ++f)

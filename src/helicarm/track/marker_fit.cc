@@ -16,6 +16,7 @@ namespace {
 constexpr Eigen::Index background_terms = 6, contrast_at = 6, place_at = 7, others_at = 9;
 constexpr std::size_t most_others = 3;
 constexpr double margin_px = 2.5, margin_share = 1.1;  // window beyond the radius
+constexpr double bend = 0.06;  // rms of bone's curvature over the window, over a marker's contrast there
 
 struct Pixels {
   Eigen::Vector2d origin;
@@ -54,7 +55,7 @@ class WindowFit {
         appearance_(appearance),
         count_(Eigen::Index(pixels.x.size())),
         parameters_(others_at + Eigen::Index(others.size())),
-        hides_(marker.contrast.is_known ? std::clamp(marker.contrast.share, 0.0, 0.9) : 0.4),
+        hides_(marker.contrast.is_known ? std::clamp(marker.contrast.share, 0.0, 3.0) : 0.4),
         rows_(count_, parameters_),
         residual_(count_),
         weight_(Eigen::VectorXd::Ones(count_)),
@@ -68,13 +69,20 @@ class WindowFit {
 
   Eigen::Vector2d place() const { return pixels_.origin + p_.segment<2>(place_at); }
   double contrast() const { return appearance_.polarity * p_[contrast_at]; }
+  /// Without its prior. `variance`: of it with the prior.
+  double contrast_by_pixels(double variance) const {
+    if (!marker_.contrast.is_known) return contrast();
+    const double prior = 1 / (prior_sigma() * prior_sigma()),
+                 pixels = std::max(1e-3 * prior, 1 / variance - prior);
+    return (contrast() / variance - expected() * prior) / pixels;
+  }
   double background() const {
     const double x = p_[place_at] / pixels_.window, y = p_[place_at + 1] / pixels_.window;
     return p_[0] + p_[1] * x + p_[2] * y + p_[3] * x * x + p_[4] * x * y + p_[5] * y * y;
   }
-  double squares() const { return (weight_.array() * residual_.array().square()).sum(); }
+  double squares() const { return residual_squares() + bend_pull() * p_.segment<3>(3).squaredNorm(); }
   double freedom() const { return std::max(1.0, weight_.sum() - double(parameters_)); }
-  double noise() const { return squares() / freedom(); }
+  double noise() const { return residual_squares() / freedom(); }
   double used() const { return weight_.sum(); }
 
   /// Background and contrasts at a fixed place.
@@ -91,16 +99,18 @@ class WindowFit {
   /// Everything, from the state of `fit_linear`.
   bool fit(double farthest_px) {
     constexpr int iterations = 15;
-    constexpr double enough_px = 2e-3, longest_px = 0.6;
+    constexpr double enough_px = 2e-3, vague_px = 0.05, longest_px = 0.6;
     const Eigen::Vector2d start = p_.segment<2>(place_at);
+    double moved = 1;
     for (int i = 0; i < iterations; ++i) {
       if (i > 2) reweight();
       const Eigen::Vector2d before = p_.segment<2>(place_at);
       if (!step(false, longest_px)) return false;
       if ((p_.segment<2>(place_at) - start).norm() > farthest_px) return false;
-      if (i > 4 && (p_.segment<2>(place_at) - before).norm() < enough_px) return true;
+      moved = (p_.segment<2>(place_at) - before).norm();
+      if (i > 4 && moved < enough_px) break;
     }
-    return false;
+    return moved < vague_px;
   }
 
   /// Residual squares without the marker, at the same weights.
@@ -116,8 +126,10 @@ class WindowFit {
     const Eigen::MatrixXd weighted = weight_.asDiagonal() * rows;
     Eigen::MatrixXd normal = rows.transpose() * weighted;
     normal.diagonal().array() += 1e-9;
+    normal.diagonal().segment<3>(3).array() += bend_pull();
     const Eigen::VectorXd best = normal.ldlt().solve(weighted.transpose() * grey);
-    return (weight_.array() * (grey - rows * best).array().square()).sum();
+    return (weight_.array() * (grey - rows * best).array().square()).sum() +
+           bend_pull() * best.segment<3>(3).squaredNorm();
   }
 
   /// Covariance of contrast and place.
@@ -157,6 +169,11 @@ class WindowFit {
     return sum / double(count_);
   }
   double expected() const { return marker_.contrast.at(background()); }
+  double residual_squares() const { return (weight_.array() * residual_.array().square()).sum(); }
+  /// Weight of a curvature of zero: texture is a share of the radiation, as the contrast is.
+  double bend_pull() const {
+    return marker_.contrast.is_known ? noise() / std::pow(bend * expected(), 2) : 0;
+  }
 
   void evaluate() {
     const double contrast = p_[contrast_at];
@@ -181,6 +198,7 @@ class WindowFit {
     if (marker_.contrast.is_known) {
       const double pull = noise() / (prior_sigma() * prior_sigma());
       made(contrast_at, contrast_at) += pull;
+      for (Eigen::Index i = 3; i < background_terms; ++i) made(i, i) += bend_pull();
     }
     if (linear)
       for (const Eigen::Index i : {place_at, place_at + 1}) made(i, i) += 1e30;
@@ -193,6 +211,7 @@ class WindowFit {
     if (marker_.contrast.is_known)
       right[contrast_at] +=
           noise() / (prior_sigma() * prior_sigma()) * (appearance_.polarity * expected() - p_[contrast_at]);
+    right.segment<3>(3) -= bend_pull() * p_.segment<3>(3);
     if (linear) right.segment<2>(place_at).setZero();
     const Eigen::LDLT<Matrix> factor(normal(linear));
     Vector moved = factor.solve(right);
@@ -275,7 +294,7 @@ std::optional<EvidentMarker> fit_known_marker(const image::Image<float>& grey, c
   made.image.uv_raw = fit.place();
   made.image.sigma_px = std::sqrt(of_place.trace() / 2);
   made.image.radius_px = marker.radius_px;
-  made.image.contrast = appearance.polarity * fit.contrast();
+  made.image.contrast = appearance.polarity * fit.contrast_by_pixels(covariance(0, 0));
   made.image.background = fit.background();
   if (!std::isfinite(made.image.sigma_px)) return std::nullopt;
   made.evidence = evidence_of(fit);

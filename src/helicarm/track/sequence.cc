@@ -124,6 +124,11 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
   constexpr double lost_mm = 5;
   const auto holder = std::ranges::find_if(
       work.given.bodies, [&](const BodyPlan& body) { return std::ranges::count(body.markers, m) > 0; });
+  const auto by_body = [&](std::size_t f, bool by_others) {
+    const auto b = std::size_t(holder - work.given.bodies.begin());
+    const auto i = std::size_t(std::ranges::find(holder->markers, m) - holder->markers.begin());
+    return place_by_body(work, *holder, bodies[b], sequence.bodies[b], i, f, by_others);
+  };
   std::optional<std::vector<FramePlace>> alone;
   bool is_smoothed = false;
   Eigen::Matrix3d of_cameras = Eigen::Matrix3d::Zero();
@@ -137,13 +142,12 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
       marker.status = MarkerStatus::tracked;
       marker.place = FramePlace{point->place, point->covariance};
       marker.ray_gap_mm = point->ray_gap_mm;
+      // What weak images leave open the others of the body say.
+      if (holder != work.given.bodies.end())
+        if (const auto guess = by_body(f, true)) marker.place = with_sights(*guess, seen);
     } else {
       std::optional<FramePlace> guess;
-      if (holder != work.given.bodies.end()) {
-        const auto b = std::size_t(holder - work.given.bodies.begin());
-        const auto i = std::size_t(std::ranges::find(holder->markers, m) - holder->markers.begin());
-        guess = place_by_body(work, *holder, bodies[b], sequence.bodies[b], i, f);
-      }
+      if (holder != work.given.bodies.end()) guess = by_body(f, false);
       if (!guess) {
         if (!is_smoothed) alone = smoothed_alone(work, m), is_smoothed = true;
         if (alone) guess = (*alone)[f];

@@ -32,7 +32,9 @@ std::optional<ExpectedMarker> Tracker::narrowed(const ExpectedMarker& marker, st
 /// markers without a disc where they are expected. What background alone explains as well is none.
 void Tracker::seek_evidence(FrameSights& sights, const std::vector<ExpectedMarker>& expected,
                             const std::vector<xray::XrayImage>& images) const {
-  constexpr double widest_px = 2, enough = 3, nearest_px = 1.2;
+  constexpr double widest_px = 2, nearest_px = 1.2;
+  constexpr double detected = 0.95, certain = 0.99;  // before and after the image is seen
+  const double enough = std::log(certain / (1 - certain)) - std::log(detected / (1 - detected));
   const std::size_t count = markers_.size();
   for (const bool is_search : {false, true}) {
     std::vector<std::optional<ExpectedMarker>> at(count);
