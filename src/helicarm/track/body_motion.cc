@@ -33,11 +33,15 @@ std::vector<SeenMarker> seen_markers(const SequenceData& work, const BodyPlan& p
 void pose_frames(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body) {
   constexpr double misfit = 30, misfit_mm = 0.5;
   at.poses.assign(work.frames, std::nullopt);
+  at.dropped.assign(work.frames, std::nullopt);
   body.frames.assign(work.frames, {});
   std::optional<RigidTransform> last;
   for (std::size_t f = 0; f < work.frames; ++f) {
     TrackedBody& frame = body.frames[f];
     std::vector<SeenMarker> seen = seen_markers(work, plan, at, f);
+    std::vector<std::size_t> indices;
+    for (std::size_t i = 0; i < plan.markers.size(); ++i)
+      if (at.counts[i] && at.shape.in_body[i]) indices.push_back(i);
     const auto sighted = [&] {
       return std::ranges::count_if(seen, [](const SeenMarker& marker) { return !marker.sights.empty(); });
     };
@@ -58,8 +62,13 @@ void pose_frames(const SequenceData& work, const BodyPlan& plan, Estimated& at, 
       }
       if (worst && round == 0 && sighted() > 3) {
         seen[*worst].sights.clear();
+        at.dropped[f] = indices[*worst];
         is_dropped = true;
         continue;
+      }
+      if (worst) {
+        frame.reason = Reason::residual_too_large;
+        break;
       }
       const RigidCovariance covariance = covariance_of(*fit, seen, body.deviation_mm);
       if (!covariance.allFinite()) break;
@@ -76,11 +85,11 @@ void pose_frames(const SequenceData& work, const BodyPlan& plan, Estimated& at, 
       frame.markers = int(sighted());
       if (full > 0) frame.rms_mm = std::sqrt(squares / full);
       frame.centre = fit->centre;
-      const bool is_odd = is_dropped || worst || full < 3;
+      const bool is_odd = is_dropped || full < 3;
       frame.decision = is_odd ? PoseDecision::warn : PoseDecision::accept;
-      frame.reason = is_dropped || worst ? std::optional(Reason::residual_too_large)
-                     : is_odd            ? std::optional(Reason::marker_lost)
-                                         : std::nullopt;
+      frame.reason = is_dropped ? std::optional(Reason::residual_too_large)
+                     : is_odd   ? std::optional(Reason::marker_lost)
+                                : std::nullopt;
       last = fit->world_from_body;
       break;
     }
@@ -102,8 +111,22 @@ void against_first(std::vector<TrackedBody>& frames, const std::vector<std::opti
   }
 }
 
+/// Without those of frames in which another disc was taken for the marker.
+std::vector<OptionalPlace> without_outliers(std::vector<OptionalPlace> deviations) {
+  constexpr double usual = 6, least_mm = 0.5;
+  std::vector<double> sizes;
+  for (const OptionalPlace& each : deviations)
+    if (each) sizes.push_back(each->norm());
+  if (sizes.empty()) return deviations;
+  const double limit = std::max(least_mm, usual * median(std::move(sizes)));
+  for (OptionalPlace& each : deviations)
+    if (each && each->norm() > limit) each.reset();
+  return deviations;
+}
+
 /// What the markers of a body deviate from their places.
 void learn_deviations(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body) {
+  constexpr double farthest_mm = 1;  // rms of a frame that has another disc
   double squares = 0, by_images = 0, freedom = 0;
   for (std::size_t f = 0; f < work.frames; ++f) {
     if (!at.shape.poses[f]) continue;
@@ -115,7 +138,7 @@ void learn_deviations(const SequenceData& work, const BodyPlan& plan, Estimated&
         traces += point->covariance.trace();
         ++n;
       }
-    if (n < 3) continue;
+    if (n < 3 || here > n * farthest_mm * farthest_mm) continue;
     const double left = 3 * n - 6;
     squares += here;
     by_images += traces * left / (3 * n);
@@ -124,7 +147,7 @@ void learn_deviations(const SequenceData& work, const BodyPlan& plan, Estimated&
   const double shown = double(work.frames) > 1 ? double(work.frames - 1) / double(work.frames) : 1;
   if (freedom > 0) body.deviation_mm = std::sqrt(std::max(0.0, (squares / shown - by_images) / freedom));
   for (std::size_t i = 0; i < plan.markers.size(); ++i) {
-    const auto deviations = deviations_of(work, plan, at.shape, at.counts, i);
+    const auto deviations = without_outliers(deviations_of(work, plan, at.shape, at.counts, i));
     Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
     int count = 0;
     for (std::size_t f = 0; f < work.frames; ++f) {
@@ -209,6 +232,7 @@ void estimate_body(const SequenceData& work, const BodyPlan& plan, Estimated& at
   std::vector<Eigen::Vector3d> points;
   for (std::size_t i = 0; i < plan.markers.size(); ++i)
     if (at.counts[i] && at.shape.in_body[i]) points.push_back(*at.shape.in_body[i]);
+  at.dropped.assign(work.frames, std::nullopt);
   body.frames.assign(work.frames, {});
   body.smoothed.assign(work.frames, {});
   const auto refuse = [&](const std::string& why) {
@@ -266,7 +290,7 @@ std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan
   std::vector<SeenMarker> others;
   std::size_t full = 0;
   for (std::size_t k = 0; k < plan.markers.size(); ++k)
-    if (k != i && at.counts[k] && at.shape.in_body[k]) {
+    if (k != i && at.counts[k] && at.shape.in_body[k] && at.dropped[f] != k) {
       others.push_back({*at.shape.in_body[k], work.seen(f, plan.markers[k])});
       full += others.back().sights.size() >= 2;
     }

@@ -15,6 +15,7 @@ struct Estimated {
   std::vector<std::optional<FramePose>> poses;  // world_from_body of the body's own frame
   std::vector<Eigen::Matrix3d> spread;          // of each marker about its place by the others, body frame
   std::optional<SmoothMotion> motion;
+  std::vector<std::optional<std::size_t>> dropped;  // of each frame: the marker that its pose leaves out
 };
 
 /// A body's geometry, poses and motion; one whose markers do not determine its poses has none, and a warning

@@ -43,6 +43,21 @@ Shift shift_of(const std::vector<OptionalPlace>& deviations) {
   return shift;
 }
 
+/// Mean square of the markers' deviations from a shape.
+double misfit_of(const SequenceData& work, const BodyPlan& plan, const Shape& shape,
+                 const std::vector<char>& counts) {
+  double squares = 0;
+  int count = 0;
+  for (std::size_t f = 0; f < work.frames; ++f)
+    for (std::size_t i = 0; i < plan.markers.size(); ++i)
+      if (const auto& point = work.points[f][plan.markers[i]];
+          counts[i] && point && shape.poses[f] && shape.in_body[i]) {
+        squares += (point->place - *shape.poses[f] * *shape.in_body[i]).squaredNorm();
+        ++count;
+      }
+  return squares / std::max(1, count);
+}
+
 }  // namespace
 
 std::optional<RigidTransform> pose_from(const SequenceData& work, const BodyPlan& plan,
@@ -126,6 +141,7 @@ void find_loose(const SequenceData& work, const BodyPlan& plan, std::vector<char
   while (std::ranges::count(counts, 1) >= 4) {
     std::optional<std::size_t> worst;
     Shift farthest;
+    double least = 0;
     for (std::size_t i = 0; i < plan.markers.size(); ++i) {
       if (!counts[i]) continue;
       // The others' own geometry, without this marker's pull.
@@ -133,7 +149,11 @@ void find_loose(const SequenceData& work, const BodyPlan& plan, std::vector<char
       others[i] = 0;
       const Shape apart = shape_of(work, plan, others);
       const Shift shift = shift_of(deviations_of(work, plan, apart, counts, i));
-      if (shift.mm > least_mm && shift.mm > least_sigmas * shift.noise_mm && shift.mm > farthest.mm) {
+      if (shift.mm < least_mm || shift.mm < least_sigmas * shift.noise_mm) continue;
+      // One that moves displaces the others' places by their pose; without it they are rigid.
+      const double left = misfit_of(work, plan, apart, others);
+      if (!worst || left < least) {
+        least = left;
         farthest = shift;
         worst = i;
       }

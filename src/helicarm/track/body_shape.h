@@ -25,7 +25,8 @@ Shape shape_of(const SequenceData& work, const BodyPlan& plan, const std::vector
 std::vector<OptionalPlace> deviations_of(const SequenceData& work, const BodyPlan& plan, const Shape& shape,
                                          const std::vector<char>& counts, std::size_t i);
 
-/// Names markers that moved in their bone, the farthest first, and takes them out.
+/// Names markers that moved in their bone, first the one without which the others are most rigid, and takes
+/// them out.
 void find_loose(const SequenceData& work, const BodyPlan& plan, std::vector<char>& counts, BodySequence& body,
                 Shape& shape, const std::vector<int>& frames, std::vector<Warning>& warnings);
 

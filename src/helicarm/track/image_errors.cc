@@ -79,8 +79,9 @@ std::vector<double> sigma_factors(SequenceData& work) {
   for (std::size_t m = 0; m < work.markers; ++m) {
     const auto count = double(ratios[m].size());
     const double own = ratios[m].empty() ? pooled : variance(ratios[m]);
-    factors[m] =
-        std::clamp(std::sqrt((count * own + shared_frames * pooled) / (count + shared_frames)), least, most);
+    // The gaps show one direction of two or more: a marker whose gaps are small has the errors of the others.
+    const double shared = (count * own + shared_frames * pooled) / (count + shared_frames);
+    factors[m] = std::clamp(std::sqrt(std::max(pooled, shared)), least, most);
   }
   for (auto& frame : work.sights)
     for (std::size_t m = 0; m < work.markers; ++m)

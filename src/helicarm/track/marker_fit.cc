@@ -138,6 +138,28 @@ class WindowFit {
     return noise() * inverse.block<3, 3>(contrast_at, contrast_at);
   }
 
+  /// Variance of the place, of both axes' mean, when each octant about it in turn is left out: what lies on
+  /// one side of the marker alone, as the rim of a bone.
+  double jackknife_variance() const {
+    constexpr std::size_t octants = 8;
+    const Matrix inverse = normal(false).inverse();
+    Eigen::Matrix<double, 2, octants> moved = Eigen::Matrix<double, 2, octants>::Zero(), shares = moved;
+    for (Eigen::Index i = 0; i < count_; ++i) {
+      const double x = pixels_.x[std::size_t(i)] - p_[place_at],
+                   y = pixels_.y[std::size_t(i)] - p_[place_at + 1];
+      const Eigen::Index octant = 4 * (y >= 0) + 2 * (x >= 0) + (std::abs(x) > std::abs(y));
+      const Eigen::Vector2d influence =
+          inverse.middleRows<2>(place_at) * rows_.row(i).transpose() * weight_[i];
+      moved.col(octant) += influence * residual_[i];
+      shares.col(octant) += influence.cwiseAbs2();
+    }
+    const Eigen::Array<double, 2, octants> share =
+        (shares.array().colwise() / shares.rowwise().sum().array()).min(0.9);
+    const Eigen::Matrix<double, 2, octants> steps = moved.array() / (1 - share);
+    const double squares = (steps.colwise() - steps.rowwise().mean()).squaredNorm();
+    return 0.5 * squares * double(octants - 1) / double(octants);
+  }
+
   /// Of the contrast against its prior, in standard deviations, and that of the prior.
   double prior_off() const {
     return marker_.contrast.is_known ? (appearance_.polarity * p_[contrast_at] - expected()) / prior_sigma()
@@ -292,7 +314,7 @@ std::optional<EvidentMarker> fit_known_marker(const image::Image<float>& grey, c
   const Eigen::Matrix2d of_place = covariance.bottomRightCorner<2, 2>();
   EvidentMarker made;
   made.image.uv_raw = fit.place();
-  made.image.sigma_px = std::sqrt(of_place.trace() / 2);
+  made.image.sigma_px = std::sqrt(detection::prior_variance(of_place.trace() / 2, fit.jackknife_variance()));
   made.image.radius_px = marker.radius_px;
   made.image.contrast = appearance.polarity * fit.contrast_by_pixels(covariance(0, 0));
   made.image.background = fit.background();

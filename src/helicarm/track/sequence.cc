@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
@@ -11,6 +12,7 @@
 #include "helicarm/localization/locate.h"
 #include "helicarm/track/body_motion.h"
 #include "helicarm/track/delays.h"
+#include "helicarm/track/exchanges.h"
 #include "helicarm/track/image_errors.h"
 
 namespace helicarm::track {
@@ -118,6 +120,14 @@ std::optional<std::vector<FramePlace>> smoothed_alone(const SequenceData& work, 
   return smooth_places(work.times, measured);
 }
 
+/// Whether the images are of something else than the marker that its body places there.
+bool contradicts(const SightedPoint& point, const FramePlace& by_body) {
+  constexpr double farthest_mm = 1, farthest_chi2 = 60;
+  const Eigen::Vector3d off = point.place - by_body.place;
+  const Eigen::Matrix3d spread = point.covariance + by_body.covariance;
+  return off.norm() > farthest_mm && off.dot(spread.ldlt().solve(off)) > farthest_chi2;
+}
+
 /// A marker in every frame: by two views, else by its body or its own smooth motion and what one view shows.
 void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies, std::size_t m,
                   Sequence& sequence) {
@@ -135,16 +145,23 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
   bool is_first = true;
   for (std::size_t f = 0; f < work.frames; ++f) {
     TrackedMarker& marker = sequence.markers[f][m];
-    const auto seen = work.seen(f, m);
+    auto seen = work.seen(f, m);
+    const auto& point = work.points[f][m];
+    std::optional<FramePlace> by_others;
+    if (point && holder != work.given.bodies.end()) by_others = by_body(f, true);
+    const auto by_motion =
+        point && !by_others && holder != work.given.bodies.end() ? by_body(f, false) : std::nullopt;
+    const auto& check = by_others ? by_others : by_motion;
+    const bool is_wrong = check && contradicts(*point, *check);
+    if (is_wrong) seen.clear();
     for (std::size_t k = 0; k < work.views; ++k)
-      if (work.sights[f][m][k]) marker.views.push_back(k);
-    if (const auto& point = work.points[f][m]) {
+      if (work.sights[f][m][k] && !is_wrong) marker.views.push_back(k);
+    if (point && !is_wrong) {
       marker.status = MarkerStatus::tracked;
       marker.place = FramePlace{point->place, point->covariance};
       marker.ray_gap_mm = point->ray_gap_mm;
       // What weak images leave open the others of the body say.
-      if (holder != work.given.bodies.end())
-        if (const auto guess = by_body(f, true)) marker.place = with_sights(*guess, seen);
+      if (by_others) marker.place = with_sights(*by_others, seen);
     } else {
       std::optional<FramePlace> guess;
       if (holder != work.given.bodies.end()) guess = by_body(f, false);
@@ -190,6 +207,7 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
   Sequence sequence;
   sequence.warnings = given.warnings;
   SequenceData work = data_of(given, sights, sequence);
+  repair_exchanges(work, sequence);
   correct_delays(work, sequence);
   warn_of_delays(work, sequence);
   sequence.sigma_factor = sigma_factors(work);

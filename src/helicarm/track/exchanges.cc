@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/track/exchanges.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/track/body_shape.h"
+
+namespace helicarm::track {
+namespace {
+
+constexpr double suspect_mm = 0.5;  // rms of a body's markers about its geometry
+constexpr double cut_mm = 5;        // of one marker
+
+/// Square sum of a frame's deviations from the bodies' geometry, with what a marker's rays miss each other
+/// by.
+double misfit_of(const SequenceData& work, const std::vector<Shape>& shapes, std::size_t f) {
+  double sum = 0;
+  for (std::size_t b = 0; b < shapes.size(); ++b) {
+    const BodyPlan& plan = work.given.bodies[b];
+    const auto pose = pose_from(work, plan, shapes[b].in_body, f, std::vector<char>(plan.markers.size(), 1));
+    for (std::size_t i = 0; i < plan.markers.size(); ++i) {
+      const auto& point = work.points[f][plan.markers[i]];
+      if (!point || !pose || !shapes[b].in_body[i]) continue;
+      sum += std::min(cut_mm * cut_mm, (point->place - *pose * *shapes[b].in_body[i]).squaredNorm() +
+                                           point->ray_gap_mm * point->ray_gap_mm);
+    }
+  }
+  return sum;
+}
+
+void exchange(SequenceData& work, std::size_t f, std::size_t first, std::size_t second, std::size_t view) {
+  for (std::size_t k = 0; k < work.views; ++k)
+    if (view == work.views || view == k) std::swap(work.sights[f][first][k], work.sights[f][second][k]);
+  for (const std::size_t m : {first, second}) {
+    const auto seen = work.seen(f, m);
+    work.points[f][m] = seen.size() >= 2 ? sighted_point(seen) : std::nullopt;
+  }
+}
+
+struct Exchange {
+  std::size_t first = 0, second = 0, view = 0;  // `views`: in all
+};
+
+/// The exchange of two markers that explains a frame, where one does.
+std::optional<Exchange> exchange_in(SequenceData& work, const std::vector<Shape>& shapes, std::size_t f) {
+  constexpr double explained = 0.1;
+  const double now = misfit_of(work, shapes, f);
+  if (now < suspect_mm * suspect_mm) return std::nullopt;
+  double least = explained * now;
+  std::optional<Exchange> best;
+  for (std::size_t i = 0; i < work.markers; ++i)
+    for (std::size_t k = i + 1; k < work.markers; ++k) {
+      if (!work.points[f][i] || !work.points[f][k]) continue;
+      for (std::size_t view = 0; view <= work.views; ++view) {
+        exchange(work, f, i, k, view);
+        const bool is_whole = work.points[f][i] && work.points[f][k];
+        const double there = is_whole ? misfit_of(work, shapes, f) : least;
+        exchange(work, f, i, k, view);
+        if (there < least) least = there, best = Exchange{i, k, view};
+      }
+    }
+  return best;
+}
+
+}  // namespace
+
+void repair_exchanges(SequenceData& work, Sequence& sequence) {
+  std::vector<Shape> shapes;
+  for (const BodyPlan& plan : work.given.bodies)
+    shapes.push_back(shape_of(work, plan, std::vector<char>(plan.markers.size(), 1)));
+  for (std::size_t f = 0; f < work.frames; ++f)
+    while (const auto found = exchange_in(work, shapes, f)) {
+      exchange(work, f, found->first, found->second, found->view);
+      auto& images = sequence.images[f];
+      for (std::size_t k = 0; k < work.views; ++k)
+        if (found->view == work.views || found->view == k)
+          std::swap(images[found->first * work.views + k], images[found->second * work.views + k]);
+      ++sequence.repaired;
+      const bool is_everywhere = found->view == work.views;
+      sequence.warnings.push_back(
+          {Reason::markers_swapped,
+           fmt::format("frame {}: the images of \"{}\" and \"{}\" were exchanged{}, against the geometry of "
+                       "their bodies: they are exchanged back",
+                       sequence.frames[f], work.given.markers[found->first],
+                       work.given.markers[found->second], is_everywhere ? " in all views" : ""),
+           is_everywhere ? std::string() : work.given.views[found->view].images.name,
+           {{"frame", double(sequence.frames[f])}}});
+    }
+}
+
+}  // namespace helicarm::track

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/track/sequence.h"
+
+#include <algorithm>
+#include <functional>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/track/two_cameras_test.h"
+
+namespace helicarm::track {
+namespace {
+
+constexpr double noise_px = 0.05;
+constexpr int frames = 40;
+
+const std::vector<std::vector<Eigen::Vector3d>> bodies{
+    {{10, 0, 3}, {-8, 7, -4}, {2, -9, 8}, {-5, -6, -9}},
+    {{9, 12, 25}, {-12, 3, 31}, {4, -11, 22}, {-3, 14, 36}}};
+
+TrackCase two_bodies() {
+  TrackCase given;
+  for (const geometry::View& camera : two_cameras()) {
+    TrackView& view = given.views.emplace_back();
+    view.images.name = given.views.size() == 1 ? "A" : "B";
+    view.camera = camera;
+  }
+  for (const auto& body : bodies) {
+    BodyPlan& plan = given.bodies.emplace_back();
+    plan.name = given.bodies.size() == 1 ? "jaw" : "skull";
+    for (std::size_t i = 0; i < body.size(); ++i) {
+      plan.markers.push_back(given.markers.size());
+      given.markers.push_back(plan.name[0] + std::to_string(i + 1));
+    }
+  }
+  return given;
+}
+
+geometry::RigidTransform pose_at(std::size_t body, int frame) {
+  const double t = 0.1 * frame, sign = body == 0 ? 1 : -1;
+  return {geometry::rotation_from_vector({0.1 * std::sin(t), sign * 0.05 * t, 0}),
+          {3 * std::sin(t), sign * 2 * t, std::cos(t)}};
+}
+
+using Shift = std::function<Eigen::Vector3d(std::size_t marker, int frame)>;
+
+Eigen::Vector3d place_of(std::size_t marker, int frame, const Shift& shift) {
+  const std::size_t body = marker / 4;
+  return pose_at(body, frame) * (bodies[body][marker % 4] + shift(marker, frame));
+}
+
+std::vector<FrameSights> drawn(const TrackCase& given, const Shift& shift) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  std::vector<FrameSights> made;
+  for (int f = 1; f <= frames; ++f) {
+    FrameSights& sights = made.emplace_back();
+    sights.frame = f;
+    for (std::size_t m = 0; m < given.markers.size(); ++m) {
+      auto& of = sights.of.emplace_back();
+      for (const TrackView& view : given.views)
+        of.push_back(MarkerImage{view.camera.project(place_of(m, f, shift)) +
+                                     noise_px * Eigen::Vector2d(normal(random), normal(random)),
+                                 noise_px, 2, 60, 120});
+    }
+  }
+  return made;
+}
+
+Eigen::Vector3d none(std::size_t, int) { return Eigen::Vector3d::Zero(); }
+
+double farthest(const Sequence& sequence, const Shift& shift) {
+  double most = 0;
+  for (std::size_t f = 0; f < sequence.frames.size(); ++f)
+    for (std::size_t m = 0; m < sequence.markers[f].size(); ++m)
+      most = std::max(most, (sequence.markers[f][m].place->place - place_of(m, int(f) + 1, shift)).norm());
+  return most;
+}
+
+const Warning* warning_of(const Sequence& sequence, Reason reason) {
+  const auto found = std::ranges::find(sequence.warnings, reason, &Warning::reason);
+  return found == sequence.warnings.end() ? nullptr : &*found;
+}
+
+TEST(Sequence, PlacesAndPosesAreWithinTheirBands) {
+  const TrackCase given = two_bodies();
+  const Sequence sequence = estimate_sequence(given, drawn(given, none));
+  int inside = 0, all = 0;
+  for (std::size_t f = 1; f < sequence.frames.size(); ++f) {
+    for (std::size_t m = 0; m < given.markers.size(); ++m) {
+      const FramePlace& place = *sequence.markers[f][m].place;
+      const Eigen::Vector3d off = place.place - place_of(m, int(f) + 1, none);
+      for (int k = 0; k < 3; ++k, ++all)
+        inside += std::abs(off[k]) < 1.96 * std::sqrt(place.covariance(k, k));
+    }
+    for (std::size_t b = 0; b < 2; ++b) {
+      const TrackedBody& body = sequence.bodies[b].smoothed[f];
+      const geometry::RigidTransform truth = pose_at(b, int(f) + 1) * pose_at(b, 1).inverse();
+      EXPECT_LT((registration::step_about(body.pose->pose, truth, body.centre).tail<3>()).norm(), 0.08);
+    }
+  }
+  EXPECT_NEAR(double(inside) / all, 0.95, 0.03);
+  EXPECT_EQ(sequence.repaired, 0);
+  EXPECT_FALSE(warning_of(sequence, Reason::markers_swapped));
+}
+
+TEST(Sequence, SwapOfTwoMarkersIsRepaired) {
+  const TrackCase given = two_bodies();
+  for (const std::size_t other : {std::size_t(2), std::size_t(6)}) {  // of the same body, of the other
+    auto sights = drawn(given, none);
+    std::swap(sights[19].of[1], sights[19].of[other]);
+    const Sequence sequence = estimate_sequence(given, sights);
+    EXPECT_EQ(sequence.repaired, 1);
+    EXPECT_LT(farthest(sequence, none), 0.3);
+    const Warning* warning = warning_of(sequence, Reason::markers_swapped);
+    ASSERT_TRUE(warning);
+    EXPECT_NE(warning->message.find("frame 20: the images of \"j2\" and"), std::string::npos);
+  }
+}
+
+TEST(Sequence, SwapInOneViewIsRepaired) {
+  const TrackCase given = two_bodies();
+  auto sights = drawn(given, none);
+  std::swap(sights[11].of[4][1], sights[11].of[7][1]);
+  const Sequence sequence = estimate_sequence(given, sights);
+  EXPECT_EQ(sequence.repaired, 1);
+  EXPECT_LT(farthest(sequence, none), 0.3);
+  const Warning* warning = warning_of(sequence, Reason::markers_swapped);
+  ASSERT_TRUE(warning);
+  EXPECT_EQ(warning->view, "B");
+}
+
+TEST(Sequence, DiscThatIsNotTheMarkersIsNotItsPlace) {
+  const TrackCase given = two_bodies();
+  auto sights = drawn(given, none);
+  for (std::size_t k = 0; k < 2; ++k)
+    sights[24].of[3][k]->uv_raw =
+        given.views[k].camera.project(place_of(3, 25, none) + Eigen::Vector3d(4, -3, 2));
+  const Sequence sequence = estimate_sequence(given, sights);
+  EXPECT_EQ(sequence.markers[24][3].status, MarkerStatus::predicted);
+  EXPECT_LT(farthest(sequence, none), 0.5);
+  EXPECT_EQ(sequence.bodies[0].frames[24].decision, PoseDecision::warn);
+}
+
+TEST(Sequence, LooseMarkerIsNamed) {
+  const TrackCase given = two_bodies();
+  const Shift loose = [](std::size_t marker, int frame) {
+    return marker == 5 && frame >= 22 ? Eigen::Vector3d(0.6, -0.5, 0.2) : Eigen::Vector3d(0, 0, 0);
+  };
+  const Sequence sequence = estimate_sequence(given, drawn(given, loose));
+  const Warning* warning = warning_of(sequence, Reason::marker_loose);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(warning->message.find("\"s2\" moved in the body \"skull\""), std::string::npos);
+  EXPECT_EQ(sequence.bodies[1].markers[1].moved_at, 22);
+  EXPECT_LT(farthest(sequence, loose), 0.3);
+  EXPECT_EQ(sequence.repaired, 0);
+}
+
+}  // namespace
+}  // namespace helicarm::track
