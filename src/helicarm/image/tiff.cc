@@ -138,6 +138,14 @@ Expected<int> count_tiff_pages(std::string_view bytes, const std::string& origin
   });
 }
 
+Expected<std::array<int, 2>> tiff_size(std::string_view bytes, const std::string& origin) {
+  return guarded([&] {
+    Source from{bytes};
+    const Layout layout = read_layout(open(from, origin).get(), origin);
+    return std::array{int(layout.width), int(layout.height)};
+  });
+}
+
 Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::string& origin) {
   return guarded([&] {
     Source from{bytes};

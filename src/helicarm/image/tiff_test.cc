@@ -76,6 +76,11 @@ TEST(Tiff, GreyRoundTripIsExact) {
       }
 }
 
+TEST(Tiff, SizeIsReadWithoutThePixels) {
+  EXPECT_EQ(tiff_size(encoded({}), "a.tif").value(), (std::array{5, 3}));
+  EXPECT_EQ(tiff_size(encoded({}).substr(0, 9), "a.tif").error().reason, Reason::bad_value);
+}
+
 TEST(Tiff, WhiteIsZeroIsInverted) {
   EXPECT_EQ(decode_tiff(encoded({.photometric = PHOTOMETRIC_MINISWHITE}), 0, "x.tif")->pixels(4, 2),
             255 - 42);

@@ -7,6 +7,7 @@
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/xray/dicom_builder.h"
 #include "helicarm/xray/read_xray_image.h"
+#include "helicarm/xray/stated_size.h"
 
 namespace helicarm::xray {
 namespace {
@@ -44,6 +45,14 @@ TEST_F(ImageFiles, EachFrameIsThatOfTheFileReadAlone) {
     EXPECT_EQ(image->name, "RUN/1");
   }
   EXPECT_EQ(file->read("RUN/3", 3).error().reason, Reason::bad_value);
+}
+
+TEST_F(ImageFiles, HeadersStateTheSize) {
+  opened(run_of_two("0\\2.5"));
+  EXPECT_EQ(stated_size(file_), Eigen::Vector2i(8, 6));
+  ASSERT_TRUE(write_file(file_, "no image of any kind, but long enough"));
+  EXPECT_FALSE(stated_size(file_));
+  EXPECT_FALSE(stated_size(folder_.path() / "missing.dcm"));
 }
 
 TEST_F(ImageFiles, AnglesOfAnotherNumberOfFramesAreRefused) {
