@@ -53,6 +53,37 @@ void raise_to_floor(SequenceData& work) {
   locate_all(work);
 }
 
+/// Ray gap of the first two views in standard deviations, with the side on which the rays pass.
+std::optional<double> signed_gap(const SequenceData& work, std::size_t f, std::size_t m) {
+  const auto &first = work.sights[f][m][0], &other = work.sights[f][m][1];
+  if (!work.points[f][m] || !first || !other) return std::nullopt;
+  const geometry::Ray from = geometry::ray_through(*first->view, first->uv),
+                      to = geometry::ray_through(*other->view, other->uv);
+  const double sign = (to.origin - from.origin).dot(from.direction.cross(to.direction)) > 0 ? 1 : -1;
+  return sign * std::sqrt(work.points[f][m]->chi2);
+}
+
+/// By how much a 95 % band is wider because the errors' variance is itself estimated: by as many independent
+/// gaps as the part that a marker's gaps have in common (texture moves with it) leaves.
+double few_gaps_factor(const SequenceData& work) {
+  constexpr double z = 1.96, fewest = 4;
+  double squares = 0, between = 0, count = 0, markers = 0;
+  for (std::size_t m = 0; m < work.markers; ++m) {
+    double sum = 0, of_marker = 0, n = 0;
+    for (std::size_t f = 0; f < work.frames; ++f)
+      if (const auto gap = signed_gap(work, f, m)) sum += *gap, of_marker += *gap * *gap, ++n;
+    if (n < 2) continue;
+    squares += of_marker;
+    count += n;
+    between += (sum * sum - of_marker) / (n - 1);
+    ++markers;
+  }
+  if (markers < 2 || !(squares > 0)) return 1;
+  const double common = std::clamp(between / squares, 0.0, 1.0);
+  const double independent = std::max(fewest, count / (1 + (count / markers - 1) * common));
+  return 1 + (z * z + 1) / (4 * independent);  // Student's quantile over the normal one
+}
+
 }  // namespace
 
 std::vector<double> sigma_factors(SequenceData& work) {
@@ -75,13 +106,13 @@ std::vector<double> sigma_factors(SequenceData& work) {
   };
   std::vector<double> factors(work.markers, 1);
   if (all.size() < 5) return factors;
-  const double pooled = variance(all);
+  const double pooled = variance(all), widened = few_gaps_factor(work);
   for (std::size_t m = 0; m < work.markers; ++m) {
     const auto count = double(ratios[m].size());
     const double own = ratios[m].empty() ? pooled : variance(ratios[m]);
     // The gaps show one direction of two or more: a marker whose gaps are small has the errors of the others.
     const double shared = (count * own + shared_frames * pooled) / (count + shared_frames);
-    factors[m] = std::clamp(std::sqrt(std::max(pooled, shared)), least, most);
+    factors[m] = std::clamp(widened * std::sqrt(std::max(pooled, shared)), least, most);
   }
   for (auto& frame : work.sights)
     for (std::size_t m = 0; m < work.markers; ++m)
@@ -96,14 +127,8 @@ double correlation_of(const SequenceData& work) {
   for (std::size_t m = 0; m < work.markers; ++m) {
     std::optional<double> before;
     for (std::size_t f = 0; f < work.frames; ++f) {
-      std::optional<double> now;
-      const auto &first = work.sights[f][m][0], &other = work.sights[f][m][1];
-      if (work.points[f][m] && first && other) {
-        const geometry::Ray from = geometry::ray_through(*first->view, first->uv),
-                            to = geometry::ray_through(*other->view, other->uv);
-        const double sign = (to.origin - from.origin).dot(from.direction.cross(to.direction)) > 0 ? 1 : -1;
-        now = std::clamp(sign * std::sqrt(work.points[f][m]->chi2), -cut, cut);
-      }
+      auto now = signed_gap(work, f, m);
+      if (now) now = std::clamp(*now, -cut, cut);
       if (now && before) {
         products += *now * *before;
         squares += 0.5 * (*now * *now + *before * *before);

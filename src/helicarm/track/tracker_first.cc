@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/statistics.h"
+#include "helicarm/detection/find_dots.h"
+#include "helicarm/geometry/triangulation.h"
+#include "helicarm/track/tracker.h"
+
+namespace helicarm::track {
+
+void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
+  constexpr double click_px = 6;
+  for (std::size_t k = 0; k < cameras_.size(); ++k) {
+    MarkerAppearance best;
+    double least = 1e9;
+    std::size_t most = 0;
+    for (const double polarity : {1.0, -1.0})
+      for (const double absorbance : {0.8, 8.0})  // like the chord's length, and a flat disc
+        for (const double blur : profile_blurs()) {
+          MarkerAppearance tried;
+          tried.polarity = polarity;
+          tried.profile = detection::BallProfile(blur, absorbance);
+          tried.options = detection::fit_options_for(images[k]);
+          std::vector<double> misfits, sizes;
+          for (const MarkerPick& pick : given_->picks) {
+            if (pick.view != k) continue;
+            const double radius = radius_px(k, markers_[pick.marker].place);
+            if (const auto found = picked_marker(images[k], pick.uv_raw, radius, click_px + radius, tried)) {
+              misfits.push_back(found->misfit);
+              sizes.push_back(std::log(found->image.radius_px / radius));
+            }
+          }
+          if (misfits.empty() || misfits.size() + 1 < most) continue;
+          // A blurred small disc looks like a sharp large one: of what fits, the stated size decides.
+          const double misfit = (median(misfits) + 0.1 * std::abs(median(sizes))) / double(misfits.size());
+          if (misfits.size() > most + 1 || misfit < least) {
+            least = misfit;
+            best = tried;
+            best.radius_factor = std::exp(median(sizes));
+          }
+          most = std::max(most, misfits.size());
+        }
+    if (most == 0) best.options = detection::fit_options_for(images[k]);
+    appearance_.push_back(best);
+  }
+}
+
+void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) {
+  constexpr double click_sigma_px = 1.5, click_px = 6;
+  // Places by the clicks alone: depth and size.
+  std::vector<Eigen::Vector3d> placed;
+  for (std::size_t m = 0; m < markers_.size(); ++m) {
+    std::vector<Sight> clicks;
+    for (const MarkerPick& pick : given_->picks)
+      if (pick.marker == m)
+        clicks.push_back({&cameras_[pick.view], rectified(pick.view, pick.uv_raw), click_sigma_px});
+    const auto met = clicks.size() >= 2 ? sighted_point(clicks) : std::nullopt;
+    if (!met) continue;
+    markers_[m].place = met->place;
+    placed.push_back(met->place);
+  }
+  if (placed.empty())
+    throw BadInput(Reason::not_seen, "picks: no marker is picked in two views of the first frame");
+  for (std::size_t m = 0; m < markers_.size(); ++m)
+    if (markers_[m].place.isZero()) markers_[m].place = mean_of(placed);
+  learn_appearance(images);
+
+  first_.frame = frame;
+  first_.of.assign(markers_.size(), std::vector<std::optional<MarkerImage>>(cameras_.size()));
+  struct Snap {
+    double distance;
+    const MarkerPick* pick;
+    MarkerImage image;
+  };
+  std::vector<Snap> snaps;
+  for (const MarkerPick& pick : given_->picks) {
+    const double radius = radius_px(pick.view, markers_[pick.marker].place), reach = click_px + radius;
+    const SearchWindow window{pick.uv_raw, reach + radius, radius, 0};
+    const auto nearest = picked_marker(images[pick.view], pick.uv_raw, radius, reach, appearance_[pick.view]);
+    std::vector<MarkerImage> found = find_markers(images[pick.view], {&window, 1}, appearance_[pick.view]);
+    // Weak discs are texture, where a clear one is near.
+    for (const MarkerImage& image : found)
+      if (const double distance = (image.uv_raw - pick.uv_raw).norm();
+          distance < reach && has_marker_size(image, radius) && nearest && image.sigma_px < 0.15 * radius &&
+          std::abs(image.contrast) > 0.5 * std::abs(nearest->image.contrast))
+        snaps.push_back({distance, &pick, image});
+  }
+  std::ranges::stable_sort(snaps, std::less<>(), &Snap::distance);
+  const auto taken = [&](const Snap& snap) {
+    return std::ranges::any_of(first_.of, [&](const auto& of) {
+      const auto& image = of[snap.pick->view];
+      return image && (image->uv_raw - snap.image.uv_raw).norm() < 0.8;
+    });
+  };
+  for (const Snap& snap : snaps) {
+    auto& of = first_.of[snap.pick->marker][snap.pick->view];
+    if (!of && !taken(snap)) of = snap.image;
+  }
+  for (const MarkerPick& pick : given_->picks)
+    if (!first_.of[pick.marker][pick.view])
+      warnings_.push_back(
+          {Reason::target_not_found,
+           fmt::format("frame {}: no marker of {:.1f} px in diameter within {:.0f} px of the pick \"{}\" at "
+                       "{:.1f}, {:.1f}: it counts as hidden in this view; pick it again if it is visible",
+                       frame, 2 * radius_px(pick.view, markers_[pick.marker].place), click_px + 2,
+                       given_->markers[pick.marker], pick.uv_raw.x(), pick.uv_raw.y()),
+           given_->views[pick.view].images.name,
+           {{"u_px", pick.uv_raw.x()}, {"v_px", pick.uv_raw.y()}}});
+  bool is_any = false;
+  for (std::size_t m = 0; m < markers_.size(); ++m) {
+    const auto seen = sights_of(m, first_, markers_[m].place, Eigen::Vector3d::Zero());
+    is_any = is_any || seen.size() >= 2;
+    if (seen.size() < 2) markers_[m].known = std::ranges::count(given_->picks, m, &MarkerPick::marker) >= 2;
+  }
+  if (!is_any)
+    throw BadInput(
+        Reason::not_seen,
+        fmt::format("frame {}: no marker is found at its picks in two views: check the picks, which "
+                    "are raw pixels, and \"diameter_mm\"",
+                    frame));
+}
+
+}  // namespace helicarm::track

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+#include "helicarm/geometry/triangulation.h"
+#include "helicarm/track/tracker.h"
+
+namespace helicarm::track {
+namespace {
+
+constexpr double sight_floor_px = 0.05;  // of a fit, by the texture behind a marker
+
+}  // namespace
+
+std::vector<Sight> Tracker::sights_of(std::size_t marker, const FrameSights& sights,
+                                      const Eigen::Vector3d& place, const Eigen::Vector3d& velocity) const {
+  std::vector<Sight> made;
+  for (std::size_t k = 0; k < cameras_.size(); ++k) {
+    const auto& image = sights.of[marker][k];
+    if (!image) continue;
+    Eigen::Vector2d uv = rectified(k, image->uv_raw);
+    double sigma = std::hypot(image->sigma_px, sight_floor_px);
+    if (k > 0 && cameras_[k].depth(place) > 1) {
+      const Eigen::Vector2d speed = geometry::projection_jacobian(cameras_[k], place) * velocity;
+      uv -= delays_[k].mean() * speed;
+      sigma = std::hypot(sigma, delays_[k].sigma() * speed.norm());
+    }
+    made.push_back({&cameras_[k], uv, sigma});
+  }
+  return made;
+}
+
+std::optional<PoseFit> Tracker::pose_of(const BodyState& body, const BodyPlan& plan,
+                                        const FrameSights& sights) const {
+  const auto prior = predicted_pose(body);
+  if (!prior) return std::nullopt;
+  // Each image by itself: a wrong disc in one view must not cost the marker's other one.
+  std::vector<SeenMarker> seen, whole;
+  std::vector<std::size_t> marker_of;
+  for (std::size_t i = 0; i < plan.markers.size(); ++i) {
+    if (body.seen[i] == 0) continue;
+    const std::vector<Sight> sights_of_it = sights_of(
+        plan.markers[i], sights, prior->world_from_body * body.in_body[i], velocity_of(plan.markers[i]));
+    for (const Sight& sight : sights_of_it) {
+      seen.push_back({body.in_body[i], {sight}});
+      marker_of.push_back(i);
+    }
+    if (!sights_of_it.empty()) whole.push_back({body.in_body[i], sights_of_it});
+  }
+  if (seen.empty()) return std::nullopt;
+  // From the prior moved by one marker, whichever agrees with most images.
+  constexpr double cut = 50;  // chi2 of an image that counts as wrong
+  const auto cost_of = [&](const geometry::RigidTransform& pose) {
+    const auto at = fit_pose(pose, seen, prior, {.loose_mm = body.loose_mm, .iterations = 1});
+    if (!at) return std::numeric_limits<double>::infinity();
+    const RigidStep off = registration::step_about(pose, prior->world_from_body, prior->centre);
+    double cost = off.dot(prior->covariance.ldlt().solve(off));
+    for (const double chi2 : at->chi2) cost += std::min(cut, chi2);
+    return cost;
+  };
+  geometry::RigidTransform best = prior->world_from_body;
+  double least = cost_of(best);
+  for (const SeenMarker& marker : whole)
+    if (const auto moved = fit_pose(best, {&marker, 1}, prior, {.loose_mm = body.loose_mm}))
+      if (const double cost = cost_of(moved->world_from_body); cost < least) {
+        least = cost;
+        best = moved->world_from_body;
+      }
+  auto fit = fit_pose(best, seen, prior, {.loose_mm = body.loose_mm, .robust = true});
+  if (!fit) return std::nullopt;
+  std::vector<char> determines(plan.markers.size(), 0);
+  for (std::size_t k = 0; k < seen.size(); ++k)
+    if (fit->weight[k] > 0.1) determines[marker_of[k]] = 1;
+  fit->determining = int(std::ranges::count(determines, 1));
+  // The centre of the body's markers, not of their images.
+  std::vector<Eigen::Vector3d> places;
+  for (const SeenMarker& marker : whole) places.push_back(fit->world_from_body * marker.in_body);
+  const Eigen::Vector3d centre = mean_of(places);
+  RigidCovariance moves = RigidCovariance::Identity();
+  moves.bottomLeftCorner<3, 3>() = point_by_step(centre, fit->centre).leftCols<3>();
+  fit->covariance = moves * fit->covariance * moves.transpose();
+  fit->centre = centre;
+  return fit;
+}
+
+}  // namespace helicarm::track
