@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "helicarm/core/parallel.h"
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/track/marker_fit.h"
 #include "helicarm/track/tracker.h"
@@ -40,7 +41,7 @@ void Tracker::seek_evidence(FrameSights& sights, const std::vector<ExpectedMarke
     std::vector<std::optional<ExpectedMarker>> at(count);
     for (std::size_t m = 0; m < count; ++m) at[m] = narrowed(expected[m], m, sights);
     const FrameSights before = sights;
-    for (std::size_t k = 0; k < cameras_.size(); ++k) {
+    parallel_for(cameras_.size(), 0, [&](std::size_t k) {
       struct Where {
         Eigen::Vector2d uv;
         Eigen::Matrix2d covariance;
@@ -81,7 +82,7 @@ void Tracker::seek_evidence(FrameSights& sights, const std::vector<ExpectedMarke
                      (sights.of[i][k] && (sights.of[i][k]->uv_raw - fit->image.uv_raw).norm() < nearest_px);
         if (!is_taken) image = fit->image;
       }
-    }
+    });
   }
 }
 
