@@ -52,7 +52,8 @@ class EarlierResults(SimulatedCase):
         out = self.root / "register"
         out.mkdir()
         (out / "registration.json").write_text(json.dumps({"models": [{"views": [{"name": "AP"}]}]}))
-        for name in ("AP_overlay.png", "report.html", "registration.csv", "relative.csv", "notes.txt"):
+        for name in ("AP_overlay.png", "report.html", "registration.csv", "relative.csv", "bodies.csv",
+                     "smoothed.csv", "frames.jsonl", "sequence.json", "notes.txt"):
             (out / name).write_text("earlier")
         self.assertEqual(run("register", self.root / "case", "--out", out).returncode, 2)
         self.assertEqual(self.names(out), ["notes.txt"])

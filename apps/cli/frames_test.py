@@ -34,7 +34,8 @@ def matter(origin, ray, shift):
     return total
 
 
-def image(axes, shift):
+def image(axes, shift, spots=0):
+    """`spots`: added to single pixels, seven apart."""
     middle = (SIZE - 1) / 2
     origin = [-DISTANCE * axis for axis in axes[2]]
     rows = []
@@ -44,7 +45,8 @@ def image(axes, shift):
             ray = [axes[0][i] * (u - middle) / FOCUS + axes[1][i] * (v - middle) / FOCUS + axes[2][i] for i in range(3)]
             length = math.sqrt(sum(r * r for r in ray))
             noise = ((u * 7919 + v * 104729) % 1009 - 504) // 8
-            row.append(int(40000 * math.exp(-0.03 * matter(origin, [r / length for r in ray], shift))) + noise)
+            bright = spots if u % 7 == 3 and v % 7 == 3 else 0
+            row.append(int(40000 * math.exp(-0.03 * matter(origin, [r / length for r in ray], shift))) + noise + bright)
         rows.append(struct.pack(f">{SIZE}H", *row))
     return b"".join(b"\0" + row for row in rows)
 
@@ -110,9 +112,77 @@ class Frames(unittest.TestCase):
             self.assertEqual(row["decision"], "warn")
             self.assertIn("covariance_missing", row["code"])
             self.assertGreater(float(row["sigma_x_mm"]), 0)
+        for name in ("bodies.csv", "smoothed.csv"):
+            rows = self.table(name)
+            self.assertEqual([(row["frame"], row["body"]) for row in rows],
+                             [(str(frame), model) for frame in range(3) for model in ("first", "second")])
+            self.assertEqual([float(rows[0][f"m{i}{i}"]) for i in range(1, 5)], 4 * [1])
+            self.assertEqual(float(rows[0]["sigma_x_mm"]), 0)
+            for key, expected in zip(("m14", "m24", "m34"), shift_at(2)):
+                self.assertAlmostEqual(float(rows[5][key]), expected, delta=0.4)
+            self.assertEqual((rows[5]["decision"], rows[5]["markers_used"], rows[5]["rms_mm"]), ("warn", "", ""))
+            self.assertGreater(float(rows[5]["sigma_x_mm"]), 0)
         relative = self.table("relative.csv")
-        self.assertEqual([(row["model"], row["reference"]) for row in relative], 3 * [("second", "first")])
+        self.assertEqual([(row["body"], row["reference"]) for row in relative], 3 * [("second", "first")])
         self.assertAlmostEqual(float(relative[2]["m11"]), 1, delta=1e-3)
+        summary = json.loads((self.root / "out" / "sequence.json").read_text())
+        self.assertEqual([(m["name"], m["warned"]) for m in summary["models"]], [("first", 3), ("second", 3)])
+        self.assertIn("second against first", (self.root / "out" / "report.html").read_text())
+
+    def test_interrupted_and_resumed_gives_the_same_bytes(self):
+        names = ("frames.jsonl", "registration.csv", "bodies.csv", "smoothed.csv", "relative.csv", "report.html")
+        options = ("--frames", "0-2", "--search-mm", 4, "--search-deg", 4)
+        self.assertEqual(self.register(self.case, *options).returncode, 0)
+        out = self.root / "out"
+        whole = {name: (out / name).read_bytes() for name in names}
+        (out / "frames.jsonl").write_bytes(whole["frames.jsonl"][:-200])
+        for name in names[1:]:
+            (out / name).unlink()
+        done = self.register(self.case, *options, "--resume")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual({name: (out / name).read_bytes() for name in names}, whole)
+        done = self.register(self.case, "--frames", "0-1", "--search-mm", 4, "--search-deg", 4, "--resume")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("another sequence", done.stderr)
+        self.assertIn("--frames", self.register(self.case, "--resume").stderr)
+
+    def test_a_view_may_start_at_another_number(self):
+        for frame in range(3):
+            (self.root / f"later_{frame + 5}.png").write_bytes((self.root / f"B_{frame:02d}.png").read_bytes())
+        views = [self.case["views"][0], dict(self.case["views"][1], image="later_{frame}.png", frame_offset=5)]
+        case = dict(self.case, views=views, models=self.case["models"][:1])
+        done = self.register(case, "--frames", "0-2", "--search-mm", 4, "--search-deg", 4)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertAlmostEqual(float(self.table("registration.csv")[2]["m14"]), shift_at(2)[0], delta=0.3)
+        views[1]["frame_offset"] = -1
+        self.assertIn("is image -1", self.register(case, "--frames", "0-2").stderr)
+
+    def test_one_frame_that_looks_bright_has_the_polarity_of_its_run(self):
+        views = []
+        for name, axes in CAMERAS.items():
+            for frame in range(3):
+                spots = 20000 if frame == 1 else 0
+                (self.root / f"spots{name}_{frame}.png").write_bytes(png(image(axes, shift_at(frame), spots)))
+            views.append({"name": name, "image": f"spots{name}_{{frame}}.png", "camera": f"{name}.json"})
+        self.assertIn("inverted", run("detect", self.root / "spotsA_1.png").stderr)
+        case = dict(self.case, views=views, models=self.case["models"][:1])
+        done = self.register(case, "--frames", "0-2", "--search-mm", 4, "--search-deg", 4)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("inverted", done.stderr)
+        self.assertAlmostEqual(float(self.table("registration.csv")[1]["m14"]), shift_at(1)[0], delta=0.3)
+
+    def test_images_of_other_sizes_are_named_before_the_work(self):
+        for frame in range(3):
+            data = (self.root / f"B_{frame:02d}.png").read_bytes()
+            if frame == 2:
+                data = data[:16] + struct.pack(">II", 97, SIZE) + data[24:]
+            (self.root / f"size_{frame}.png").write_bytes(data)
+        views = [self.case["views"][0], dict(self.case["views"][1], image="size_{frame}.png")]
+        done = self.register(dict(self.case, views=views), "--frames", "0-2")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("97 x 96", done.stderr)
+        views[1]["frame"] = 1
+        self.assertIn("names one image", self.register(dict(self.case, views=views), "--frames", "0-1").stderr)
 
     def test_a_missing_frame_is_named(self):
         done = self.register(self.case, "--frames", "2-3")

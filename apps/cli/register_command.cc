@@ -7,13 +7,13 @@
 
 #include "command_line.h"
 #include "findings.h"
-#include "helicarm/case_registration/follow_case.h"
 #include "helicarm/case_registration/register_fields.h"
 #include "helicarm/case_registration/registration_tables.h"
 #include "helicarm/core/json.h"
 #include "helicarm/pipeline/registration_case.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/earlier_results.h"
+#include "helicarm/track/model_sequence.h"
 #include "progress_line.h"
 #include "run_command.h"
 
@@ -23,6 +23,7 @@ namespace helicarm::cli {
 struct RegisterArguments {
   RunArguments run = {.folder = {}, .out = "registration"};  ///< the C-arm's history is only read
   std::string frames;                                        ///< A-B[:STEP]; empty: one image per view
+  bool resume = false;                                       ///< of a sequence
 };
 
 namespace {
@@ -62,30 +63,22 @@ void follow(const RegisterArguments& arguments, const case_registration::Registe
   const auto range = value_or_throw(case_registration::frame_range_from(arguments.frames));
   const auto given = value_or_throw(pipeline::read_registration_case(arguments.run.folder));
   ProgressLine progress(console);
-  const auto sequence = value_or_throw(case_registration::follow_case(
-      given, range, options, [&](double share) { progress.notify(share); }, steps));
+  const auto sequence = value_or_throw(track::follow_models(
+      given, range, options, {.out = arguments.run.out, .resume = arguments.resume},
+      [&](double share) { progress.notify(share); }, steps));
   print_warnings(sequence.warnings, console);
-  if (sequence.failure) throw BadInput(*sequence.failure);
-  value_or_throw(case_registration::write_sequence(sequence, arguments.run.out));
-  Json summary = {
-      {"frames", sequence.frames.size()}, {"seconds", sequence.seconds}, {"models", Json::array()}};
-  std::string text;
-  for (std::size_t i = 0; i < given.models.size(); ++i) {
-    int counts[3] = {};
-    for (const auto& frame : sequence.frames) ++counts[int(frame.models[i].decision)];
-    text += fmt::format("  {}: {} accepted, {} warned, {} refused\n", given.models[i].name, counts[0],
-                        counts[1], counts[2]);
-    summary["models"].push_back({{"name", given.models[i].name},
-                                 {"accepted", counts[0]},
-                                 {"warned", counts[1]},
-                                 {"refused", counts[2]}});
-  }
-  if (console.json)
+  value_or_throw(track::write_models(sequence, arguments.run.out));
+  const Json summary = track::to_json(sequence);
+  if (console.json) {
     console.out << to_text(summary) << '\n';
-  else if (!console.quiet)
-    console.out << text
-                << fmt::format("  {} frames in {:.1f} s\n\n  written to {}\n", sequence.frames.size(),
+  } else if (!console.quiet) {
+    for (const Json& model : summary["models"])
+      console.out << fmt::format("  {}: {} accepted, {} warned, {} refused\n",
+                                 model["name"].get<std::string>(), model["accepted"].get<int>(),
+                                 model["warned"].get<int>(), model["refused"].get<int>());
+    console.out << fmt::format("  {} frames in {:.1f} s\n\n  written to {}\n", sequence.frames.size(),
                                sequence.seconds, arguments.run.out.string());
+  }
   if (const auto refusal = sequence.refusal()) throw BadInput(*refusal);
 }
 
@@ -99,7 +92,9 @@ std::string summary_of(const case_registration::CaseRegistration& registration) 
 
 CommandResult register_command(const RegisterArguments& arguments, Console& console) {
   return guarded([&] {
-    report::forget_registration(arguments.run.out);
+    if (arguments.resume && arguments.frames.empty())
+      throw BadInput(Reason::usage, "--resume is for a sequence: give --frames A-B as well");
+    if (!arguments.resume) report::forget_registration(arguments.run.out);
     const case_registration::RegisterOptions options = value_or_throw(options_of(arguments.run, console));
     case_registration::Progress progress;
     if (!console.quiet)
@@ -144,10 +139,12 @@ void add_register(CLI::App& app, Action& action) {
       ->capture_default_str();
   add_run_options(command, a.run, "The C-arm's history (JSON), read only");
   add_fields(command, a.run.options.search, case_registration::search_fields);
-  command->add_option("--frames", a.frames,
-                      "Follow the models through the frames A-B[:STEP] of files with several frames, or of "
-                      "numbered files (\"image\": \"ap_{frame:03d}.tif\"); writes registration.csv and "
-                      "relative.csv");
+  command->add_option(
+      "--frames", a.frames,
+      "Follow the models through the frames A-B[:STEP] of files with several frames, or of "
+      "numbered files (\"image\": \"ap_{frame:03d}.tif\"); writes registration.csv, bodies.csv, "
+      "smoothed.csv, relative.csv, sequence.json and report.html");
+  command->add_flag("--resume", a.resume, "Go on after the frames that an interrupted run left in --out");
 }
 
 }  // namespace helicarm::cli

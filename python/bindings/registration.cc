@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <limits>
 #include <variant>
 
 #include "arrays.h"
-#include "helicarm/case_registration/follow_case.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/pipeline/registration_case.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/registration/follow.h"
+#include "helicarm/report/earlier_results.h"
+#include "helicarm/track/model_sequence.h"
 #include "measuring_options.h"
 #include "module.h"
 #include "signals.h"
@@ -14,7 +16,6 @@
 namespace helicarm::python {
 namespace {
 
-using case_registration::CaseSequence;
 using registration::Registration;
 
 py::object register_models(const std::filesystem::path& folder,
@@ -81,11 +82,25 @@ py::array stacked(const Values& values, py::ssize_t rows, py::ssize_t columns, c
   return array;
 }
 
-py::dict poses_of(const CaseSequence& sequence, std::size_t model) {
+/// (N, rows, rows) of frames, NaN without a pose.
+template <class MatrixOf>
+py::array of_frames(const std::vector<track::TrackedBody>& frames, py::ssize_t rows,
+                    const MatrixOf& matrix_of) {
+  using Matrix = std::decay_t<decltype(matrix_of(track::FramePose{}))>;
+  return stacked(frames, rows, rows, [&](const track::TrackedBody& frame) -> Matrix {
+    if (frame.pose) return matrix_of(*frame.pose);
+    return Matrix::Constant(std::numeric_limits<double>::quiet_NaN());
+  });
+}
+
+Eigen::Matrix4d matrix_of_pose(const track::FramePose& frame) { return frame.pose.matrix(); }
+registration::RigidCovariance covariance_of_pose(const track::FramePose& frame) { return frame.covariance; }
+
+py::dict poses_of(const track::ModelSequence& sequence, std::size_t model) {
   std::vector<const Registration*> found;
   py::list decisions, codes;
   std::vector<Eigen::Vector3d> centres;
-  for (const auto& frame : sequence.frames) {
+  for (const auto& frame : sequence.registered) {
     const Registration& one = frame.models[model];
     found.push_back(&one);
     centres.push_back(one.centre);
@@ -93,33 +108,38 @@ py::dict poses_of(const CaseSequence& sequence, std::size_t model) {
     codes.append(one.failure ? py::object(py::str(std::string(code(one.failure->reason)))) : py::none());
   }
   py::dict poses;
-  poses["name"] = found.front()->name;
+  poses["name"] = sequence.names[model];
   poses["world_from_model"] =
       stacked(found, 4, 4, [](const Registration* one) { return one->world_from_model.matrix(); });
   poses["covariance"] = stacked(found, 6, 6, [](const Registration* one) { return one->covariance; });
   poses["centre_mm"] = rows_array<3>(centres);
   poses["decision"] = decisions;
   poses["refused"] = codes;
+  const track::BodySequence& body = sequence.bodies[model];
+  poses["smoothed"] = of_frames(body.smoothed, 4, matrix_of_pose);
+  poses["smoothed_covariance"] = of_frames(body.smoothed, 6, covariance_of_pose);
   return poses;
 }
 
-py::dict relative_poses_of(const CaseSequence& sequence, std::size_t model) {
+py::dict relative_poses_of(const track::ModelSequence& sequence, std::size_t model) {
   std::vector<registration::RelativePose> found;
-  for (const auto& frame : sequence.frames)
+  for (const auto& frame : sequence.registered)
     found.push_back(registration::relative_pose(frame.models.front(), frame.models[model]));
   py::dict poses;
-  poses["name"] = sequence.frames.front().models[model].name;
-  poses["reference"] = sequence.frames.front().models.front().name;
+  poses["name"] = sequence.names[model];
+  poses["reference"] = sequence.names.front();
   poses["reference_from_model"] =
       stacked(found, 4, 4, [](const auto& one) { return one.reference_from_model.matrix(); });
   poses["covariance"] = stacked(found, 6, 6, [](const auto& one) { return one.covariance; });
+  poses["smoothed"] = of_frames(sequence.relative[model - 1], 4, matrix_of_pose);
+  poses["smoothed_covariance"] = of_frames(sequence.relative[model - 1], 6, covariance_of_pose);
   return poses;
 }
 
 py::object register_sequence(const std::filesystem::path& folder, const Frames& frames,
-                             const std::optional<std::filesystem::path>& out, const std::string& method,
-                             std::optional<double> max_error_mm, double motion_sigma_mm, double search_mm,
-                             double search_deg, unsigned threads,
+                             const std::optional<std::filesystem::path>& out, bool resume,
+                             const std::string& method, std::optional<double> max_error_mm,
+                             double motion_sigma_mm, double search_mm, double search_deg, unsigned threads,
                              const std::optional<std::filesystem::path>& history, const py::object& cache,
                              const py::object& progress) {
   const auto options = measuring_options("register_sequence", method, max_error_mm, motion_sigma_mm,
@@ -131,26 +151,25 @@ py::object register_sequence(const std::filesystem::path& folder, const Frames& 
     const py::gil_scoped_acquire acquire;
     if (!progress.is_none()) progress(share);
   };
+  if (out && !resume) report::forget_registration(*out);
   const auto sequence = value_or_raise(without_gil([&] {
     return pipeline::read_registration_case(folder)
         .and_then([&](const pipeline::RegistrationCase& given) {
-          return case_registration::follow_case(given, range, options, on_frame, {{}, hooks.on_view});
+          return track::follow_models(given, range, options, {.out = out, .resume = resume}, on_frame,
+                                      {{}, hooks.on_view});
         })
-        .and_then([&](CaseSequence made) {
-          const auto written =
-              out && !made.failure ? case_registration::write_sequence(made, *out) : Expected<void>{};
+        .and_then([&](track::ModelSequence made) {
+          const auto written = out ? track::write_models(made, *out) : Expected<void>{};
           return written.map([&] { return std::move(made); });
         });
   }));
-  if (sequence.failure) raise(*sequence.failure);
   py::dict answer;
-  py::list numbers, models, relative;
-  for (const auto& frame : sequence.frames) numbers.append(frame.frame);
-  for (std::size_t i = 0; i < sequence.frames.front().models.size(); ++i) {
+  py::list models, relative;
+  for (std::size_t i = 0; i < sequence.names.size(); ++i) {
     models.append(poses_of(sequence, i));
     if (i > 0) relative.append(relative_poses_of(sequence, i));
   }
-  answer["frames"] = numbers;
+  answer["frames"] = py::cast(sequence.frames);
   answer["models"] = models;
   answer["relative"] = relative;
   answer["warnings"] = warning_list(sequence.warnings);
@@ -186,7 +205,7 @@ void add_registration(py::module_& module) {
       ".result.");
   module.def(
       "register_sequence", &register_sequence, py::arg("folder"), py::arg("frames"), py::kw_only(),
-      py::arg("out") = py::none(),
+      py::arg("out") = py::none(), py::arg("resume") = false,
       py::arg("method") = std::string(pipeline::method_words[std::size_t(defaults.run.method)]),
       py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
       py::arg("search_mm") = defaults.search.shift_mm, py::arg("search_deg") = defaults.search.turn_deg,
@@ -199,8 +218,15 @@ void add_registration(py::module_& module) {
       "(N, 3), decision (N words), refused (N reasons "
       "or\n"
       "None)), relative (of the second and further models: name, reference, reference_from_model (N, 4, 4),\n"
-      "covariance (N, 6, 6)), warnings and seconds.\n\n"
-      "out: folder for registration.csv and relative.csv, or None. progress: called with the share done, 0 "
+      "covariance (N, 6, 6)), warnings and seconds. smoothed (N, 4, 4) and smoothed_covariance (N, 6, 6) of "
+      "each\n"
+      "model and relative pose: the motion against the first frame by one estimate over all frames, gaps "
+      "filled.\n\n"
+      "out: folder for registration.csv, bodies.csv, smoothed.csv, relative.csv, sequence.json and "
+      "report.html,\n"
+      "or None; rows are written as they are computed. resume: go on after the frames of an interrupted run "
+      "in\n"
+      "`out`. progress: called with the share done, 0 "
       "to 1,\n"
       "after each frame. The others as in register.\n\n"
       "Raises as run_case; RefusedError if a model is refused in some frame, with all poses in .result.");

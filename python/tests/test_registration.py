@@ -130,7 +130,12 @@ def test_register_sequence_follows_the_models(sequence, tmp_path):
     assert body["world_from_model"][:, :3, 3] == pytest.approx(np.array([[1, 0, 0], [2, 0, 0], [3, 0, 0]]), abs=0.2)
     assert body["covariance"].shape == (3, 6, 6) and body["decision"] == ["warn"] * 3 and body["refused"] == [None] * 3
     assert answer["relative"][0]["reference_from_model"] == pytest.approx(np.tile(np.eye(4), (3, 1, 1)), abs=0.05)
+    assert body["smoothed"][2, :3, 3] == pytest.approx([2, 0, 0], abs=0.2) and body["smoothed_covariance"].shape == (3, 6, 6)
+    assert answer["relative"][0]["smoothed"] == pytest.approx(np.tile(np.eye(4), (3, 1, 1)), abs=0.05)
     assert len((tmp_path / "registration.csv").read_text().splitlines()) == 1 + 3 * 2
+    assert len((tmp_path / "bodies.csv").read_text().splitlines()) == 1 + 3 * 2
+    again = helicarm.register_sequence(sequence, range(1, 4), out=tmp_path, resume=True)
+    assert np.array_equal(again["models"][0]["smoothed"], body["smoothed"])
 
 
 def test_register_sequence_ends_where_progress_raises(sequence):

@@ -151,6 +151,24 @@ def summary(errors):
     return f"median {np.median(errors):.3f} mm, 95 % {np.percentile(errors, 95):.3f} mm, largest {max(errors):.3f} mm"
 
 
+def motion_summary(rows, name, in_femur, start):
+    """Errors of motions against the first frame at the model's points, and the share of the centre's that 1.96 sigma hold."""
+    errors, inside, count = [], 0, 0
+    points, centre = placed(start[name], CENTRES[name] + 0.75 * TARGETS), placed(start[name], CENTRES[name][None])
+    for row in rows:
+        poses = poses_at(int(row["frame"]))
+        true = poses[name] @ np.linalg.inv(start[name])
+        if in_femur:
+            true = np.linalg.inv(poses["femur"] @ np.linalg.inv(start["femur"])) @ true
+        errors.append(np.linalg.norm(placed(pose_of(row), points) - placed(true, points), axis=1).mean())
+        if row is rows[0]:
+            continue  # the identity, without error
+        sigma = np.array([float(row[f"sigma_{axis}_mm"]) for axis in "xyz"])
+        inside += np.sum(np.abs(placed(pose_of(row), centre) - placed(true, centre))[0] < 1.96 * sigma)
+        count += 3
+    return f"{summary(errors)}; rms {np.sqrt(np.mean(np.square(errors))):.4f} mm; {100 * inside / max(1, count):.0f} % inside 95 %"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="build/bin/helicarm")
@@ -179,13 +197,20 @@ def main():
             codes = sorted({row["code"] for row in own if row["code"]})
             print(f"{name}: {summary(errors) if errors else '-'}; {decisions}; codes: {', '.join(codes) or '-'}")
         errors = []
-        for row in rows_of(folder / "out/relative.csv"):
-            if row["decision"] == "refuse":
+        for femur, tibia in zip(*([row for row in rows if row["model"] == name] for name in ("femur", "tibia"))):
+            if "refuse" in (femur["decision"], tibia["decision"]):
                 continue
-            poses, points = poses_at(int(row["frame"])), CENTRES["tibia"] + 0.75 * TARGETS
+            poses, points = poses_at(int(femur["frame"])), CENTRES["tibia"] + 0.75 * TARGETS
+            found = np.linalg.inv(pose_of(femur)) @ pose_of(tibia)
             true = np.linalg.inv(poses["femur"]) @ poses["tibia"]
-            errors.append(np.linalg.norm(placed(pose_of(row), points) - placed(true, points), axis=1).mean())
+            errors.append(np.linalg.norm(placed(found, points) - placed(true, points), axis=1).mean())
         print(f"tibia in femur: {summary(errors) if errors else '-'}")
+        start = poses_at(0)
+        for kind in ("bodies", "smoothed", "relative"):
+            for name in ("femur", "tibia"):
+                own = [row for row in rows_of(folder / f"out/{kind}.csv") if row["body"] == name and row["m11"]]
+                if own:
+                    print(f"{kind}.csv, {name} against its first frame: {motion_summary(own, name, kind == 'relative', start)}")
         frames, seconds = re.search(r"(\d+) frames in ([\d.]+) s", done.stdout).groups()
         print(f"{frames} pairs in {seconds} s: {int(frames) / float(seconds):.2f} pairs/s, two bones")
 

@@ -2,9 +2,8 @@
 #include "helicarm/case_registration/follow_case.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <memory>
+#include <iterator>
 #include <regex>
 
 #include <fmt/format.h>
@@ -13,45 +12,29 @@
 #include "helicarm/case_registration/plan_errors.h"
 #include "helicarm/case_registration/start_poses.h"
 #include "helicarm/core/csv.h"
-#include "helicarm/core/files.h"
-#include "helicarm/pipeline/view_image.h"
 #include "helicarm/registration/follow.h"
+#include "helicarm/xray/run_polarity.h"
 
 namespace helicarm::case_registration {
-namespace {
 
-using registration::Follower;
-using registration::Registration;
-
-/// Refuses images of later frames that are missing, and frames that a file does not have, before the work.
-void check_frames(const pipeline::RegistrationCase& given, const FrameRange& range) {
-  std::string first;
-  int missing = 0;
-  for (int i = 0; i < range.count(); ++i)
-    for (const pipeline::CaseView& view :
-         value_or_throw(pipeline::at_frame(given, range.first + i * range.step)).base.views)
-      if (!std::filesystem::exists(view.image) && missing++ == 0) first = view.image.filename().string();
-  if (missing > 0)
-    throw BadInput(Reason::missing_file, fmt::format("{} of {} images do not exist, the first: {}", missing,
-                                                     range.count() * int(given.base.views.size()), first));
-  const auto last = value_or_throw(pipeline::at_frame(given, range.first + (range.count() - 1) * range.step));
-  for (const pipeline::CaseView& view : last.base.views) value_or_throw(pipeline::image_of(view));
-}
-
-/// A model and who follows it; the follower refers to the model.
-struct Followed {
+struct FollowedModel {
   registration::Model model;
-  std::optional<Follower> follower;
+  std::optional<registration::Follower> follower;
   StartPoses start;
   std::optional<registration::LandmarkFault> fault;
   std::optional<Plan> plan;
 };
 
-std::vector<std::unique_ptr<Followed>> followed_models(const pipeline::RegistrationCase& given,
-                                                       const RegisterOptions& options,
-                                                       const Progress& progress, const LoadedViews& loaded,
-                                                       std::vector<Warning>& warnings) {
-  std::vector<std::unique_ptr<Followed>> bodies;
+namespace {
+
+using registration::Registration;
+
+std::vector<std::unique_ptr<FollowedModel>> followed_models(const pipeline::RegistrationCase& given,
+                                                            const RegisterOptions& options,
+                                                            const Progress& progress,
+                                                            const LoadedViews& loaded,
+                                                            std::vector<Warning>& warnings) {
+  std::vector<std::unique_ptr<FollowedModel>> bodies;
   std::vector<std::optional<Plan>> plans = read_plans(given);
   for (std::size_t i = 0; i < given.models.size(); ++i) {
     const pipeline::CaseModel& asked = given.models[i];
@@ -65,8 +48,8 @@ std::vector<std::unique_ptr<Followed>> followed_models(const pipeline::Registrat
     if (fault && fault->is_certain) throw BadInput(fault->failure);
     for (Warning& warning : places_outside(asked, model, start.used, plans[i]))
       warnings.push_back(std::move(warning));
-    auto body = std::make_unique<Followed>(
-        Followed{std::move(*model), {}, std::move(start), fault, std::move(plans[i])});
+    auto body = std::make_unique<FollowedModel>(
+        FollowedModel{std::move(*model), {}, std::move(start), fault, std::move(plans[i])});
     const std::vector<geometry::RigidTransform>& poses = body->start.poses;
     body->follower.emplace(body->model, poses,
                            search_options(options, progress, loaded, asked, poses.size()));
@@ -103,12 +86,6 @@ std::string pose_fields(const geometry::RigidTransform& pose,
   return fields;
 }
 
-std::string header(const char* first) {
-  std::string line = first;
-  for (int i = 0; i < 16; ++i) line += fmt::format(",m{}{}", i / 4 + 1, i % 4 + 1);
-  return line + ",sigma_rx_deg,sigma_ry_deg,sigma_rz_deg,sigma_x_mm,sigma_y_mm,sigma_z_mm,code\n";
-}
-
 /// Of the failure, or else of the warnings.
 std::string code_field(const Registration& result) {
   if (result.failure) return std::string(code(result.failure->reason));
@@ -136,7 +113,7 @@ Expected<FrameRange> frame_range_from(const std::string& text) {
   return range;
 }
 
-std::optional<Failure> CaseSequence::refusal() const {
+std::optional<Failure> refusal_of(const std::vector<RegisteredFrame>& frames) {
   std::optional<Failure> first;
   int refused = 0, number = 0;
   for (const RegisteredFrame& frame : frames)
@@ -148,78 +125,73 @@ std::optional<Failure> CaseSequence::refusal() const {
   return first;
 }
 
-Expected<CaseSequence> follow_case(const pipeline::RegistrationCase& given, const FrameRange& range,
-                                   const RegisterOptions& options,
-                                   const std::function<void(double share)>& on_frame,
-                                   const Progress& progress) {
+CaseFollower::CaseFollower(CaseFollower&&) noexcept = default;
+CaseFollower::~CaseFollower() = default;
+
+Expected<CaseFollower> CaseFollower::begin(const pipeline::RegistrationCase& first,
+                                           const RegisterOptions& options, const Progress& progress) {
   return guarded([&] {
-    CaseSequence sequence;
-    sequence.warnings = given.base.warnings;
-    const auto first = value_or_throw(pipeline::at_frame(given, range.first));
-    const auto loaded = load_views(first, options.run, progress.of_views());
-    if (!loaded) {
-      if (exit_code(loaded.error().reason) == 2) throw BadInput(loaded.error());
-      sequence.failure = loaded.error();
-      return sequence;
-    }
-    sequence.warnings.insert(sequence.warnings.end(), loaded->warnings.begin(), loaded->warnings.end());
-    check_frames(given, range);
-    const auto bodies = followed_models(first, options, progress, *loaded, sequence.warnings);
-    const auto begun = std::chrono::steady_clock::now();
-    for (int i = 0; i < range.count(); ++i) {
-      const int frame = range.first + i * range.step;
-      const auto views =
-          value_or_throw(with_images(*loaded, value_or_throw(pipeline::at_frame(given, frame))));
-      RegisteredFrame made{frame, {}};
-      for (const auto& body : bodies) {
-        made.models.push_back(body->follower->next(views, frame));
-        if (i == 0) compare_with_landmarks(body->start, body->fault, made.models.back());
-        limit_error(largest_error(body->plan, made.models.back()), options.run.max_error_mm,
-                    made.models.back());
-        // For the figures of a report, which a sequence has not.
-        for (registration::RegisteredView& view : made.models.back().views) view.agreements = {};
-      }
-      sequence.frames.push_back(std::move(made));
-      if (on_frame) on_frame(double(i + 1) / range.count());
-    }
-    for (const auto& body : bodies)
-      sequence.warnings.insert(sequence.warnings.end(), body->model.warnings.begin(),
-                               body->model.warnings.end());
-    sequence.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-    return sequence;
+    CaseFollower made;
+    made.max_error_mm_ = options.run.max_error_mm;
+    made.loaded_ = value_or_throw(load_views(first, options.run, progress.of_views()));
+    made.warnings_ = first.base.warnings;
+    // The polarity of a run is not that of its first image.
+    std::ranges::copy_if(
+        made.loaded_.warnings, std::back_inserter(made.warnings_),
+        [](const Warning& warning) { return !warning.message.ends_with(xray::inverted_note); });
+    made.models_ = followed_models(first, options, progress, made.loaded_, made.warnings_);
+    for (const auto& body : made.models_)
+      made.warnings_.insert(made.warnings_.end(), body->model.warnings.begin(), body->model.warnings.end());
+    return made;
   });
 }
 
-std::string poses_csv(const CaseSequence& sequence) {
-  std::string csv = header("frame,model,decision");
-  for (const RegisteredFrame& frame : sequence.frames)
-    for (const Registration& model : frame.models)
-      csv += fmt::format("{},{},{}{},{}\n", frame.frame, csv_field(model.name),
-                         registration::word(model.decision),
-                         pose_fields(model.world_from_model, model.covariance), code_field(model));
-  return csv;
-}
-
-std::string relative_csv(const CaseSequence& sequence) {
-  std::string csv = header("frame,model,reference,decision");
-  for (const RegisteredFrame& frame : sequence.frames)
-    for (std::size_t i = 1; i < frame.models.size(); ++i) {
-      const Registration &reference = frame.models[0], &model = frame.models[i];
-      const auto relative = registration::relative_pose(reference, model);
-      const bool by_reference = reference.decision > model.decision;
-      csv += fmt::format("{},{},{},{}{},{}\n", frame.frame, csv_field(model.name), csv_field(reference.name),
-                         registration::word(std::max(reference.decision, model.decision)),
-                         pose_fields(relative.reference_from_model, relative.covariance),
-                         code_field(by_reference ? reference : model));
+Expected<RegisteredFrame> CaseFollower::next(int frame, const std::vector<xray::XrayImage>& images) {
+  return guarded([&] {
+    const auto views = value_or_throw(with_images(loaded_, images));
+    RegisteredFrame made{frame, {}};
+    for (const auto& body : models_) {
+      made.models.push_back(body->follower->next(views, frame));
+      if (!is_begun_) compare_with_landmarks(body->start, body->fault, made.models.back());
+      limit_error(largest_error(body->plan, made.models.back()), max_error_mm_, made.models.back());
+      // For the figures of a report of one image.
+      for (registration::RegisteredView& view : made.models.back().views) view.agreements = {};
     }
-  return csv;
+    is_begun_ = true;
+    return made;
+  });
 }
 
-Expected<void> write_sequence(const CaseSequence& sequence, const std::filesystem::path& folder) {
-  return write_file(folder / "registration.csv", poses_csv(sequence)).and_then([&]() -> Expected<void> {
-    if (sequence.frames.empty() || sequence.frames.front().models.size() < 2) return {};
-    return write_file(folder / "relative.csv", relative_csv(sequence));
-  });
+void CaseFollower::take(const RegisteredFrame& frame) {
+  for (std::size_t i = 0; i < models_.size(); ++i) models_[i]->follower->take(frame.models[i], frame.frame);
+  is_begun_ = true;
+}
+
+std::vector<geometry::View> CaseFollower::cameras() const {
+  std::vector<geometry::View> cameras;
+  for (const registration::RegistrationView& view : loaded_.views) cameras.push_back(view.view);
+  return cameras;
+}
+
+std::vector<Eigen::Vector3d> CaseFollower::centres() const {
+  std::vector<Eigen::Vector3d> centres;
+  for (const auto& body : models_) centres.push_back(body->model.centre);
+  return centres;
+}
+
+std::string poses_header() {
+  std::string line = "frame,model,decision";
+  for (int i = 0; i < 16; ++i) line += fmt::format(",m{}{}", i / 4 + 1, i % 4 + 1);
+  return line + ",sigma_rx_deg,sigma_ry_deg,sigma_rz_deg,sigma_x_mm,sigma_y_mm,sigma_z_mm,code\n";
+}
+
+std::string poses_rows(const RegisteredFrame& frame) {
+  std::string rows;
+  for (const Registration& model : frame.models)
+    rows +=
+        fmt::format("{},{},{}{},{}\n", frame.frame, csv_field(model.name), registration::word(model.decision),
+                    pose_fields(model.world_from_model, model.covariance), code_field(model));
+  return rows;
 }
 
 }  // namespace helicarm::case_registration

@@ -179,17 +179,16 @@ Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const 
 }
 
 Expected<std::vector<RegistrationView>> with_images(const LoadedViews& loaded,
-                                                    const pipeline::RegistrationCase& given) {
+                                                    const std::vector<xray::XrayImage>& images) {
   return guarded([&] {
     std::vector<RegistrationView> views = loaded.views;
     for (std::size_t i = 0; i < views.size(); ++i) {
-      const pipeline::CaseView& asked = given.base.views[i];
-      const auto image = value_or_throw(pipeline::image_of(asked));
+      const xray::XrayImage& image = images[i];
       std::string patient = loaded.patient_key;
       take_patient(patient, image);
-      check_size(asked.name, "the sequence's first image has",
+      check_size(views[i].name, "the sequence's first image has",
                  {views[i].grey.width(), views[i].grey.height()}, image.pixels);
-      RegistrationView now = view_of(image, asked.name, views[i].view);
+      RegistrationView now = view_of(image, views[i].name, views[i].view);
       now.grey = loaded.maps[i] ? rectification::resample(image, *loaded.maps[i]) : image.pixels;
       now.usable = std::move(views[i].usable);
       views[i] = std::move(now);

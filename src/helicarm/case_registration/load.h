@@ -37,10 +37,10 @@ Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const 
 LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
                                  const pipeline::CaseCalibration& calibration);
 
-/// The views with the images of another moment: their geometry, distortion and masks stay. Fails as
-/// `read_xray_image`, with bad_size for another image size, and with patient_mismatch for another patient.
+/// The views with the images of another moment, one for each view: their geometry, distortion and masks stay.
+/// Fails with bad_size for another image size, and with patient_mismatch for another patient.
 Expected<std::vector<registration::RegistrationView>> with_images(const LoadedViews& loaded,
-                                                                  const pipeline::RegistrationCase& given);
+                                                                  const std::vector<xray::XrayImage>& images);
 
 /// What a model's files hold.
 struct LoadedModel {

@@ -79,7 +79,8 @@ void describe_view(Codec& codec, View& view, const std::filesystem::path& folder
       codec, "calibration", "string", of_track,
       "of [`helicarm track`](motion.md#run-it): path of a result.json that holds this view's camera");
   describe_elsewhere(codec, "frame_offset", "integer", of_track,
-                     "of `helicarm track`: the image's number is the sequence's frame plus this");
+                     "of `helicarm track` and `helicarm register --frames`: the image's number is the "
+                     "sequence's frame plus this");
   describe_elsewhere(
       codec, "frames", "string",
       "makes the view a run of images: calibrate it with `helicarm sweep`, or name one image by \"frame\"",

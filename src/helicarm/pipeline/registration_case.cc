@@ -51,6 +51,22 @@ std::vector<fs::path> take_cameras(Json& json, const fs::path& file) {
   return cameras;
 }
 
+/// Takes "frame_offset" out of every view.
+std::vector<int> take_frame_offsets(Json& json, const std::string& origin) {
+  constexpr int most = 1000000;
+  std::vector<int> offsets;
+  if (!json.is_object() || !json.contains("views") || !json["views"].is_array()) return offsets;
+  for (Json& view : json["views"]) {
+    int& offset = offsets.emplace_back(0);
+    if (!view.is_object() || !view.contains("frame_offset")) continue;
+    const Json taken = {{"frame_offset", view["frame_offset"]}};
+    JsonReader reader(taken, fmt::format("{}: views[{}]", origin, offsets.size() - 1));
+    if (reader.has("frame_offset")) offset = reader.integer("frame_offset", -most, most);
+    view.erase("frame_offset");
+  }
+  return offsets;
+}
+
 constexpr std::string_view placeholder = "{frame";
 
 /// `name` with the frame's number, or nothing without a placeholder.
@@ -89,6 +105,12 @@ void description::check_model_line(const JsonReader& reader, const ModelTunnelPl
                                       tunnel.model));
 }
 
+Json to_json(const CaseModel& model, const fs::path& folder) {
+  ToJson codec;
+  description::describe_model(codec, model, folder, {});
+  return std::move(codec.json);
+}
+
 bool has_models(const fs::path& path) {
   const auto json = read_json(case_file(path));
   return json && json->is_object() && json->contains("models") && !(*json)["models"].empty();
@@ -102,6 +124,8 @@ Expected<RegistrationCase> read_with_models(const fs::path& path, Purpose purpos
     Json json = value_or_throw(read_json(file));
     RegistrationCase read;
     read.cameras = take_cameras(json, file);
+    if (purpose == Purpose::registration)
+      read.frame_offsets = take_frame_offsets(json, file.filename().string());
     const Json tunnels = take_model_tunnels(json);
     Json models = Json::object();
     if (json.is_object() && json.contains("models")) models["models"] = json["models"];
@@ -143,11 +167,14 @@ bool is_sequence(const RegistrationCase& given) {
 
 Expected<RegistrationCase> at_frame(RegistrationCase given, int frame) {
   return guarded([&] {
-    for (CaseView& view : given.base.views)
-      if (const auto name = numbered(view.image.filename().string(), frame))
+    for (std::size_t i = 0; i < given.base.views.size(); ++i) {
+      CaseView& view = given.base.views[i];
+      const int number = frame + (i < given.frame_offsets.size() ? given.frame_offsets[i] : 0);
+      if (const auto name = numbered(view.image.filename().string(), number))
         view.image.replace_filename(*name);
       else
-        view.frame = frame;
+        view.frame = number;
+    }
     return std::move(given);
   });
 }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/model_description.h"
+
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
-#include "helicarm/pipeline/model_description.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -28,6 +30,25 @@ TEST(RegistrationCase, WrongModelsAreRefusedWhereTheyAreRead) {
     EXPECT_TRUE(has_models(folder.path())) << wrong;
     EXPECT_FALSE(read_registration_case(folder.path())) << wrong;
   }
+}
+
+TEST(RegistrationCase, AViewsImagesMayStartAtAnotherNumber) {
+  const TemporaryFolder folder;
+  const auto with = [&](const char* offset) {
+    EXPECT_TRUE(
+        write_file(folder.path() / "case.json", fmt::format(R"({{"format": "helicarm-case/1", "views": [
+                             {{"name": "A", "image": "a{{frame:03d}}.png", "camera": "a.json"}},
+                             {{"name": "B", "image": "b{{frame}}.png", "camera": "b.json", "frame_offset": {}}}],
+                             "models": [{{"name": "femur", "surface": "f.stl"}}]}})",
+                                                            offset)));
+    return read_registration_case(folder.path());
+  };
+  const auto read = with("-3");
+  ASSERT_TRUE(read) << read.error().message;
+  const auto frame = at_frame(*read, 10);
+  EXPECT_EQ(frame->base.views[0].image.filename(), "a010.png");
+  EXPECT_EQ(frame->base.views[1].image.filename(), "b7.png");
+  EXPECT_EQ(with("1.5").error().reason, Reason::bad_value);
 }
 
 /// The tunnel of a case with a model, or why it is refused.

@@ -44,10 +44,12 @@ Registration Follower::next(const std::vector<RegistrationView>& views, double t
   } else {
     result = register_model(*model_, views, starts_, options_);
   }
-  if (!result.failure) {
-    before_ = std::exchange(last_, Timed{time, result.world_from_model});
-  }
+  take(result, time);
   return result;
+}
+
+void Follower::take(const Registration& result, double time) {
+  if (!result.failure) before_ = std::exchange(last_, Timed{time, result.world_from_model});
 }
 
 RelativePose relative_pose(const Registration& reference, const Registration& model) {

@@ -18,6 +18,9 @@ class Follower {
   /// Registers the next images; `time` (in any unit) increases. A refused result does not change the motion.
   Registration next(const std::vector<RegistrationView>& views, double time);
 
+  /// Goes on from an earlier result at its time, as if `next` had given it.
+  void take(const Registration& result, double time);
+
   /// The pose expected at a time: none before the first that was not refused.
   std::optional<geometry::RigidTransform> predicted(double time) const;
 

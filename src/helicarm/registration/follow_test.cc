@@ -47,6 +47,16 @@ TEST(Follower, ExpectsTheMotionToGoOn) {
   EXPECT_LT(separation(model, *follower.predicted(2), pose_at(2)), 1);
 }
 
+TEST(Follower, GoesOnFromEarlierResultsAsIfItHadMadeThem) {
+  const Model model = bone();
+  Follower follower(model, {pose_at(0)}, follow_options()), later(model, {pose_at(0)}, follow_options());
+  for (const int frame : {0, 1})
+    later.take(follower.next(two_views(lopsided_bone(), pose_at(frame)), frame), frame);
+  const auto images = two_views(lopsided_bone(), pose_at(2));
+  EXPECT_EQ(follower.next(images, 2).world_from_model.matrix(),
+            later.next(images, 2).world_from_model.matrix());
+}
+
 TEST(Follower, RefusesImagesWithoutTheBodyAndFindsItAgain) {
   const Model model = bone();
   Follower follower(model, {pose_at(0)}, follow_options());

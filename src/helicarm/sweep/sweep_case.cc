@@ -92,17 +92,11 @@ void warn_of_gaps(const std::vector<int>& numbers, const std::string& view, std:
                       {{"missing", double(gaps.size())}, {"images", double(numbers.size())}}});
 }
 
-std::vector<int> numbers_in(const FrameRange& range) {
-  std::vector<int> numbers;
-  for (int i = 0; i < range.count(); ++i) numbers.push_back(range.first + i * range.step);
-  return numbers;
-}
-
 std::vector<int> numbers_of(SweepCase& read, const pipeline::CaseView& view, const std::string& frames) {
   const bool all = frames == "all";
   if (is_numbered(view.image))
     return all ? numbers_of_files(view)
-               : numbers_in(value_or_throw(case_registration::frame_range_from(frames)));
+               : value_or_throw(case_registration::frame_range_from(frames)).numbers();
   auto& file = read.files[view.image];
   if (!file) file = value_or_throw(xray::ImageFile::open(view.image));
   value_or_throw(file->check_angles());
@@ -112,7 +106,7 @@ std::vector<int> numbers_of(SweepCase& read, const pipeline::CaseView& view, con
   if (range.first < 1 || range.last > count)
     throw BadInput(Reason::bad_value, fmt::format("{}: \"frames\" is \"{}\", but {} has the frames 1 to {}",
                                                   view.name, frames, view.image.filename().string(), count));
-  return numbers_in(range);
+  return range.numbers();
 }
 
 void add_frames(SweepCase& read, const pipeline::CaseView& view, const std::string& frames) {

@@ -8,17 +8,12 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
+#include "helicarm/track/body_series.h"
 
 namespace helicarm::track {
 namespace {
 
 constexpr std::size_t few_frames = 5;  // too few for a marker's place in its body and its deviations
-
-/// Condition number of radiostereometry (Soderkvist and Wedin 1993): of markers in metres.
-double condition_of(std::span<const Eigen::Vector3d> points) {
-  const Eigen::Vector3d sigma = extents(points) * std::sqrt(double(points.size())) / 1000;
-  return 1 / std::max(1e-9, std::hypot(sigma[1], sigma[2]));
-}
 
 std::vector<SeenMarker> seen_markers(const SequenceData& work, const BodyPlan& plan, const Estimated& at,
                                      std::size_t f) {
@@ -93,21 +88,6 @@ void pose_frames(const SequenceData& work, const BodyPlan& plan, Estimated& at, 
       last = fit->world_from_body;
       break;
     }
-  }
-}
-
-/// Poses against the first frame's, whose error is in every other.
-void against_first(std::vector<TrackedBody>& frames, const std::vector<std::optional<FramePose>>& poses,
-                   const Eigen::Vector3d& centre_in_body, const FramePose& first) {
-  for (std::size_t f = 0; f < frames.size(); ++f) {
-    if (!poses[f]) continue;
-    FramePose made{poses[f]->pose * first.pose.inverse(), poses[f]->covariance};
-    RigidCovariance turned = RigidCovariance::Zero();
-    turned.topLeftCorner<3, 3>() = turned.bottomRightCorner<3, 3>() = made.pose.rotation;
-    made.covariance += turned * first.covariance * turned.transpose();
-    if (f == 0) made = {RigidTransform{}, RigidCovariance::Zero()};
-    frames[f].pose = made;
-    frames[f].centre = poses[f]->pose * centre_in_body;
   }
 }
 
@@ -192,37 +172,6 @@ void learn_shape(const SequenceData& work, const BodyPlan& plan, Estimated& at, 
   learn_deviations(work, plan, at, body);
 }
 
-/// The smooth motion, and the frames' poses against the first one.
-void smooth_body(const SequenceData& work, Estimated& at, BodySequence& body, const Eigen::Vector3d& centre,
-                 double correlation) {
-  // Of correlated errors, as many independent ones as their means' variance shows.
-  const double fewer = (1 + correlation) / (1 - correlation);
-  std::vector<std::optional<FramePose>> measured = at.poses;
-  for (auto& pose : measured)
-    if (pose) pose->covariance *= fewer;
-  at.motion = smooth_poses(work.times, measured, centre);
-  const auto& motion = at.motion;
-  if (motion) {
-    body.prior = motion->prior;
-    std::vector<std::optional<FramePose>> smooth;
-    for (const FramePose& pose : motion->frames) smooth.emplace_back(pose);
-    against_first(body.smoothed, smooth, centre, *smooth.front());
-    for (std::size_t f = 0; f < work.frames; ++f) {
-      TrackedBody& frame = body.smoothed[f];
-      const TrackedBody& own = body.frames[f];
-      frame.markers = own.markers;
-      frame.rms_mm = own.rms_mm;
-      frame.reason = own.reason;
-      frame.decision = at.poses[f] ? own.decision : PoseDecision::warn;
-    }
-  }
-  // Against the smooth one of the first frame, which its neighbours' images determine too.
-  if (const auto first = motion ? std::optional(motion->frames.front()) : at.poses.front())
-    against_first(body.frames, at.poses, centre, *first);
-  for (TrackedBody& frame : body.frames)
-    if (!frame.pose) frame.decision = PoseDecision::refuse;
-}
-
 }  // namespace
 
 void estimate_body(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
@@ -251,7 +200,7 @@ void estimate_body(const SequenceData& work, const BodyPlan& plan, Estimated& at
     refuse(fmt::format("{} of its markers are located, three are needed", points.size()));
     return;
   }
-  body.condition_per_m = condition_of(points);
+  body.condition_per_m = track::condition_per_m(points);
   pose_frames(work, plan, at, body);
   std::vector<double> turns;
   for (const auto& pose : at.poses)
@@ -280,7 +229,13 @@ void estimate_body(const SequenceData& work, const BodyPlan& plan, Estimated& at
                      plan.name, body.condition_per_m, condition_limit, turn),
          {},
          {{"condition_per_m", body.condition_per_m}, {"sigma_deg", turn}}});
-  smooth_body(work, at, body, mean_of(points), sequence.correlation);
+  // Of correlated errors, as many independent ones as their means' variance shows.
+  const double fewer = (1 + sequence.correlation) / (1 - sequence.correlation);
+  std::vector<std::optional<FramePose>> measured = at.poses;
+  for (auto& pose : measured)
+    if (pose) pose->covariance *= fewer;
+  at.motion = smooth_poses(work.times, measured, mean_of(points));
+  take_motion(body, at.poses, at.motion, mean_of(points));
 }
 
 std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan& plan, const Estimated& at,

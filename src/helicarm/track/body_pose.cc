@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/track/body_pose.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -65,6 +66,11 @@ Eigen::Vector3d extents(std::span<const Eigen::Vector3d> points) {
   const Eigen::Vector3d values =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(squares / double(points.size())).eigenvalues();
   return values.reverse().cwiseMax(0).cwiseSqrt();
+}
+
+double condition_per_m(std::span<const Eigen::Vector3d> points) {
+  const Eigen::Vector3d sigma = extents(points) * std::sqrt(double(points.size())) / 1000;
+  return 1 / std::max(1e-9, std::hypot(sigma[1], sigma[2]));
 }
 
 std::optional<PoseFit> fit_pose(const geometry::RigidTransform& start, std::span<const SeenMarker> markers,

@@ -73,6 +73,10 @@ geometry::RigidTransform absolute_pose(std::span<const Eigen::Vector3d> in_body,
 /// is determined by the second: the distance of its markers from their common line.
 Eigen::Vector3d extents(std::span<const Eigen::Vector3d> points);
 
+/// Condition number of radiostereometry (Soderkvist and Wedin 1993), per metre: 1 / sqrt(s2^2 + s3^2) of the
+/// singular values of the markers about their mean.
+double condition_per_m(std::span<const Eigen::Vector3d> points);
+
 Eigen::Vector3d mean_of(std::span<const Eigen::Vector3d> points);
 
 }  // namespace helicarm::track

@@ -74,13 +74,32 @@ std::string body_row(int frame, const std::string& names, const TrackedBody& bod
   } else {
     row += std::string(22, ',');
   }
-  row += fmt::format(",{},", body.markers);
+  row += body.markers ? fmt::format(",{},", *body.markers) : ",,";
   if (body.rms_mm) row += fmt::format("{:.6g}", *body.rms_mm);
   return row + "," + (body.reason ? std::string(code(*body.reason)) : "") + "\n";
 }
 
 std::string sights_header() {
   return "frame,marker,view,u_raw,v_raw,sigma_px,radius_px,contrast,background,repaired\n";
+}
+
+std::string bodies_table(const std::vector<int>& frames, const std::vector<std::string>& names,
+                         const std::vector<BodySequence>& bodies,
+                         std::vector<TrackedBody> BodySequence::*rows) {
+  std::string csv = bodies_header();
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+      csv += body_row(frames[f], csv_field(names[b]), (bodies[b].*rows)[f]);
+  return csv;
+}
+
+std::string relative_table(const std::vector<int>& frames, const std::vector<std::string>& names,
+                           const std::vector<std::vector<TrackedBody>>& relative) {
+  std::string csv = bodies_header(true);
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    for (std::size_t b = 0; b < relative.size(); ++b)
+      csv += body_row(frames[f], csv_field(names[b + 1]) + "," + csv_field(names[0]), relative[b][f]);
+  return csv;
 }
 
 std::string sights_rows(const FrameSights& sights, const TrackCase& given) {

@@ -14,6 +14,15 @@ std::string marker_row(int frame, const std::string& name, const TrackedMarker& 
 std::string bodies_header(bool relative = false);
 std::string body_row(int frame, const std::string& names, const TrackedBody& body);
 
+/// bodies.csv and smoothed.csv: a row for each frame and body, whose rows are `BodySequence::frames` or
+/// `smoothed`.
+std::string bodies_table(const std::vector<int>& frames, const std::vector<std::string>& names,
+                         const std::vector<BodySequence>& bodies,
+                         std::vector<TrackedBody> BodySequence::*rows);
+/// relative.csv: the second and further bodies against the first.
+std::string relative_table(const std::vector<int>& frames, const std::vector<std::string>& names,
+                           const std::vector<std::vector<TrackedBody>>& relative);
+
 /// sights.csv: where each marker is seen in each view of a frame, to the last bit.
 std::string sights_header();
 std::string sights_rows(const FrameSights& sights, const TrackCase& given);

@@ -11,6 +11,7 @@
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/localization/locate.h"
 #include "helicarm/track/body_motion.h"
+#include "helicarm/track/body_series.h"
 #include "helicarm/track/delays.h"
 #include "helicarm/track/exchanges.h"
 #include "helicarm/track/image_errors.h"
@@ -61,28 +62,6 @@ std::vector<MarkerDistance> distances_of(const SequenceData& work) {
                              std::sqrt(std::max(0.0, squares - count * mean * mean) / (count - 1)), count});
       }
   return distances;
-}
-
-/// Of the body against the reference, both against their first frames.
-TrackedBody relative_of(const TrackedBody& reference, const TrackedBody& body) {
-  TrackedBody made;
-  made.decision = std::max(reference.decision, body.decision);
-  made.reason = reference.decision > body.decision ? reference.reason : body.reason;
-  made.markers = std::min(reference.markers, body.markers);
-  made.centre = body.centre;
-  if (!reference.pose || !body.pose) return made;
-  const RigidTransform back = reference.pose->pose.inverse();
-  made.centre = back * body.centre;
-  // A step of the reference about its centre moves the body about its own, in the reference's axes.
-  RigidCovariance carried = RigidCovariance::Identity();
-  carried.bottomLeftCorner<3, 3>() = point_by_step(body.centre, reference.centre).leftCols<3>();
-  RigidCovariance turned = RigidCovariance::Zero();
-  turned.topLeftCorner<3, 3>() = turned.bottomRightCorner<3, 3>() = back.rotation;
-  made.pose = FramePose{
-      back * body.pose->pose,
-      turned * (body.pose->covariance + carried * reference.pose->covariance * carried.transpose()) *
-          turned.transpose()};
-  return made;
 }
 
 /// The images' sights, rectified.
@@ -225,11 +204,7 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
       return marker.status == MarkerStatus::tracked;
     });
   warn_of_lost_markers(work, sequence);
-  for (std::size_t b = 1; b < sequence.bodies.size(); ++b) {
-    auto& relative = sequence.relative.emplace_back();
-    for (std::size_t f = 0; f < work.frames; ++f)
-      relative.push_back(relative_of(sequence.bodies[0].smoothed[f], sequence.bodies[b].smoothed[f]));
-  }
+  sequence.relative = relative_motions(sequence.bodies);
   return sequence;
 }
 

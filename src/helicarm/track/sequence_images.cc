@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/track/sequence_images.h"
 
-#include <array>
-#include <cstdint>
-#include <fstream>
+#include <algorithm>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/pipeline/registration_case.h"
 #include "helicarm/pipeline/view_image.h"
-#include "helicarm/xray/read_dicom.h"
+#include "helicarm/xray/run_polarity.h"
+#include "helicarm/xray/stated_size.h"
 
 namespace helicarm::track {
 namespace {
@@ -21,32 +20,10 @@ bool is_numbered(const fs::path& image) {
   return image.filename().string().find("{frame") != std::string::npos;
 }
 
-pipeline::CaseView at_number(const TrackView& view, int frame) {
+pipeline::CaseView at_number(const SequenceView& view, int frame) {
   pipeline::RegistrationCase one;
   one.base.views = {view.images};
   return value_or_throw(pipeline::at_frame(std::move(one), frame + view.frame_offset)).base.views.front();
-}
-
-/// Width and height in a PNG file's header.
-std::optional<Eigen::Vector2i> png_size(const fs::path& path) {
-  std::array<unsigned char, 24> head{};
-  std::ifstream file(path, std::ios::binary);
-  if (!file.read(reinterpret_cast<char*>(head.data()), head.size()) || head[1] != 'P' || head[2] != 'N')
-    return std::nullopt;
-  const auto number = [&](std::size_t at) {
-    return int(std::uint32_t(head[at]) << 24 | std::uint32_t(head[at + 1]) << 16 |
-               std::uint32_t(head[at + 2]) << 8 | head[at + 3]);
-  };
-  return Eigen::Vector2i(number(16), number(20));
-}
-
-/// A reader that finds more bright discs than dark ones inverts the image. A sequence keeps its polarity,
-/// which the picks show.
-void keep_polarity(xray::XrayImage& image) {
-  if (std::erase_if(image.warnings, [](const Warning& warning) {
-        return warning.reason == Reason::tag_disagrees && warning.message.ends_with("values were inverted");
-      }) > 0)
-    xray::invert(image);
 }
 
 void check_size(const std::string& view, int number, const Eigen::Vector2i& size,
@@ -59,14 +36,19 @@ void check_size(const std::string& view, int number, const Eigen::Vector2i& size
 
 }  // namespace
 
-Expected<SequenceImages> SequenceImages::open(const TrackCase& given,
+Expected<SequenceImages> SequenceImages::open(std::span<const SequenceView> views,
                                               const case_registration::FrameRange& frames) {
   return guarded([&] {
     SequenceImages images;
-    images.views_ = given.views;
+    images.views_.assign(views.begin(), views.end());
     std::string first;
     int missing = 0;
-    for (const TrackView& view : given.views) {
+    for (const SequenceView& view : views) {
+      if (view.images.frame)
+        throw BadInput(Reason::bad_value,
+                       fmt::format("{}: \"frame\" names one image: a sequence has --frames and "
+                                   "\"frame_offset\"",
+                                   view.images.name));
       auto& size = images.sizes_.emplace_back(view.image_size);
       auto& file = images.files_.emplace_back();
       const int lowest = frames.first + view.frame_offset;
@@ -91,7 +73,7 @@ Expected<SequenceImages> SequenceImages::open(const TrackCase& given,
           if (missing++ == 0) first = path.filename().string();
           continue;
         }
-        if (const auto stated = png_size(path)) {
+        if (const auto stated = xray::stated_size(path)) {
           if (!size) size = stated;
           check_size(view.images.name, frame + view.frame_offset, *stated, size);
         }
@@ -99,18 +81,46 @@ Expected<SequenceImages> SequenceImages::open(const TrackCase& given,
     }
     if (missing > 0)
       throw BadInput(Reason::missing_file, fmt::format("{} of {} images do not exist, the first: {}", missing,
-                                                       frames.count() * int(given.views.size()), first));
+                                                       frames.count() * int(views.size()), first));
+    images.decide_polarity(frames);
     return images;
   });
 }
 
+xray::XrayImage SequenceImages::as_read(std::size_t view, int frame) const {
+  const SequenceView& asked = views_[view];
+  return files_[view] ? value_or_throw(files_[view]->read(asked.images.name, frame + asked.frame_offset))
+                      : value_or_throw(pipeline::image_of(at_number(asked, frame)));
+}
+
+void SequenceImages::decide_polarity(const case_registration::FrameRange& frames) {
+  constexpr int most_looked_at = 15;
+  const int looked_at = std::min(most_looked_at, frames.count());
+  std::vector<char> looks_bright(views_.size() * std::size_t(looked_at));
+  parallel_for(looks_bright.size(), 0, [&](std::size_t i) {
+    const int at = int(i) % looked_at * (frames.count() - 1) / std::max(1, looked_at - 1);
+    looks_bright[i] =
+        xray::was_inverted(as_read(i / std::size_t(looked_at), frames.first + at * frames.step));
+  });
+  for (std::size_t view = 0; view < views_.size(); ++view) {
+    const auto first = looks_bright.begin() + std::ptrdiff_t(view) * looked_at;
+    const int bright = int(std::count(first, first + looked_at, char(true)));
+    inverted_.push_back(2 * bright > looked_at);
+    const std::string& name = views_[view].images.name;
+    if (inverted_.back())
+      warnings_.push_back({Reason::tag_disagrees,
+                           fmt::format("{}: in {} of {} frames {}, those of all its frames", name, bright,
+                                       looked_at, xray::inverted_note),
+                           name,
+                           {}});
+  }
+}
+
 Expected<xray::XrayImage> SequenceImages::image(std::size_t view, int frame) const {
-  const TrackView& asked = views_[view];
+  const SequenceView& asked = views_[view];
   return guarded([&] {
-    xray::XrayImage read =
-        files_[view] ? value_or_throw(files_[view]->read(asked.images.name, frame + asked.frame_offset))
-                     : value_or_throw(pipeline::image_of(at_number(asked, frame)));
-    keep_polarity(read);
+    xray::XrayImage read = as_read(view, frame);
+    xray::take_polarity(read, inverted_[view]);
     check_size(asked.images.name, frame + asked.frame_offset, {read.pixels.width(), read.pixels.height()},
                sizes_[view]);
     return read;

@@ -78,7 +78,20 @@ struct Step {
 
 struct Filtered {
   std::vector<Step> steps;
-  double log_likelihood = 0;
+  double squares = 0, log_widths = 0;  // of the innovations
+  int updates = 0;
+
+  /// Of the measured covariances. The first three frames begin the motion and its rates.
+  double variance_factor(NoiseScale scale) const {
+    constexpr int enough = 10;
+    constexpr double least = 1e-2, most = 1e2;
+    if (scale == NoiseScale::stated || updates < enough) return 1;
+    return std::clamp(squares / (6.0 * (updates - 3)), least, most);
+  }
+  double log_likelihood(NoiseScale scale) const {
+    const double factor = variance_factor(scale);
+    return -0.5 * squares / factor - 3.0 * (updates - 3) * std::log(factor) - log_widths;
+  }
 };
 
 struct Measured {
@@ -118,7 +131,9 @@ Filtered filter(std::span<const double> times, std::span<const std::optional<Mea
       const Vector6 weighted = factor.solve(off);
       const Eigen::Matrix<double, n, 6> gain = factor.solve(covariance.topRows<6>()).transpose();
       const Matrix6 triangle = factor.matrixL();
-      result.log_likelihood -= 0.5 * off.dot(weighted) + triangle.diagonal().array().log().sum();
+      result.squares += off.dot(weighted);
+      result.log_widths += triangle.diagonal().array().log().sum();
+      ++result.updates;
       state = moved(state, gain * off);
       covariance -= gain * covariance.topRows<6>();
       covariance = (0.5 * (covariance + covariance.transpose())).eval();
@@ -132,10 +147,10 @@ Filtered filter(std::span<const double> times, std::span<const std::optional<Mea
 
 /// The prior of the largest likelihood, found on a grid of factors that is refined.
 MotionPrior likeliest(std::span<const double> times, std::span<const std::optional<Measured>> measured,
-                      bool turns) {
+                      bool turns, NoiseScale scale) {
   constexpr double least_factor = 1.3;
   MotionPrior best{turns ? 1e-7 : 1e-12, 1e-2};
-  double most = filter(times, measured, best, turns, false).log_likelihood;
+  double most = filter(times, measured, best, turns, false).log_likelihood(scale);
   for (double factor = 10; factor > least_factor; factor = std::sqrt(factor)) {
     bool is_better = true;
     for (int rounds = 0; is_better && rounds < 8; ++rounds) {
@@ -145,7 +160,7 @@ MotionPrior likeliest(std::span<const double> times, std::span<const std::option
         for (const double by : {factor, 1 / factor}) {
           MotionPrior tried = best;
           tried.*part *= by;
-          const double there = filter(times, measured, tried, turns, false).log_likelihood;
+          const double there = filter(times, measured, tried, turns, false).log_likelihood(scale);
           if (!(there > most + 1e-3)) continue;
           most = there;
           best = tried;
@@ -188,7 +203,7 @@ bool is_enough(std::span<const std::optional<Measured>> measured) {
 
 std::optional<SmoothMotion> smooth_poses(std::span<const double> times,
                                          std::span<const std::optional<FramePose>> measured,
-                                         const Eigen::Vector3d& centre_in_body) {
+                                         const Eigen::Vector3d& centre_in_body, NoiseScale scale) {
   std::vector<std::optional<Measured>> given;
   for (const auto& frame : measured) {
     auto& made = given.emplace_back();
@@ -200,11 +215,16 @@ std::optional<SmoothMotion> smooth_poses(std::span<const double> times,
   }
   if (!is_enough(given)) return std::nullopt;
   SmoothMotion motion;
-  motion.prior = likeliest(times, given, true);
-  for (const Smoothed& frame : smoothed(filter(times, given, motion.prior, true, true)))
+  motion.prior = likeliest(times, given, true, scale);
+  const Filtered filtered = filter(times, given, motion.prior, true, true);
+  const double factor = filtered.variance_factor(scale);
+  for (const Smoothed& frame : smoothed(filtered))
     motion.frames.push_back(
         {{frame.state.rotation, frame.state.centre - frame.state.rotation * centre_in_body},
-         frame.covariance});
+         factor * frame.covariance});
+  motion.prior.turn *= factor;
+  motion.prior.shift *= factor;
+  motion.noise_factor = std::sqrt(factor);
   return motion;
 }
 
@@ -219,7 +239,7 @@ std::optional<std::vector<FramePlace>> smooth_places(std::span<const double> tim
     made->covariance.bottomRightCorner<3, 3>() = frame->covariance;
   }
   if (!is_enough(given)) return std::nullopt;
-  const MotionPrior prior = likeliest(times, given, false);
+  const MotionPrior prior = likeliest(times, given, false, NoiseScale::stated);
   std::vector<FramePlace> places;
   for (const Smoothed& frame : smoothed(filter(times, given, prior, false, true)))
     places.push_back({frame.state.centre, frame.covariance.bottomRightCorner<3, 3>()});

@@ -28,7 +28,12 @@ struct MotionPrior {
 struct SmoothMotion {
   std::vector<FramePose> frames;
   MotionPrior prior;
+  double noise_factor = 1;  ///< of the measured poses' standard deviations
 };
+
+/// Measured covariances as they are stated, or known up to one factor, which then has the largest likelihood
+/// with the prior; it is 1 for fewer than ten measured frames.
+enum class NoiseScale { stated, by_data };
 
 /// One estimate over all frames: rotation and the centre's place with white jerk, whose size has the largest
 /// likelihood; frames without a pose get the width that the prior gives them. Extended Kalman filter and
@@ -36,7 +41,8 @@ struct SmoothMotion {
 /// three measured frames.
 std::optional<SmoothMotion> smooth_poses(std::span<const double> times,
                                          std::span<const std::optional<FramePose>> measured,
-                                         const Eigen::Vector3d& centre_in_body);
+                                         const Eigen::Vector3d& centre_in_body,
+                                         NoiseScale scale = NoiseScale::stated);
 
 /// A place with its covariance.
 struct FramePlace {

@@ -65,6 +65,23 @@ TEST(Smooth, HalvesTheErrorAndItsBandsHoldTheTruth) {
   EXPECT_NEAR(double(inside) / all, 0.95, 0.04);
 }
 
+TEST(Smooth, CovariancesThatAreTooSmallAreScaledByTheData) {
+  int inside = 0, all = 0;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    Data data = measured_at(100, -1, -1, seed);
+    for (auto& pose : data.measured) pose->covariance /= 9;
+    const auto motion = smooth_poses(data.times, data.measured, centre, NoiseScale::by_data);
+    ASSERT_TRUE(motion);
+    EXPECT_NEAR(motion->noise_factor, 3, 0.4);
+    for (std::size_t i = 0; i < data.times.size(); ++i) {
+      const auto off = error_of(motion->frames[i], data.times[i]);
+      for (int k = 0; k < 6; ++k, ++all)
+        inside += std::abs(off[k]) < 1.96 * std::sqrt(motion->frames[i].covariance(k, k));
+    }
+  }
+  EXPECT_NEAR(double(inside) / all, 0.95, 0.04);
+}
+
 TEST(Smooth, GapIsFilledWithAWidthThatGrows) {
   const Data data = measured_at(80, 40, 51, 9);
   const auto motion = smooth_poses(data.times, data.measured, centre);

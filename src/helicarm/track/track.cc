@@ -3,28 +3,22 @@
 
 #include <chrono>
 #include <cstdint>
-#include <fstream>
 #include <future>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
-#include "helicarm/core/system_message.h"
+#include "helicarm/track/growing_table.h"
 #include "helicarm/track/rows.h"
 #include "helicarm/track/sequence_images.h"
+#include "helicarm/xray/digest.h"
 
 namespace helicarm::track {
 namespace {
 
 namespace fs = std::filesystem;
 constexpr std::uintmax_t most_bytes = std::uintmax_t(1) << 30;
-
-std::vector<int> numbers_of(const case_registration::FrameRange& frames) {
-  std::vector<int> numbers;
-  for (int i = 0; i < frames.count(); ++i) numbers.push_back(frames.first + i * frames.step);
-  return numbers;
-}
 
 /// A text that two cases share only if their sequences are the same.
 std::string identity_of(const TrackCase& given, const case_registration::FrameRange& frames) {
@@ -44,28 +38,8 @@ std::string identity_of(const TrackCase& given, const case_registration::FrameRa
     for (const Eigen::Vector3d& place : body.geometry)
       text += fmt::format(" {} {} {}", place.x(), place.y(), place.z());
   }
-  // FNV-1a.
-  std::uint64_t digest = 14695981039346656037u;
-  for (const char c : text) digest = (digest ^ static_cast<unsigned char>(c)) * 1099511628211u;
-  return fmt::format("{:016x}", digest);
+  return xray::digest(text);
 }
-
-/// A table that grows by rows, each of which is in the file when `add` returns.
-class GrowingTable {
- public:
-  GrowingTable(const fs::path& path, const std::string& header) : path_(path), file_(path, std::ios::binary) {
-    add(header);
-  }
-  void add(const std::string& rows) {
-    file_ << rows << std::flush;
-    if (!file_)
-      throw BadInput(Reason::cannot_write, path_.string() + ": cannot be written: " + system_message(errno));
-  }
-
- private:
-  fs::path path_;
-  std::ofstream file_;
-};
 
 /// Rows of the frames so far; those of the whole sequence replace them at its end.
 struct GrowingTables {
@@ -89,6 +63,10 @@ struct GrowingTables {
   }
 };
 
+Expected<SequenceImages> open_images(const TrackCase& given, const case_registration::FrameRange& frames) {
+  return SequenceImages::open(std::vector<SequenceView>(given.views.begin(), given.views.end()), frames);
+}
+
 /// The frames that an interrupted run left in the folder.
 std::vector<FrameSights> kept_frames(const fs::path& folder, const TrackCase& given,
                                      const std::string& identity, const std::vector<int>& numbers) {
@@ -110,8 +88,8 @@ Expected<Sequence> run_track(const TrackCase& given, const case_registration::Fr
                              const TrackOptions& options, const OnFrame& on_frame) {
   return guarded([&] {
     const auto begun = std::chrono::steady_clock::now();
-    const std::vector<int> numbers = numbers_of(frames);
-    const SequenceImages images = value_or_throw(SequenceImages::open(given, frames));
+    const std::vector<int> numbers = frames.numbers();
+    const SequenceImages images = value_or_throw(open_images(given, frames));
     const std::string identity = identity_of(given, frames);
     std::vector<FrameSights> kept;
     if (options.out && options.resume) kept = kept_frames(*options.out, given, identity, numbers);
@@ -146,6 +124,7 @@ Expected<Sequence> run_track(const TrackCase& given, const case_registration::Fr
       done();
     }
     Sequence sequence = estimate_sequence(given, sights);
+    sequence.warnings.insert(sequence.warnings.end(), images.warnings().begin(), images.warnings().end());
     sequence.warnings.insert(sequence.warnings.end(), tracker.warnings().begin(), tracker.warnings().end());
     sequence.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     return sequence;

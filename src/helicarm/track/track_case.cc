@@ -269,11 +269,6 @@ Expected<TrackCase> read_track_case(const fs::path& path, const case_registratio
       if (named(keys.offsets[i]))
         view.frame_offset = integer_of(
             keys.offsets[i], fmt::format("{}: views[{}]: \"frame_offset\"", origin, i), -1000000, 1000000);
-      if (view.images.frame)
-        throw BadInput(Reason::bad_value,
-                       fmt::format("{}: views[{}]: \"frame\" names one image: a sequence has --frames and "
-                                   "\"frame_offset\"",
-                                   origin, i));
     }
     if (read.views.size() < 2)
       throw BadInput(Reason::too_few_views, fmt::format("{}: markers are located in two views or more; the "

@@ -8,20 +8,17 @@
 
 #include <Eigen/Core>
 
-#include "helicarm/case_registration/follow_case.h"
 #include "helicarm/geometry/view.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/rectification/distortion_map.h"
+#include "helicarm/track/sequence_images.h"
 
 namespace helicarm::track {
 
 /// One camera of the sequence.
-struct TrackView {
-  pipeline::CaseView images;                        ///< "image" with {frame}, or a file with several frames
-  int frame_offset = 0;                             ///< the image's number is the sequence's frame plus this
+struct TrackView : SequenceView {
   geometry::View camera;                            ///< world, mm, to rectified pixels
   std::optional<rectification::DistortionMap> map;  ///< raw to rectified; nothing: none
-  std::optional<Eigen::Vector2i> image_size;        ///< as the camera's file states it
 };
 
 /// A marker's place in one view of the first frame.

@@ -68,13 +68,10 @@ Json json_of(const BodySequence& body, const BodyPlan& plan, const TrackCase& gi
   return json;
 }
 
-std::string bodies_table(const std::vector<BodySequence>& bodies, const Sequence& sequence,
-                         const TrackCase& given, std::vector<TrackedBody> BodySequence::*frames) {
-  std::string csv = bodies_header();
-  for (std::size_t f = 0; f < sequence.frames.size(); ++f)
-    for (std::size_t b = 0; b < bodies.size(); ++b)
-      csv += body_row(sequence.frames[f], csv_field(given.bodies[b].name), (bodies[b].*frames)[f]);
-  return csv;
+std::vector<std::string> names_of(const TrackCase& given) {
+  std::vector<std::string> bodies;
+  for (const BodyPlan& body : given.bodies) bodies.push_back(body.name);
+  return bodies;
 }
 
 constexpr std::array names{"markers.csv",  "bodies.csv",   "smoothed.csv", "relative.csv", "track.json",
@@ -149,21 +146,15 @@ std::string markers_csv(const Sequence& sequence, const TrackCase& given) {
 }
 
 std::string bodies_csv(const Sequence& sequence, const TrackCase& given) {
-  return bodies_table(sequence.bodies, sequence, given, &BodySequence::frames);
+  return bodies_table(sequence.frames, names_of(given), sequence.bodies, &BodySequence::frames);
 }
 
 std::string smoothed_csv(const Sequence& sequence, const TrackCase& given) {
-  return bodies_table(sequence.bodies, sequence, given, &BodySequence::smoothed);
+  return bodies_table(sequence.frames, names_of(given), sequence.bodies, &BodySequence::smoothed);
 }
 
 std::string relative_csv(const Sequence& sequence, const TrackCase& given) {
-  std::string csv = bodies_header(true);
-  for (std::size_t f = 0; f < sequence.frames.size(); ++f)
-    for (std::size_t b = 0; b < sequence.relative.size(); ++b)
-      csv += body_row(sequence.frames[f],
-                      csv_field(given.bodies[b + 1].name) + "," + csv_field(given.bodies[0].name),
-                      sequence.relative[b][f]);
-  return csv;
+  return relative_table(sequence.frames, names_of(given), sequence.relative);
 }
 
 std::string points2d_csv(const Sequence& sequence, const TrackCase& given) {

@@ -5,82 +5,32 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/geometry/rotation.h"
 #include "helicarm/report/chart.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/table.h"
+#include "helicarm/track/motion_charts.h"
 #include "helicarm/track/track.h"
 
 namespace helicarm::track {
 namespace {
 
-constexpr double degrees = 180 / EIGEN_PI, width_of_95 = 1.959964;
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
-std::string card(const std::string& value, const std::string& what) {
-  return fmt::format("<div class=\"card\"><b>{}</b><span>{}</span></div>", report::escaped(value), what);
-}
-
-/// Three curves with their 95 % bands over the frames.
-report::Chart pose_chart(const Sequence& sequence, const std::vector<TrackedBody>& frames, std::string title,
-                         bool turns) {
-  report::Chart chart{std::move(title), "frame", turns ? "degrees" : "mm"};
-  constexpr std::array axes{"x", "y", "z"};
-  Eigen::Vector3d start = Eigen::Vector3d::Zero();
-  bool is_started = false;
-  for (const TrackedBody& frame : frames)
-    if (frame.pose && !is_started) start = frame.centre, is_started = true;
-  for (int axis = 0; axis < 3; ++axis) {
-    report::ChartSeries curve{axes[std::size_t(axis)]}, band{""};
-    curve.joined = true;
-    for (std::size_t f = 0; f < frames.size(); ++f) {
-      const auto& pose = frames[f].pose;
-      if (!pose) {
-        curve.points.push_back({double(sequence.frames[f]), nothing});
-        curve.ranges.push_back({nothing, nothing});
-        continue;
-      }
-      const double value = turns ? degrees * geometry::vector_from_rotation(pose->pose.rotation)[axis]
-                                 : (frames[f].centre - start)[axis];
-      const int at = axis + (turns ? 0 : 3);
-      const double width =
-          width_of_95 * (turns ? degrees : 1) * std::sqrt(std::max(0.0, pose->covariance(at, at)));
-      curve.points.push_back({double(sequence.frames[f]), value});
-      curve.ranges.push_back({value - width, value + width});
-    }
-    chart.series.push_back(std::move(curve));
-  }
-  return chart;
-}
-
 std::string body_charts(const Sequence& sequence, const TrackCase& given) {
-  std::string html;
+  std::vector<std::string> names;
+  std::vector<report::Chart> residuals;
   for (std::size_t b = 0; b < given.bodies.size(); ++b) {
-    const BodySequence& body = sequence.bodies[b];
-    const std::string& name = given.bodies[b].name;
-    std::vector<report::Chart> charts{
-        pose_chart(sequence, body.smoothed, "Centre from its place in the first frame", false),
-        pose_chart(sequence, body.smoothed, "Rotation vector against the first frame", true)};
+    names.push_back(given.bodies[b].name);
     report::Chart rms{"Markers from their places in the body", "frame", "rms, mm"};
     report::ChartSeries residual{""};
-    for (std::size_t f = 0; f < body.frames.size(); ++f)
-      residual.points.push_back({double(sequence.frames[f]), body.frames[f].rms_mm.value_or(nothing)});
+    for (std::size_t f = 0; f < sequence.frames.size(); ++f)
+      residual.points.push_back(
+          {double(sequence.frames[f]), sequence.bodies[b].frames[f].rms_mm.value_or(nothing)});
     rms.series.push_back(std::move(residual));
     rms.y_from_zero = true;
-    charts.push_back(std::move(rms));
-    html += fmt::format(
-        "<h2>{}</h2>\n<figure class=\"plain\">{}<figcaption>Smoothed; bars: 95 %.</figcaption></figure>\n",
-        report::escaped(name), report::chart_svg(charts));
+    residuals.push_back(std::move(rms));
   }
-  for (std::size_t b = 0; b < sequence.relative.size(); ++b) {
-    const std::array charts{
-        pose_chart(sequence, sequence.relative[b], "Centre in the reference body", false),
-        pose_chart(sequence, sequence.relative[b], "Rotation vector in the reference body", true)};
-    html += fmt::format("<h2>{} against {}</h2>\n<figure class=\"plain\">{}</figure>\n",
-                        report::escaped(given.bodies[b + 1].name), report::escaped(given.bodies[0].name),
-                        report::chart_svg(charts));
-  }
-  return html;
+  return motion_charts(sequence.frames, names, sequence.bodies, sequence.relative, residuals);
 }
 
 std::string gap_chart(const Sequence& sequence, const TrackCase& given) {
@@ -154,13 +104,6 @@ std::string distance_table(const Sequence& sequence, const TrackCase& given) {
       sequence.distances));
 }
 
-std::string findings(const Sequence& sequence) {
-  std::string html;
-  for (const Warning& warning : sequence.warnings)
-    html += fmt::format("<li><b>{}</b> {}</li>", code(warning.reason), report::escaped(warning.message));
-  return html.empty() ? "" : "<h2>Warnings</h2>\n<ul>" + html + "</ul>\n";
-}
-
 }  // namespace
 
 std::string track_report(const Sequence& sequence, const TrackCase& given) {
@@ -170,18 +113,19 @@ std::string track_report(const Sequence& sequence, const TrackCase& given) {
   const int all = counts[0] + counts[1] + counts[2] + counts[3];
   std::string cards =
       "<div class=\"cards\">" +
-      card(fmt::format("{} of {}", sequence.complete, sequence.frames.size()),
-           "frames with all markers tracked") +
-      card(fmt::format("{:.1f} %", 100.0 * counts[0] / std::max(1, all)), "of the places tracked") +
-      card(std::to_string(sequence.repaired), "exchanges repaired");
+      report_card(fmt::format("{} of {}", sequence.complete, sequence.frames.size()),
+                  "frames with all markers tracked") +
+      report_card(fmt::format("{:.1f} %", 100.0 * counts[0] / std::max(1, all)), "of the places tracked") +
+      report_card(std::to_string(sequence.repaired), "exchanges repaired");
   for (std::size_t k = 1; k < given.views.size(); ++k)
     if (sequence.delays[k].is_known)
-      cards += card(fmt::format("{:.4f} frames", sequence.delays[k].frames),
-                    "delay of " + report::escaped(given.views[k].images.name));
+      cards += report_card(fmt::format("{:.4f} frames", sequence.delays[k].frames),
+                           "delay of " + report::escaped(given.views[k].images.name));
   return report::page_html("helicarm track", "Markers and bodies through a sequence",
-                           cards + "</div>\n" + findings(sequence) + body_charts(sequence, given) +
-                               "<h2>Markers</h2>\n" + gap_chart(sequence, given) +
-                               marker_table(sequence, given) + distance_table(sequence, given),
+                           cards + "</div>\n" + warnings_list(sequence.warnings) +
+                               body_charts(sequence, given) + "<h2>Markers</h2>\n" +
+                               gap_chart(sequence, given) + marker_table(sequence, given) +
+                               distance_table(sequence, given),
                            ". Millimetres, degrees and pixels.");
 }
 

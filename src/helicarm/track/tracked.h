@@ -30,8 +30,8 @@ struct TrackedBody {
   PoseDecision decision = PoseDecision::refuse;
   std::optional<FramePose> pose;  ///< world_from_body; covariance about `centre`
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  int markers = 0;               ///< that determined it
-  std::optional<double> rms_mm;  ///< of those seen in two views about their places in the body
+  std::optional<int> markers = 0;  ///< that determined it; nothing: a model
+  std::optional<double> rms_mm;    ///< of those seen in two views about their places in the body
   std::optional<Reason> reason;
 };
 

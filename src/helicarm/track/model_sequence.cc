@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/track/model_sequence.h"
+
+#include <chrono>
+#include <future>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/csv.h"
+#include "helicarm/core/files.h"
+#include "helicarm/exchange/import_matrix.h"
+#include "helicarm/track/body_series.h"
+#include "helicarm/track/growing_table.h"
+#include "helicarm/track/rows.h"
+#include "helicarm/track/sequence_images.h"
+#include "helicarm/xray/digest.h"
+
+namespace helicarm::track {
+namespace {
+
+namespace fs = std::filesystem;
+using case_registration::CaseFollower;
+using case_registration::RegisteredFrame;
+using registration::Registration;
+
+std::vector<SequenceView> views_of(const pipeline::RegistrationCase& given) {
+  std::vector<SequenceView> views;
+  for (std::size_t i = 0; i < given.base.views.size(); ++i) {
+    SequenceView& view = views.emplace_back(SequenceView{given.base.views[i], 0, {}});
+    if (i < given.frame_offsets.size()) view.frame_offset = given.frame_offsets[i];
+    if (!given.cameras.empty())
+      view.image_size = value_or_throw(exchange::import_matrix(given.cameras[i])).image_size;
+  }
+  return views;
+}
+
+/// A text that two sequences share only if they are the same.
+std::string identity_of(const pipeline::RegistrationCase& given, const case_registration::FrameRange& range,
+                        const case_registration::RegisterOptions& options, const CaseFollower& follower) {
+  std::string text =
+      fmt::format("{} {} {} {} {} {} {}", range.first, range.last, range.step, options.search.shift_mm,
+                  options.search.turn_deg, options.run.motion_sigma_mm, options.run.max_error_mm.value_or(0));
+  for (const SequenceView& view : views_of(given))
+    text +=
+        fmt::format("\n{} {} {}", view.images.name, view.images.image.filename().string(), view.frame_offset);
+  for (const geometry::View& camera : follower.cameras()) {
+    const geometry::Projection projection = camera.projection();
+    for (const double value : projection.reshaped()) text += fmt::format(" {}", value);
+  }
+  for (const pipeline::CaseModel& model : given.models)
+    text += "\n" + model.name + pipeline::to_json(model, given.base.folder).dump();
+  for (const Eigen::Vector3d& centre : follower.centres())
+    text += fmt::format("\n{} {} {}", centre.x(), centre.y(), centre.z());
+  return xray::digest(text);
+}
+
+std::string first_line(const std::string& identity) {
+  return Json{{"format", "helicarm-frames/1"}, {"identity", identity}}.dump() + "\n";
+}
+
+/// The frames that an interrupted run left in the folder.
+std::vector<RegisteredFrame> kept_frames(const fs::path& folder, const std::string& identity,
+                                         const std::vector<std::string>& names,
+                                         const std::vector<int>& numbers) {
+  constexpr std::uintmax_t most_bytes = std::uintmax_t(1) << 30;
+  std::error_code ignored;
+  const fs::path file = folder / "frames.jsonl";
+  if (!fs::exists(file, ignored)) return {};
+  const std::string text = value_or_throw(read_file(file, most_bytes)), first = first_line(identity);
+  if (text.find('\n') == text.npos) return {};
+  if (!text.starts_with(first))
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("--resume: {} holds frames of another sequence, case or range of frames, or of "
+                    "other options: run without --resume, or with another --out",
+                    folder.string()));
+  return frames_from(text.substr(first.size()), names, numbers);
+}
+
+FramePose pose_of(const Registration& model) { return {model.world_from_model, model.covariance}; }
+
+bool has_pose(const Registration& model) { return !model.failure && model.is_determined(); }
+
+/// What a frame's registration says, without its pose.
+TrackedBody body_of(const Registration& model) {
+  TrackedBody body;
+  body.markers.reset();
+  body.decision = PoseDecision(int(model.decision));
+  if (model.failure)
+    body.reason = model.failure->reason;
+  else if (!model.warnings.empty())
+    body.reason = model.warnings.front().reason;
+  return body;
+}
+
+/// Rows of the frames so far; those of the whole sequence replace them at its end.
+struct ModelTables {
+  GrowingTable frames, poses, bodies;
+
+  ModelTables(const fs::path& folder, const std::string& identity)
+      : frames(folder / "frames.jsonl", first_line(identity)),
+        poses(folder / "registration.csv", case_registration::poses_header()),
+        bodies(folder / "bodies.csv", bodies_header()) {}
+
+  void add(const RegisteredFrame& frame, const RegisteredFrame& first,
+           const std::vector<Eigen::Vector3d>& centres) {
+    std::string rows;
+    for (std::size_t i = 0; i < frame.models.size(); ++i) {
+      const Registration& model = frame.models[i];
+      TrackedBody body = body_of(model);
+      if (has_pose(model) && has_pose(first.models[i]))
+        against_first(body, pose_of(model), centres[i], pose_of(first.models[i]), &frame == &first);
+      rows += body_row(frame.frame, csv_field(model.name), body);
+    }
+    bodies.add(rows);
+    poses.add(case_registration::poses_rows(frame));
+    frames.add(frame_line(frame));
+  }
+};
+
+}  // namespace
+
+void estimate_motion(ModelSequence& sequence, const std::vector<Eigen::Vector3d>& centres_in_model) {
+  const std::vector<double> times(sequence.frames.begin(), sequence.frames.end());
+  for (std::size_t i = 0; i < sequence.names.size(); ++i) {
+    BodySequence& body = sequence.bodies.emplace_back();
+    std::vector<std::optional<FramePose>> poses;
+    for (const RegisteredFrame& frame : sequence.registered) {
+      const Registration& model = frame.models[i];
+      body.frames.push_back(body_of(model));
+      poses.push_back(has_pose(model) ? std::optional(pose_of(model)) : std::nullopt);
+    }
+    body.smoothed.resize(body.frames.size());
+    for (std::size_t f = 0; f < body.frames.size(); ++f) {
+      body.smoothed[f].markers.reset();
+      body.smoothed[f].reason = body.frames[f].reason;
+    }
+    take_motion(body, poses, smooth_poses(times, poses, centres_in_model[i], NoiseScale::by_data),
+                centres_in_model[i]);
+  }
+  sequence.relative = relative_motions(sequence.bodies);
+}
+
+Expected<ModelSequence> follow_models(const pipeline::RegistrationCase& given,
+                                      const case_registration::FrameRange& range,
+                                      const case_registration::RegisterOptions& options,
+                                      const FollowOptions& follow,
+                                      const std::function<void(double share)>& on_frame,
+                                      const case_registration::Progress& progress) {
+  return guarded([&] {
+    if (follow.resume && !follow.out)
+      throw BadInput(Reason::usage, "resume: the folder of the interrupted run is not given");
+    ModelSequence sequence;
+    sequence.frames = range.numbers();
+    for (const pipeline::CaseModel& model : given.models) sequence.names.push_back(model.name);
+    const SequenceImages images = value_or_throw(SequenceImages::open(views_of(given), range));
+    CaseFollower follower = value_or_throw(
+        CaseFollower::begin(value_or_throw(pipeline::at_frame(given, range.first)), options, progress));
+    sequence.warnings = images.warnings();
+    sequence.warnings.insert(sequence.warnings.end(), follower.warnings().begin(), follower.warnings().end());
+    const auto begun = std::chrono::steady_clock::now();
+    const std::vector<Eigen::Vector3d> centres = follower.centres();
+    const std::string identity = identity_of(given, range, options, follower);
+    std::vector<RegisteredFrame> kept;
+    std::optional<ModelTables> tables;
+    if (follow.out) {
+      if (follow.resume) kept = kept_frames(*follow.out, identity, sequence.names, sequence.frames);
+      std::error_code ignored;
+      fs::create_directories(*follow.out, ignored);
+      tables.emplace(*follow.out, identity);
+    }
+    sequence.registered.reserve(sequence.frames.size());
+    // The next frame's images are read while this one's are registered.
+    std::future<Expected<std::vector<xray::XrayImage>>> ahead;
+    for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
+      if (i < kept.size()) {
+        follower.take(kept[i]);
+        sequence.registered.push_back(std::move(kept[i]));
+      } else {
+        auto now = ahead.valid() ? ahead.get() : images.at(sequence.frames[i]);
+        if (i + 1 < sequence.frames.size())
+          ahead = std::async(std::launch::async,
+                             [&images, next = sequence.frames[i + 1]] { return images.at(next); });
+        sequence.registered.push_back(
+            value_or_throw(follower.next(sequence.frames[i], value_or_throw(std::move(now)))));
+      }
+      if (tables) tables->add(sequence.registered.back(), sequence.registered.front(), centres);
+      if (on_frame) on_frame(double(i + 1) / double(sequence.frames.size()));
+    }
+    estimate_motion(sequence, centres);
+    sequence.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    return sequence;
+  });
+}
+
+}  // namespace helicarm::track

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "helicarm/report/chart.h"
+#include "helicarm/track/sequence.h"
+
+namespace helicarm::track {
+
+/// A number and what it is, for the head of a report. `what` is HTML.
+std::string report_card(const std::string& value, const std::string& what);
+
+/// HTML of the warnings, empty without any.
+std::string warnings_list(const std::vector<Warning>& warnings);
+
+/// For each body its smooth motion against the first frame with 95 % bars and the chart of its residuals,
+/// then the motion of each further body in the first one's coordinates. HTML.
+std::string motion_charts(const std::vector<int>& frames, const std::vector<std::string>& names,
+                          const std::vector<BodySequence>& bodies,
+                          const std::vector<std::vector<TrackedBody>>& relative,
+                          const std::vector<report::Chart>& residuals);
+
+}  // namespace helicarm::track
