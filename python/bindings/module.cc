@@ -17,6 +17,7 @@ PYBIND11_MODULE(_helicarm, module) {
   add_c_arm(module);
   add_sweep(module);
   add_track(module);
+  add_migration(module);
   add_phantom_calibration(module);
 }
 

@@ -29,6 +29,8 @@ void add_c_arm(py::module_& module);
 void add_sweep(py::module_& module);
 /// track, Track.
 void add_track(py::module_& module);
+/// migration.
+void add_migration(py::module_& module);
 /// measure_phantom, MeasuredPhantom, verify_phantom.
 void add_phantom_calibration(py::module_& module);
 

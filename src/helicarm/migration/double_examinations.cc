@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/migration/double_examinations.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace helicarm::migration {
+namespace {
+
+double value_of(const BodyMigration& body, int i) {
+  return i < 3 ? body.rotation_deg[i] : body.translation_mm[i - 3];
+}
+
+double sigma_of(const BodyMigration& body, int i) {
+  return (i < 3 ? 180 / EIGEN_PI : 1) * std::sqrt(body.covariance(i, i));
+}
+
+Precision precision_of(const std::string& name, const std::vector<const BodyMigration*>& found) {
+  Precision made{.body = name, .n = int(found.size())};
+  const double n = made.n;
+  for (int i = 0; i < 6; ++i) {
+    ZeroMotion& number = made.numbers[std::size_t(i)];
+    double squares = 0, stated = 0;
+    for (const BodyMigration* body : found) number.mean += value_of(*body, i) / n;
+    for (const BodyMigration* body : found) {
+      squares += std::pow(value_of(*body, i) - number.mean, 2);
+      stated += std::pow(sigma_of(*body, i), 2);
+    }
+    number.sd = std::sqrt(squares / (n - 1));
+    number.limit_95 = student_975(n - 1) * number.sd;
+    number.stated_sigma = std::sqrt(stated / n);
+  }
+  for (const BodyMigration* body : found) {
+    made.mtpm_mean_mm += body->mtpm_mm / n;
+    made.mtpm_largest_mm = std::max(made.mtpm_largest_mm, body->mtpm_mm);
+  }
+  return made;
+}
+
+}  // namespace
+
+std::vector<Precision> precision_of(const std::vector<NamedMigration>& doubles) {
+  std::vector<std::pair<std::string, std::vector<const BodyMigration*>>> of_name;
+  for (const NamedMigration& each : doubles)
+    for (const BodyMigration& body : each.migration.bodies) {
+      const std::string& name = each.migration.segments[body.segment].name;
+      auto found = std::ranges::find(of_name, name, [](const auto& entry) { return entry.first; });
+      if (found == of_name.end()) found = of_name.insert(found, {name, {}});
+      found->second.push_back(&body);
+    }
+  std::vector<Precision> made;
+  for (const auto& [name, found] : of_name)
+    if (found.size() > 1) made.push_back(precision_of(name, found));
+  return made;
+}
+
+}  // namespace helicarm::migration

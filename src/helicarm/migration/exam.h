@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/core/failure.h"
+
+namespace helicarm::migration {
+
+/// A marker where one examination located it.
+struct Marker {
+  std::string name;
+  Eigen::Vector3d place;                      ///< mm, laboratory
+  std::optional<Eigen::Matrix3d> covariance;  ///< mm^2; nothing: not stated
+  std::optional<double> ray_gap_mm;           ///< crossing-line distance
+};
+
+/// A rigid set of markers, by their names.
+struct Segment {
+  std::string name;
+  std::vector<std::string> markers;
+};
+
+/// One examination: located markers, and which of them belong together, if it says so.
+struct Exam {
+  std::string name;  ///< of its file, for messages
+  std::vector<Marker> markers;
+  std::vector<Segment> segments;
+
+  const Marker* find(const std::string& marker) const;
+};
+
+/// Reads an examination:
+/// - CSV `name,x_mm,y_mm,z_mm` and optional `sx_mm,sy_mm,sz_mm` (standard deviations), `ray_gap_mm`,
+///   `segment`;
+/// - markers.csv of `helicarm track` (its tracked places), or its folder, whose track.json names the bodies;
+///   `frame`: which one, needed if there are several;
+/// - result.json of `helicarm run`, or its folder: the located points.
+/// Fails with missing_file, bad_value, name_clash, unknown_key, and as `read_csv`, `read_json`.
+Expected<Exam> read_exam(const std::filesystem::path& path, std::optional<int> frame = {});
+
+/// "NAME=M1,M2,..." as on the command line; bad_value for another form and for fewer than three markers.
+Expected<Segment> segment_from(const std::string& text);
+
+}  // namespace helicarm::migration
