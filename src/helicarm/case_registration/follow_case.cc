@@ -42,7 +42,7 @@ std::vector<std::unique_ptr<FollowedModel>> followed_models(const pipeline::Regi
     if (!model)
       throw BadInput(Reason::bad_value,
                      fmt::format("models: \"{}\": a sequence needs a volume or a surface", asked.name));
-    StartPoses start = start_poses(given, loaded, asked, model, loaded.views, options.run.motion_sigma_mm);
+    StartPoses start = start_poses(given, loaded, asked, loaded.views, options.run.motion_sigma_mm);
     std::optional<registration::LandmarkFault> fault;
     if (start.landmarks) fault = registration::landmark_fault(start.used, *start.landmarks);
     if (fault && fault->is_certain) throw BadInput(fault->failure);
@@ -51,8 +51,7 @@ std::vector<std::unique_ptr<FollowedModel>> followed_models(const pipeline::Regi
     auto body = std::make_unique<FollowedModel>(
         FollowedModel{std::move(*model), {}, std::move(start), fault, std::move(plans[i])});
     const std::vector<geometry::RigidTransform>& poses = body->start.poses;
-    body->follower.emplace(body->model, poses,
-                           search_options(options, progress, loaded, asked, poses.size()));
+    body->follower.emplace(body->model, poses, search_options(options, progress, loaded, asked));
     bodies.push_back(std::move(body));
   }
   return bodies;

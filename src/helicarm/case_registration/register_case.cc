@@ -75,8 +75,7 @@ class Registrar {
     LoadedModel files = value_or_throw(load_model(asked, plan && !plan->tunnels.empty()));
     std::optional<registration::Model>& model = files.model;
     const double motion_sigma_mm = follows ? 0 : options_.run.motion_sigma_mm;
-    const auto start =
-        guarded([&] { return start_poses(given_, loaded_, asked, model, views, motion_sigma_mm); });
+    const auto start = guarded([&] { return start_poses(given_, loaded_, asked, views, motion_sigma_mm); });
     if (!start) {
       if (exit_code(start.error().reason) == 2) throw BadInput(start.error());
       made.by_landmarks_only = true;
@@ -118,8 +117,7 @@ class Registrar {
                                                   const std::optional<registration::LandmarkFault>& fault,
                                                   const std::vector<RegistrationView>& views,
                                                   double motion_sigma_mm) const {
-    registration::RegistrationOptions how =
-        search_options(options_, progress_, loaded_, asked, start.poses.size());
+    registration::RegistrationOptions how = search_options(options_, progress_, loaded_, asked);
     how.motion_sigma_mm = motion_sigma_mm;
     if (progress_.step) how.on_step = [&](std::string_view step) { progress_.step(asked.name, step); };
     auto result = registration::register_model(model, views, start.poses, how);
@@ -130,6 +128,9 @@ class Registrar {
   void add_figures(const registration::Model& model, const std::vector<RegistrationView>& views,
                    RegisteredModel& made) const {
     made.outlines = outlines(model, made.views, made.registration.world_from_model);
+    if (made.registration.failure)
+      for (const registration::Alternative& each : made.registration.alternatives)
+        made.alternative_outlines.push_back(outlines(model, made.views, each.world_from_model));
     made.is_surface = model.surface.has_value();
     for (const RegistrationView& view : views)
       made.drrs.push_back(drr_image(model, view.view, made.registration.world_from_model,

@@ -66,6 +66,8 @@ struct RegisteredModel {
   std::vector<geometry::View> views;  ///< as used: of a tracked bone at the first acquisition
   /// For overlays, per view: outlines of the model at its pose, rectified px.
   std::vector<std::vector<Eigen::Vector2d>> outlines;
+  /// The same for each of the registration's alternatives if it is refused: poses to choose from.
+  std::vector<std::vector<std::vector<Eigen::Vector2d>>> alternative_outlines = {};
   /// For the report, per view: `drr_image` of the model at its pose.
   std::vector<image::Image<std::uint8_t>> drrs;
 };

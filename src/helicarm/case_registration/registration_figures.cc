@@ -129,6 +129,16 @@ std::string agreement_marks(const RegisteredView& view, double side) {
   return "<g fill-opacity=\"0.25\">\n" + marks + "</g>\n";
 }
 
+/// Dots in the model's colour.
+std::string outline_path(const std::vector<Vector2d>& outline, std::size_t model, double width) {
+  const auto& [red, green, blue] = outline_colour(model);
+  std::string path;
+  for (const Vector2d& at : outline) path += fmt::format("M{:.1f} {:.1f}h0", at.x(), at.y());
+  return fmt::format(
+      "<path stroke=\"rgb({},{},{})\" stroke-width=\"{:.2f}\" stroke-linecap=\"round\" d=\"{}\"/>\n", red,
+      green, blue, width, path);
+}
+
 std::string blend_figure(const Image<std::uint8_t>& drr, const Vector2i& size, std::size_t index,
                          const std::string& title) {
   return figure("blend",
@@ -242,6 +252,31 @@ std::string model_figures(const CaseRegistration& result, std::size_t index) {
     if (!view.agreements.empty()) html += agreement_figure(view, model.is_surface, size, i, title);
   }
   return html.empty() ? html : "<div class=\"views\">\n" + html + "</div>\n";
+}
+
+std::string alternatives_html(const CaseRegistration& result, std::size_t index) {
+  const RegisteredModel& model = result.models[index];
+  if (model.alternative_outlines.empty()) return "";
+  std::string html =
+      "<p>The best poses, to choose from. The right one's outline follows the bone's edges in every view; "
+      "give "
+      "its world_from_model in registration.json as the model's start.</p>\n<div class=\"views\">\n";
+  for (std::size_t pose = 0; pose <= model.alternative_outlines.size(); ++pose) {
+    const auto& of_views = pose == 0 ? model.outlines : model.alternative_outlines[pose - 1];
+    const std::string title = pose == 0
+                                  ? "the pose of this result"
+                                  : fmt::format("alternative {}, {:.1f} mm away, cost ratio {:.2f}", pose,
+                                                model.registration.alternatives[pose - 1].distance_mm,
+                                                model.registration.alternatives[pose - 1].cost_ratio);
+    for (std::size_t i = 0; i < of_views.size(); ++i)
+      html += figure("overlay",
+                     svg(title, size_of(result.loaded.views[i].grey),
+                         xray_element(i) + outline_path(of_views[i], index,
+                                                        2 * result.loaded.views[i].grey.width() / 1024.0)),
+                     report::escaped(fmt::format("{}, {}: {}", model.registration.name,
+                                                 result.loaded.views[i].name, title)));
+  }
+  return html + "</div>\n";
 }
 
 std::string slider_script() {

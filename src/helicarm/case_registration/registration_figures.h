@@ -24,6 +24,10 @@ std::string overlay_figure(const CaseRegistration& result, std::size_t view);
 /// registration by landmarks alone.
 std::string model_figures(const CaseRegistration& result, std::size_t model);
 
+/// Outlines of a refused model at its pose and at each alternative, over each view: to choose from. Empty
+/// without alternatives.
+std::string alternatives_html(const CaseRegistration& result, std::size_t model);
+
 /// Script of the sliders; without it the figures show X-ray image and DRR half each.
 std::string slider_script();
 

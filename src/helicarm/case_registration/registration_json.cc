@@ -51,6 +51,8 @@ Json json_of(const RegisteredModel& model, const std::vector<guidance::Bone>& bo
                {"centre_mm", json_list(r.centre)},
                {"starts", {{"n", r.starts}, {"agree", r.agree}}},
                {"runner_up", nullptr},
+               {"searched", r.anywhere ? "anywhere" : "start"},
+               {"alternatives", Json::array()},
                {"score", r.score},
                {"spacing_mm", r.spacing_mm},
                {"mirrored_cost_ratio", r.mirrored_ratio ? Json(*r.mirrored_ratio) : Json()},
@@ -60,6 +62,10 @@ Json json_of(const RegisteredModel& model, const std::vector<guidance::Bone>& bo
                {"landmarks", json_of_landmarks(model)}};
   if (r.runner_up)
     json["runner_up"] = {{"distance_mm", r.runner_up->distance_mm}, {"cost_ratio", r.runner_up->cost_ratio}};
+  for (const registration::Alternative& each : r.alternatives)
+    json["alternatives"].push_back({{"world_from_model", json_rows(each.world_from_model.matrix())},
+                                    {"distance_mm", each.distance_mm},
+                                    {"cost_ratio", each.cost_ratio}});
   if (r.disagreement)
     json["disagreement"] = {{"distance_mm", r.disagreement->distance_mm},
                             {"sigma_mm", r.disagreement->sigma_mm},

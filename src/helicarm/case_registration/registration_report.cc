@@ -96,7 +96,7 @@ std::string report_html(const CaseRegistration& result) {
   body += "</div>\n";
   bool sliders = false;
   for (std::size_t m = 0; m < result.models.size(); ++m) {
-    body += model_section(result.models[m]) + model_figures(result, m);
+    body += model_section(result.models[m]) + alternatives_html(result, m) + model_figures(result, m);
     sliders = sliders || !result.models[m].drrs.empty();
   }
   if (sliders) body += slider_script();

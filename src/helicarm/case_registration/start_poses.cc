@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/case_registration/start_poses.h"
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
 #include "helicarm/case_registration/landmark_picks.h"
 #include "helicarm/case_registration/model_box.h"
 #include "helicarm/case_registration/plan_errors.h"
-#include "helicarm/geometry/ray.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -15,35 +13,6 @@ namespace {
 using Eigen::Vector3d;
 using geometry::RigidTransform;
 using registration::RegistrationView;
-
-/// The point nearest to the rays through the images' centres.
-Vector3d middle_of(const std::vector<RegistrationView>& views) {
-  Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
-  Vector3d sum = Vector3d::Zero();
-  for (const RegistrationView& view : views) {
-    const Eigen::Vector2d centre(0.5 * (view.grey.width() - 1), 0.5 * (view.grey.height() - 1));
-    const geometry::Ray ray = geometry::ray_through(view.view, centre);
-    const Eigen::Matrix3d off = Eigen::Matrix3d::Identity() - ray.direction * ray.direction.transpose();
-    across += off;
-    sum += off * ray.origin;
-  }
-  return across.ldlt().solve(sum);
-}
-
-/// The model's axes along the world's in all 24 ways.
-std::vector<RigidTransform> axis_starts(const registration::Model& model, const Vector3d& at) {
-  std::vector<RigidTransform> starts;
-  for (int x = 0; x < 3; ++x)
-    for (int y = 0; y < 3; ++y)
-      for (int signs = 0; x != y && signs < 4; ++signs) {
-        Eigen::Matrix3d rotation;
-        rotation.col(0) = (signs & 1 ? -1.0 : 1.0) * Vector3d::Unit(x);
-        rotation.col(1) = (signs & 2 ? -1.0 : 1.0) * Vector3d::Unit(y);
-        rotation.col(2) = rotation.col(0).cross(rotation.col(1));
-        starts.push_back({rotation, at - rotation * model.centre});
-      }
-  return starts;
-}
 
 /// What the located landmarks share: the cameras' errors and the model's motion.
 Eigen::MatrixXd shared_covariance(const LoadedViews& loaded, double motion_sigma_mm) {
@@ -57,8 +26,8 @@ Eigen::MatrixXd shared_covariance(const LoadedViews& loaded, double motion_sigma
 }  // namespace
 
 StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedViews& loaded,
-                       const pipeline::CaseModel& asked, const std::optional<registration::Model>& model,
-                       const std::vector<RegistrationView>& views, double motion_sigma_mm) {
+                       const pipeline::CaseModel& asked, const std::vector<RegistrationView>& views,
+                       double motion_sigma_mm) {
   if (asked.world_from_model) return {{*asked.world_from_model}, {}, {}};
   if (asked.landmarks) {
     StartPoses start;
@@ -73,7 +42,7 @@ StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedView
         Reason::bad_value,
         fmt::format("models: \"{}\": \"start\" is missing: with one view a pose or landmarks are needed",
                     asked.name));
-  return {axis_starts(*model, middle_of(views)), {}, {}};
+  return {};
 }
 
 void compare_with_landmarks(const StartPoses& start, const std::optional<registration::LandmarkFault>& fault,
@@ -110,16 +79,17 @@ std::vector<Warning> places_outside(const pipeline::CaseModel& asked,
 }
 
 registration::RegistrationOptions search_options(const RegisterOptions& options, const Progress& progress,
-                                                 const LoadedViews& loaded, const pipeline::CaseModel& asked,
-                                                 std::size_t starts) {
+                                                 const LoadedViews& loaded,
+                                                 const pipeline::CaseModel& asked) {
   registration::RegistrationOptions how;
   how.max_error_mm = options.run.max_error_mm;
   how.motion_sigma_mm = options.run.motion_sigma_mm;
   how.scale_sigma = asked.scale_sigma.value_or(registration::usual_scale_sigma);
   how.threads = options.run.threads;
   how.camera_covariance = loaded.camera_covariance;
-  how.search = {options.search.shift_mm, options.search.turn_deg, starts > 1 ? 150 * int(starts) : 600,
-                progress.interrupt};
+  how.search.shift_mm = options.search.shift_mm;
+  how.search.turn_deg = options.search.turn_deg;
+  how.search.interrupt = progress.interrupt;
   return how;
 }
 

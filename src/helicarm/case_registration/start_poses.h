@@ -18,12 +18,11 @@ struct StartPoses {
   std::optional<registration::LandmarkRegistration> landmarks;
 };
 
-/// The pose or the landmarks that the case gives; without either the model's axes along the world's in all 24
-/// ways, in the middle of the views. `motion_sigma_mm`: of landmarks, between the acquisitions. `model`:
-/// nothing for landmarks alone. Throws BadInput: bad_value without a start in one view, and as
+/// The pose or the landmarks that the case gives; none: the model is searched anywhere. `motion_sigma_mm`: of
+/// landmarks, between the acquisitions. Throws BadInput: bad_value without a start in one view, and as
 /// `picked_landmarks`, `register_landmarks`.
 StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedViews& loaded,
-                       const pipeline::CaseModel& asked, const std::optional<registration::Model>& model,
+                       const pipeline::CaseModel& asked,
                        const std::vector<registration::RegistrationView>& views, double motion_sigma_mm);
 
 /// Compares a pose that the images gave with the landmarks it started from, which may be at fault themselves:
@@ -37,9 +36,8 @@ std::vector<Warning> places_outside(const pipeline::CaseModel& asked,
                                     const std::vector<registration::Landmark>& landmarks,
                                     const std::optional<Plan>& plan);
 
-/// The options of an untracked model's registration from that many starts.
+/// The options of an untracked model's registration.
 registration::RegistrationOptions search_options(const RegisterOptions& options, const Progress& progress,
-                                                 const LoadedViews& loaded, const pipeline::CaseModel& asked,
-                                                 std::size_t starts);
+                                                 const LoadedViews& loaded, const pipeline::CaseModel& asked);
 
 }  // namespace helicarm::case_registration

@@ -81,8 +81,8 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
                 "taken into account");
   if (codec.wants(model.world_from_model || model.landmarks))
     codec.object("start", model,
-                 "a pose or landmarks; absent: the model's axes along the world's in all 24 ways, its centre "
-                 "where the views' central rays meet",
+                 "a pose or landmarks; absent, with two views or more: every orientation and position is "
+                 "[searched](registration.md#without-a-start)",
                  [&](auto& inner, auto& start) { describe_start(inner, start, folder); });
   codec.file("plan", model.plan, folder,
              "path of 3D Slicer's markups (`.mrk.json`): point lists give points, lines give tunnels; "

@@ -175,6 +175,8 @@ std::string wider_search(const RegistrationOptions& options, const Registration&
                          double reach_mm) {
   constexpr double edge_share = 0.6;
   const bool at_edge = nearest_mm > edge_share * reach_mm, disagree = result.starts > 1 && result.agree < 2;
+  if (result.anywhere)
+    return "; every orientation and position was searched: if the model is right, give landmarks or a pose";
   if (options.search.candidates == 0 || !(at_edge || disagree)) return "";
   return fmt::format(
       "; {}: if the model is right, search wider (--search-mm {:g} --search-deg {:g}) or start nearer, with "
@@ -211,7 +213,7 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
                  "hidden{}",
                  model.name, view.score, view.name, least, wider),
              {{"score", view.score}, {"limit", least}});
-  if (nearest > reach)
+  if (!starts.empty() && nearest > reach)
     refuse(
         Reason::out_of_capture,
         fmt::format(
@@ -227,13 +229,14 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
                least_mirrored_ratio),
            {{"mirrored_ratio", *result.mirrored_ratio}, {"limit", least_mirrored_ratio}});
   if (result.runner_up && result.runner_up->cost_ratio < least_runner_up_ratio)
-    refuse(
-        Reason::registration_ambiguous,
-        fmt::format(
-            "{}: another pose, {:.1f} mm away, explains the images almost as well (cost ratio {:.2f}, at "
-            "least {:.2f} is required); give a start nearer to the truth, or landmarks",
-            model.name, result.runner_up->distance_mm, result.runner_up->cost_ratio, least_runner_up_ratio),
-        {{"distance_mm", result.runner_up->distance_mm}, {"cost_ratio", result.runner_up->cost_ratio}});
+    refuse(Reason::registration_ambiguous,
+           fmt::format(
+               "{}: another pose, {:.1f} mm away, explains the images almost as well (cost ratio {:.2f}, at "
+               "least {:.2f} is required); {}",
+               model.name, result.runner_up->distance_mm, result.runner_up->cost_ratio, least_runner_up_ratio,
+               result.anywhere ? "choose one of the report's poses and give it as \"start\", or landmarks"
+                               : "give a start nearer to the truth, or landmarks"),
+           {{"distance_mm", result.runner_up->distance_mm}, {"cost_ratio", result.runner_up->cost_ratio}});
   const Deformation& shape = result.deformation;
   const double strain_limit = result.views.size() > 1 ? most_strain : most_strain_of_one_view;
   if (std::abs(shape.strain) > strain_limit && std::abs(shape.strain) > strain_sigmas * shape.sigma)

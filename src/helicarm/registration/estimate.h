@@ -39,6 +39,9 @@ class Scene {
   double pixel_mm(const Eigen::Vector3d& at) const;
   /// Side of a view's patches, or spacing of its contour points, px; after `prepare`.
   double comparison_px(const Level& level, std::size_t view) const;
+  /// What `prepare` made for a level.
+  const Raster& raster(const Level& level, std::size_t view) const { return prepared(level).rasters[view]; }
+  const Density& density(const Level& level) const { return prepared(level).density; }
 
  private:
   struct Prepared {

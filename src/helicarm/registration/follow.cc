@@ -37,6 +37,7 @@ Registration Follower::next(const std::vector<RegistrationView>& views, double t
     if (!before_ || result.failure || result.agree < 2) {
       RegistrationOptions wide = options_;
       wide.search.candidates = SearchOptions{}.candidates;
+      wide.search.anywhere_after_refusal = false;
       const double spent_s = result.seconds;
       result = register_model(*model_, views, {*expected}, wide);
       result.seconds += spent_s;

@@ -12,6 +12,7 @@
 #include "helicarm/registration/checks.h"
 #include "helicarm/registration/covariance.h"
 #include "helicarm/registration/mirror.h"
+#include "helicarm/registration/poses_anywhere.h"
 
 namespace helicarm::registration {
 namespace {
@@ -49,6 +50,14 @@ std::vector<SearchStage> stages_for(const Scene& scene, const Vector3d& at) {
   const double coarsest = std::max(fine, std::min(5.0, model.radius_mm / 5));
   for (double spacing = 2 * fine; spacing < 1.5 * coarsest; spacing *= 2)
     stages.insert(stages.begin(), {{false, spacing}, stages.size() < 2 ? 8 : 32, hopeless_ratio});
+  return stages;
+}
+
+/// From poses found anywhere; coarser levels than theirs lead away.
+std::vector<SearchStage> stages_from_anywhere(const Scene& scene, const Vector3d& at) {
+  std::vector<SearchStage> stages = stages_for(scene, at);
+  while (stages.size() > 1 && stages.front().level.spacing_mm > level_anywhere(scene.model()).spacing_mm)
+    stages.erase(stages.begin());
   return stages;
 }
 
@@ -144,6 +153,46 @@ Warning depth_from_scale(const RegistrationView& view, const RigidStep& by_size,
       {{"mm_per_percent", mm_per_percent}, {"scale_sigma", result.scale_sigma}}};
 }
 
+struct Search {
+  std::vector<SearchStage> stages;
+  SearchResult found;
+};
+
+Search searched_anywhere(Scene& scene, const SearchOptions& options) {
+  constexpr std::size_t starts = 64;
+  const Vector3d middle = middle_of(scene.views());
+  scene.prepare(level_anywhere(scene.model()), middle);
+  std::vector<RigidTransform> poses = poses_anywhere(scene, starts, options.interrupt);
+  if (poses.empty()) poses.push_back({Eigen::Matrix3d::Identity(), middle - scene.model().centre});
+  Search made{stages_from_anywhere(scene, middle), {}};
+  SearchOptions from_poses = options;
+  from_poses.candidates = 0;
+  made.found = search(scene, made.stages, poses, from_poses, same_mm);
+  return made;
+}
+
+Search searched_about(Scene& scene, const std::vector<RigidTransform>& starts, const SearchOptions& options) {
+  Search made{stages_for(scene, starts.front() * scene.model().centre), {}};
+  made.found = search(scene, made.stages, starts, options, same_mm);
+  return made;
+}
+
+/// Whether the search may have missed the solution.
+bool may_have_missed(const Registration& result) {
+  return result.failure &&
+         (result.failure->reason == Reason::wrong_model || result.failure->reason == Reason::out_of_capture ||
+          result.failure->reason == Reason::registration_ambiguous);
+}
+
+Warning found_anywhere(const Registration& before, const Registration& result, double distance_mm) {
+  return {Reason::out_of_capture,
+          fmt::format("{}: the search about the start was refused ({}); the pose is that of a search over "
+                      "every orientation and position, {:.1f} mm from the start",
+                      result.name, code(before.failure->reason), distance_mm),
+          {},
+          {{"distance_mm", distance_mm}}};
+}
+
 }  // namespace
 
 Warning cameras_without_covariance(const std::string& name) {
@@ -178,8 +227,12 @@ double worst_error_mm(const Model& model, const Registration& registration) {
   return worst;
 }
 
-Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
-                            const std::vector<RigidTransform>& starts, const RegistrationOptions& options) {
+namespace {
+
+/// `anywhere`: `starts` limit only where the solution may lie; none: nowhere.
+Registration registered(const Model& model, const std::vector<RegistrationView>& views,
+                        const std::vector<RigidTransform>& starts, const RegistrationOptions& options,
+                        bool anywhere) {
   const auto begun = std::chrono::steady_clock::now();
   const auto step = [&](std::string_view name) {
     if (options.search.interrupt) options.search.interrupt();
@@ -187,9 +240,9 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
   };
   step("prepare");
   Scene scene(model, views, options.threads);
-  const auto stages = stages_for(scene, starts.front() * model.centre);
-  step("search");
-  const SearchResult found = search(scene, stages, starts, options.search, same_mm);
+  step(anywhere ? "search anywhere" : "search");
+  const auto [stages, found] =
+      anywhere ? searched_anywhere(scene, options.search) : searched_about(scene, starts, options.search);
   const Estimate& best = found.solutions.front();
   Registration result;
   result.name = model.name;
@@ -199,6 +252,8 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
   result.spacing_mm = stages.back().level.spacing_mm;
   result.starts = found.starts;
   result.agree = found.agree;
+  result.alternatives = found.alternatives;
+  result.anywhere = anywhere;
   if (found.runner_up)
     result.runner_up = {separation(model, best.pose, found.runner_up->pose),
                         (1 - found.runner_up->score) / (1 - found.runner_up_best)};
@@ -229,6 +284,27 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
   decide(model, starts, options, result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return result;
+}
+
+}  // namespace
+
+Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
+                            const std::vector<RigidTransform>& starts, const RegistrationOptions& options) {
+  Registration result = registered(model, views, starts, options, starts.empty());
+  if (result.anywhere || views.size() < 2 || options.search.candidates == 0 ||
+      !options.search.anywhere_after_refusal || !may_have_missed(result))
+    return result;
+  Registration wider = registered(model, views, starts, options, true);
+  wider.seconds += result.seconds;
+  if (wider.failure) {
+    result.seconds = wider.seconds;
+    return result;
+  }
+  double nearest = 1e9;
+  for (const RigidTransform& start : starts)
+    nearest = std::min(nearest, separation(model, start, wider.world_from_model));
+  wider.notes.push_back(found_anywhere(result, wider, nearest));
+  return wider;
 }
 
 }  // namespace helicarm::registration

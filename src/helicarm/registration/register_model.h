@@ -92,6 +92,8 @@ struct Registration {
   double spacing_mm = 0;  ///< of the finest comparison
   int starts = 0, agree = 0;
   std::optional<RunnerUp> runner_up;
+  std::vector<Alternative> alternatives = {};  ///< at most two other poses, best first
+  bool anywhere = false;                       ///< found by a search over every orientation and position
   /// Cost ratio of the mirrored model. None: a search without candidates, or a surface that is its own mirror
   /// image.
   std::optional<double> mirrored_ratio;
@@ -109,8 +111,9 @@ inline constexpr double usual_error_mm = 2;
 /// covariance_missing, of a registration to cameras of other programs.
 Warning cameras_without_covariance(const std::string& name);
 
-/// Registers a model to the views from one or more starting poses (world_from_model). Refusals are in the
-/// result: out_of_capture, wrong_model, registration_ambiguous, registration_disagrees, uncertain.
+/// Registers a model to the views from starting poses (world_from_model). Without one, which needs two views,
+/// and after a refusal in two views, every orientation and position is searched. Refusals are in the result:
+/// out_of_capture, wrong_model, registration_ambiguous, registration_disagrees, uncertain.
 Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
                             const std::vector<geometry::RigidTransform>& starts,
                             const RegistrationOptions& options);

@@ -30,6 +30,7 @@ RegistrationOptions quick() {
   RegistrationOptions options;
   options.threads = 1;
   options.search = {8, 8, 200};
+  options.search.anywhere_after_refusal = false;
   return options;
 }
 

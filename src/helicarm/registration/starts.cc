@@ -14,6 +14,8 @@ namespace {
 using geometry::RigidTransform;
 
 constexpr std::size_t most_given = 3;  // starts that are tried whatever their score
+constexpr std::size_t most_alternatives = 2;
+constexpr double visible_share = 0.2;  // of the model's radius, between poses to choose from
 
 /// The additive recurrence with the generalised golden ratio of six dimensions (Roberts 2018), in -1 .. 1.
 RigidStep sequence(int number) {
@@ -94,6 +96,22 @@ std::vector<Estimate> refined(const Scene& scene, const Level& level, const std:
   return estimates;
 }
 
+/// Keeps the first few that differ visibly from the solution and each other.
+void keep_distinct(const Model& model, const RigidTransform& solution,
+                   std::vector<Alternative>& alternatives) {
+  const double visible_mm = visible_share * model.radius_mm;
+  std::vector<Alternative> kept;
+  for (Alternative& each : alternatives) {
+    each.distance_mm = separation(model, solution, each.world_from_model);
+    if (kept.size() < most_alternatives && each.distance_mm > visible_mm &&
+        std::ranges::none_of(kept, [&](const Alternative& other) {
+          return separation(model, other.world_from_model, each.world_from_model) < visible_mm;
+        }))
+      kept.push_back(each);
+  }
+  alternatives = std::move(kept);
+}
+
 }  // namespace
 
 SearchResult search(Scene& scene, const std::vector<SearchStage>& stages,
@@ -114,13 +132,17 @@ SearchResult search(Scene& scene, const std::vector<SearchStage>& stages,
     for (const Estimate& estimate : estimates)
       reached.push_back(estimate.pose), scores.push_back(estimate.score);
     std::size_t keep = last ? estimates.size() : std::size_t((&stage)[1].keep);
-    auto kept = best_of(model, reached, scores, int(std::max<std::size_t>(2, keep + !last)), same_mm);
+    auto kept = best_of(model, reached, scores, int(keep + most_alternatives), same_mm);
     if (!last)
       while (keep > 1 && (kept.size() < keep ||
                           1 - scores[kept[keep - 1]] > (&stage)[1].most_ratio * (1 - scores[kept[0]])))
         --keep;
     // What goes on and merges with the best was no rival; at the last level nothing goes on.
     const std::size_t rival = last ? 1 : keep;
+    std::vector<Alternative> left;
+    for (std::size_t k = rival; k < kept.size(); ++k)
+      left.push_back({reached[kept[k]], 0, (1 - scores[kept[k]]) / (1 - scores[kept[0]])});
+    result.alternatives.insert(result.alternatives.begin(), left.begin(), left.end());
     if (kept.size() > rival &&
         (last || separation(model, reached[kept[rival]], reached[kept[0]]) > 2 * stage.level.spacing_mm)) {
       result.runner_up = estimates[kept[rival]];
@@ -140,6 +162,7 @@ SearchResult search(Scene& scene, const std::vector<SearchStage>& stages,
     descents = std::move(next);
   }
   result.agree = int(descents.front().starts.size());
+  keep_distinct(model, result.solutions.front().pose, result.alternatives);
   return result;
 }
 

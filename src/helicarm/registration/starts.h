@@ -21,6 +21,15 @@ struct SearchOptions {
   double turn_deg = 15;
   int candidates = 600;                  ///< scored at the first level; 0: the starts alone are refined
   std::function<void()> interrupt = {};  ///< called often, from any thread: its exception ends the search
+  /// After a refusal in two views or more every orientation and position is searched (`poses_anywhere`).
+  bool anywhere_after_refusal = true;
+};
+
+/// Another distinct pose, of whatever level left it behind.
+struct Alternative {
+  geometry::RigidTransform world_from_model;
+  double distance_mm = 0;  ///< from the solution, rms over the model
+  double cost_ratio = 0;   ///< (1 - its score) / (1 - the best's) at that level: 1 is as good
 };
 
 struct SearchResult {
@@ -29,8 +38,9 @@ struct SearchResult {
   /// behind; and the best's score at its level.
   std::optional<Estimate> runner_up;
   double runner_up_best = 0;
-  int starts = 0;  ///< refined
-  int agree = 0;   ///< of them, that led to the best: at each level what ends within `same_mm` goes on as one
+  std::vector<Alternative> alternatives = {};  ///< to the best, of the finest levels first
+  int starts = 0;                              ///< refined
+  int agree = 0;  ///< of them, that led to the best: at each level what ends within `same_mm` goes on as one
 };
 
 /// Poses about the starts in a low-discrepancy sequence (each start first), the best of which are refined

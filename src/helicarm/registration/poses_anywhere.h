@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "helicarm/registration/estimate.h"
+
+namespace helicarm::registration {
+
+/// The point of the world nearest to the rays through the images' centres.
+Eigen::Vector3d middle_of(const std::vector<RegistrationView>& views);
+
+/// Level at which a model is looked for anywhere.
+Level level_anywhere(const Model& model);
+
+/// Poses of the model from which it may be registered without a start, best first: every orientation (about
+/// 15 degrees apart) at every position that all views show, at which gradients of its DRRs have the
+/// directions of the images' ones. Distinct; at most `count`. Two views or more; after `scene.prepare` of
+/// `level_anywhere`. `interrupt` is called often, from any thread.
+std::vector<geometry::RigidTransform> poses_anywhere(const Scene& scene, std::size_t count,
+                                                     const std::function<void()>& interrupt = {});
+
+}  // namespace helicarm::registration
