@@ -28,8 +28,12 @@ def limits(schema):
     if "array" in kinds and "items" in schema:
         items = schema["items"]
         least, most = schema.get("minItems", 0), schema.get("maxItems")
+        if most is None:
+            return "list"
         count = f"{most}" if least == most else f"{least} to {most}" if least else f"at most {most}"
-        of = f" numbers, each {limits(items)}" if items.get("type") == "number" else ""
+        of = f" numbers, each {limits(items)}" if "minimum" in items else ""
+        if items.get("type") == "array" and "maxItems" in items:
+            return f"{count} rows of {items['maxItems']} numbers"
         return f"list of {count}{of}"
     return ""
 

@@ -73,6 +73,10 @@ CommandResult track_command(const TrackArguments& arguments, Console& console) {
       console.out << summary_of(*sequence, *given)
                   << fmt::format("  {:.1f} s, {:.1f} frames/s\n\n  written to {}\n", sequence->seconds,
                                  double(sequence->frames.size()) / sequence->seconds, arguments.out.string());
+    if (sequence->failure) {
+      console.answered = console.json;
+      throw BadInput(*sequence->failure);
+    }
   });
 }
 
@@ -92,7 +96,8 @@ void add_track(CLI::App& app, Action& action) {
       "   \"picks\": [{\"name\": \"J1\", \"view\": \"cam1\", \"frame\": 1, \"uv\": [653.9, 642.5]}, ...],\n"
       "   \"bodies\": [{\"name\": \"jaw\", \"markers\": [\"J1\", \"J2\", \"J3\"], \"geometry\": null}]}\n\n"
       "\"camera\" is what `helicarm import --json` prints (MayaCam, OpenCV, a matrix); or \"calibration\": "
-      "\"result.json\",\nor the case's calibrator in the first images. Picks are raw pixels, within 6 px of "
+      "\"result.json\",\nor the case's calibrator in the first images. Picks are raw pixels, within 6 px and "
+      "a radius of "
       "the "
       "marker.\n\n"
       "Writes markers.csv, bodies.csv (poses against the first frame), smoothed.csv, relative.csv, "
@@ -101,7 +106,8 @@ void add_track(CLI::App& app, Action& action) {
       "has "
       "its standard\ndeviations; a marker that is hidden is placed by its body. An interrupted run goes on "
       "with "
-      "--resume.\nExit code 3: the picks contradict each other. See docs/motion.md.");
+      "--resume.\nExit code 3: the picks contradict each other, or nothing was followed. See "
+      "docs/motion.md.");
   auto& a = arguments_of(command, action, track_command);
   command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
   command->add_option("--frames", a.frames, "Frames A-B[:STEP]; the markers are picked in frame A")

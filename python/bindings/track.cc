@@ -38,6 +38,7 @@ std::unique_ptr<Tracked> tracked(const std::filesystem::path& folder, const std:
             progress(double(done) / range.count());
           }));
       if (out) value_or_throw(track::write_track(made->sequence, made->given, *out));
+      if (made->sequence.failure) throw BadInput(*made->sequence.failure);
       return made;
     });
   }));

@@ -18,6 +18,14 @@ void check_in_tunnel(const Guidance& now) {
   const double before_end_mm = aim.length_mm - aim.depth_mm;
   if (aim.distance_mm <= farthest_mm && aim.angle_deg <= widest_deg && std::abs(before_end_mm) <= farthest_mm)
     return;
+  if (aim.distance_mm <= farthest_mm && aim.angle_deg <= widest_deg && before_end_mm > 0)
+    throw BadInput(
+        {Reason::off_target,
+         fmt::format("the tip is {:.1f} mm before the tunnel's end: a drilled tunnel is verified within "
+                     "{:g} mm of it. Drill {:.1f} mm deeper",
+                     before_end_mm, farthest_mm, before_end_mm),
+         {},
+         {{"before_end_mm", before_end_mm}, {"limit_mm", farthest_mm}}});
   throw BadInput(
       {Reason::off_target,
        fmt::format(

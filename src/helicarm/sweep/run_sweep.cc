@@ -210,11 +210,12 @@ void label_by_neighbours(double factor, const SweepCase& given, std::vector<Fram
 /// One run tells of its own noise and calibrator many times over: more of its frames would crowd out other
 /// days.
 std::vector<calibration::HistoryEntry> acquisitions_of(const std::vector<FrameEstimate>& estimates,
-                                                       const SweepCase& given) {
+                                                       const SweepCase& given,
+                                                       const std::vector<SweepFrame>& frames) {
   constexpr std::size_t most = 40;
   std::vector<std::size_t> told;
   for (std::size_t i = 0; i < estimates.size(); ++i)
-    if (!estimates[i].failure && estimates[i].variance_scale == 1) told.push_back(i);
+    if (!frames[i].failure && estimates[i].variance_scale == 1) told.push_back(i);
   std::vector<calibration::HistoryEntry> entries;
   const calibration::CommonPrior common = pipeline::common_prior(given.base.calibrator);
   const std::size_t count = std::min(most, told.size());
@@ -390,10 +391,10 @@ Sweep swept(const SweepCase& given, const SweepOptions& options,
   }
   const PathKind kind = options.path.value_or(accepted >= least_smooth && is_one_run(given) ? PathKind::smooth
                                                                                             : PathKind::free);
-  sweep.acquisitions = acquisitions_of(estimates, given);
   report_images(sweep, estimates);
   warn_of_unused_balls(sweep, estimates, given.base.calibrator);
   sweep.failure = estimate_path(sweep, given.base, estimates, kind);
+  if (!sweep.failure) sweep.acquisitions = acquisitions_of(estimates, given, sweep.frames);
   compare_angles(sweep);
   compare_distance(sweep, estimates);
   warn_of_refused(sweep);

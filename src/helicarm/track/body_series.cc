@@ -49,12 +49,22 @@ void against_first(TrackedBody& frame, const FramePose& pose, const Eigen::Vecto
 
 void take_motion(BodySequence& body, const std::vector<std::optional<FramePose>>& poses,
                  const std::optional<SmoothMotion>& motion, const Eigen::Vector3d& centre_in_body) {
+  // Before the first and behind the last pose nothing bounds the motion.
+  const auto has_pose = [](const auto& pose) { return pose.has_value(); };
+  const auto begin = std::size_t(std::ranges::find_if(poses, has_pose) - poses.begin());
+  const auto behind =
+      std::size_t(poses.rend() - std::ranges::find_if(poses.rbegin(), poses.rend(), has_pose));
   if (motion) {
     body.prior = motion->prior;
     body.noise_factor = motion->noise_factor;
     for (std::size_t f = 0; f < poses.size(); ++f) {
       TrackedBody& frame = body.smoothed[f];
       const TrackedBody& own = body.frames[f];
+      if (f > 0 && (f < begin || f >= behind)) {
+        frame.decision = PoseDecision::refuse;
+        frame.reason = own.reason;
+        continue;
+      }
       against_first(frame, motion->frames[f], centre_in_body, motion->frames.front(), f == 0);
       frame.markers = own.markers;
       frame.rms_mm = own.rms_mm;

@@ -22,7 +22,7 @@ FramePose relative_pose(const FramePose& reference, const Eigen::Vector3d& refer
 /// Puts a body's poses of all frames and its smooth motion into its series, each against its first frame, by
 /// its smooth pose if there is one. `body.frames` has the decisions, reasons
 /// and markers of the frames, and `body.smoothed` is as long; frames without a pose are refused, and warned
-/// of where the motion fills them.
+/// of where the motion fills them between others.
 void take_motion(BodySequence& body, const std::vector<std::optional<FramePose>>& poses,
                  const std::optional<SmoothMotion>& motion, const Eigen::Vector3d& centre_in_body);
 

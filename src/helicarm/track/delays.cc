@@ -126,6 +126,10 @@ void warn_of_delays(const SequenceData& work, Sequence& sequence) {
       warning.figures["delay_ms"] = 1000 * delay.frames / *given.frame_rate_hz;
     }
     warning.message += ": its images are carried to the first camera's moment";
+    if (const double whole = std::round(delay.frames); whole != 0)
+      warning.message += fmt::format(
+          "; unless the cameras differ so much, set its \"frame_offset\" to {:g} and follow again",
+          given.views[k].frame_offset - whole);
     sequence.warnings.push_back(std::move(warning));
   }
 }

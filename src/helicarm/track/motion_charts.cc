@@ -58,7 +58,9 @@ std::string report_card(const std::string& value, const std::string& what) {
 std::string warnings_list(const std::vector<Warning>& warnings) {
   std::string html;
   for (const Warning& warning : warnings)
-    html += fmt::format("<li><b>{}</b> {}</li>", code(warning.reason), report::escaped(warning.message));
+    html += fmt::format("<li><b>{}</b> {}{}</li>", code(warning.reason),
+                        warning.view.empty() ? "" : report::escaped(warning.view) + ": ",
+                        report::escaped(warning.message));
   return html.empty() ? "" : "<h2>Warnings</h2>\n<ul>" + html + "</ul>\n";
 }
 

@@ -180,6 +180,27 @@ void warn_of_lost_markers(const SequenceData& work, Sequence& sequence) {
   }
 }
 
+/// Where no body has a pose in any frame, or without bodies most places are lost.
+std::optional<Failure> nothing_followed(const SequenceData& work, const Sequence& sequence) {
+  constexpr double most_lost = 0.5;
+  double lost = 0;
+  for (const auto& frame : sequence.markers)
+    lost += double(std::ranges::count(frame, MarkerStatus::lost, &TrackedMarker::status));
+  const double share = lost / double(work.frames * work.markers);
+  const bool no_pose = std::ranges::none_of(sequence.bodies, [](const BodySequence& body) {
+    return std::ranges::any_of(body.frames, [](const TrackedBody& frame) { return frame.pose.has_value(); });
+  });
+  if (!no_pose || (sequence.bodies.empty() && share <= most_lost)) return std::nullopt;
+  return Failure{
+      Reason::marker_lost,
+      fmt::format(
+          "{:.0f} % of the places are lost{}: is \"diameter_mm\" that of the markers, the camera of each "
+          "view its own, and \"frame_offset\" right? The warnings name each marker",
+          100 * share, sequence.bodies.empty() ? "" : ", and no body has a pose"),
+      {},
+      {{"lost_share", share}}};
+}
+
 }  // namespace
 
 Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights>& sights) {
@@ -205,6 +226,7 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
     });
   warn_of_lost_markers(work, sequence);
   sequence.relative = relative_motions(sequence.bodies);
+  sequence.failure = nothing_followed(work, sequence);
   return sequence;
 }
 

@@ -54,6 +54,7 @@ struct Sequence {
   std::vector<MarkerDistance> distances;
   int repaired = 0, complete = 0;
   std::vector<Warning> warnings;
+  std::optional<Failure> failure;  ///< nothing that was asked for was followed
   double seconds = 0;
 };
 

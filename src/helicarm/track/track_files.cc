@@ -89,8 +89,8 @@ Json refused_json(const Failure& refusal) {
 
 Json to_json(const Sequence& sequence, const TrackCase& given) {
   Json json = {{"format", "helicarm-track/1"},
-               {"status", "ok"},
-               {"failure", nullptr},
+               {"status", sequence.failure ? "refused" : "ok"},
+               {"failure", sequence.failure ? pipeline::to_json(*sequence.failure) : Json()},
                {"warnings", Json::array()},
                {"notes", Json::array()},
                {"frames", sequence.frames.size()},

@@ -68,6 +68,16 @@ void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) 
     if (markers_[m].place.isZero()) markers_[m].place = mean_of(placed);
   learn_appearance(images);
 
+  for (const MarkerPick& pick : given_->picks) {
+    const auto& pixels = images[pick.view].pixels;
+    if (pick.uv_raw.minCoeff() < -0.5 || pick.uv_raw.x() > pixels.width() - 0.5 ||
+        pick.uv_raw.y() > pixels.height() - 0.5)
+      throw BadInput(
+          Reason::bad_value,
+          fmt::format("picks: \"{}\" in {} is at {:.1f}, {:.1f}, outside the image of {} x {} pixels",
+                      given_->markers[pick.marker], given_->views[pick.view].images.name, pick.uv_raw.x(),
+                      pick.uv_raw.y(), pixels.width(), pixels.height()));
+  }
   first_.frame = frame;
   first_.of.assign(markers_.size(), std::vector<std::optional<MarkerImage>>(cameras_.size()));
   struct Snap {
