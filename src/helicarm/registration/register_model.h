@@ -92,7 +92,7 @@ struct Registration {
   double spacing_mm = 0;  ///< of the finest comparison
   int starts = 0, agree = 0;
   std::optional<RunnerUp> runner_up;
-  std::vector<Alternative> alternatives = {};  ///< at most two other poses, best first
+  std::vector<Alternative> alternatives = {};  ///< at most two other poses, of the finest levels first
   bool anywhere = false;                       ///< found by a search over every orientation and position
   /// Cost ratio of the mirrored model. None: a search without candidates, or a surface that is its own mirror
   /// image.
