@@ -26,7 +26,7 @@ using Gradients = cv::Mat2f;
 
 constexpr int orientations = 4608;   // about 15 degrees apart
 constexpr double farthest_mm = 150;  // from the views' middle, along each axis
-constexpr int patch = 8;             // side, pixels of the raster
+constexpr int patch_side = 8;        // side, pixels of the raster
 
 /// Number `i` of nearly uniform rotations (super-Fibonacci spirals, Alexa 2022).
 Eigen::Matrix3d orientation(int i) {
@@ -77,18 +77,18 @@ class ViewSearch {
     Gradients placed(size_.y(), size_.x(), cv::Vec2f(0, 0));
     const auto wrapped = [](int at, int size) { return (at % size + size) % size; };
     double total = 0;
-    for (int v0 = 1; v0 + 1 < side; v0 += patch)
-      for (int u0 = 1; u0 + 1 < side; u0 += patch) {
+    for (int v0 = 1; v0 + 1 < side; v0 += patch_side)
+      for (int u0 = 1; u0 + 1 < side; u0 += patch_side) {
         cv::Vec2d sum(0, 0);
         double squares = 0;
-        for (int v = v0; v < std::min(v0 + patch, side - 1); ++v)
-          for (int u = u0; u < std::min(u0 + patch, side - 1); ++u) {
+        for (int v = v0; v < std::min(v0 + patch_side, side - 1); ++v)
+          for (int u = u0; u < std::min(u0 + patch_side, side - 1); ++u) {
             const cv::Vec2f g(drr(v, u + 1) - drr(v, u - 1), drr(v + 1, u) - drr(v - 1, u));
             placed(wrapped(v - half_, size_.y()), wrapped(u - half_, size_.x())) = g;
             sum += cv::Vec2d(g);
             squares += g.dot(g);
           }
-        total += std::sqrt(std::max(0.0, squares - sum.dot(sum) / (patch * patch)));
+        total += std::sqrt(std::max(0.0, squares - sum.dot(sum) / (patch_side * patch_side)));
       }
     Gradients spectrum;
     cv::dft(placed, spectrum, cv::DFT_COMPLEX_OUTPUT);
@@ -127,10 +127,10 @@ class ViewSearch {
         squares(v, u) = gradients(v, u).dot(gradients(v, u));
         valid(v, u) = 1;
       }
-    const double noise = 0.01 * cv::mean(squares, valid > 0)[0] * patch * patch;
+    const double noise = 0.01 * cv::mean(squares, valid > 0)[0] * patch_side * patch_side;
     const auto summed = [](const cv::Mat& over) {
       cv::Mat sums;
-      cv::boxFilter(over, sums, -1, {patch, patch}, {-1, -1}, false, cv::BORDER_CONSTANT);
+      cv::boxFilter(over, sums, -1, {patch_side, patch_side}, {-1, -1}, false, cv::BORDER_CONSTANT);
       return sums;
     };
     const Gradients sums = summed(gradients);
