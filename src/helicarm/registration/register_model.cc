@@ -58,6 +58,8 @@ std::vector<SearchStage> stages_from_anywhere(const Scene& scene, const Vector3d
   std::vector<SearchStage> stages = stages_for(scene, at);
   while (stages.size() > 1 && stages.front().level.spacing_mm > level_anywhere(scene.model()).spacing_mm)
     stages.erase(stages.begin());
+  // Patches of a surface hardly tell its poses apart: contours do.
+  if (scene.model().surface && stages.size() > 1) stages[1].keep = 16;
   return stages;
 }
 
