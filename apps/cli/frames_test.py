@@ -35,7 +35,7 @@ def matter(origin, ray, shift):
 
 
 def image(axes, shift, spots=0):
-    """`spots`: added to single pixels, seven apart."""
+    """`spots`: added to single pixels, 14 apart."""
     middle = (SIZE - 1) / 2
     origin = [-DISTANCE * axis for axis in axes[2]]
     rows = []
@@ -45,7 +45,7 @@ def image(axes, shift, spots=0):
             ray = [axes[0][i] * (u - middle) / FOCUS + axes[1][i] * (v - middle) / FOCUS + axes[2][i] for i in range(3)]
             length = math.sqrt(sum(r * r for r in ray))
             noise = ((u * 7919 + v * 104729) % 1009 - 504) // 8
-            bright = spots if u % 7 == 3 and v % 7 == 3 else 0
+            bright = spots if u % 14 == 3 and v % 14 == 3 else 0
             row.append(int(40000 * math.exp(-0.03 * matter(origin, [r / length for r in ray], shift))) + noise + bright)
         rows.append(struct.pack(f">{SIZE}H", *row))
     return b"".join(b"\0" + row for row in rows)
@@ -161,7 +161,7 @@ class Frames(unittest.TestCase):
         views = []
         for name, axes in CAMERAS.items():
             for frame in range(3):
-                spots = 20000 if frame == 1 else 0
+                spots = 1500 if frame == 1 else 0
                 (self.root / f"spots{name}_{frame}.png").write_bytes(png(image(axes, shift_at(frame), spots)))
             views.append({"name": name, "image": f"spots{name}_{{frame}}.png", "camera": f"{name}.json"})
         self.assertIn("inverted", run("detect", self.root / "spotsA_1.png").stderr)

@@ -26,8 +26,8 @@ struct ModelSequence {
   std::optional<Failure> refusal() const { return case_registration::refusal_of(registered); }
 };
 
-/// Poses of every frame to smooth motion: refused frames are gaps, and the size of the registrations'
-/// covariances, which hold errors common to all frames, is that of the largest likelihood.
+/// Poses of every frame to smooth motion: refused frames are gaps, and the part of the registrations'
+/// covariances that is smoothed is what the frames scatter by.
 void estimate_motion(ModelSequence& sequence, const std::vector<Eigen::Vector3d>& centres_in_model);
 
 struct FollowOptions {

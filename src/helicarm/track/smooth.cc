@@ -194,6 +194,19 @@ std::vector<Smoothed> smoothed(const Filtered& filtered) {
   return result;
 }
 
+/// The share of the measured covariances that the scatter of the frames does not show: errors that
+/// neighbouring frames share, which are not smoothed away. A frame without a pose has those of the measured
+/// one before it.
+void add_shared(std::vector<FramePose>& frames, std::span<const std::optional<Measured>> measured,
+                double share) {
+  Matrix6 shared =
+      (*std::ranges::find_if(measured, [](const auto& each) { return each.has_value(); }))->covariance;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (measured[i]) shared = measured[i]->covariance;
+    frames[i].covariance += share * shared;
+  }
+}
+
 bool is_enough(std::span<const std::optional<Measured>> measured) {
   constexpr std::ptrdiff_t least = 3;
   return std::ranges::count_if(measured, [](const auto& each) { return each.has_value(); }) >= least;
@@ -222,6 +235,7 @@ std::optional<SmoothMotion> smooth_poses(std::span<const double> times,
     motion.frames.push_back(
         {{frame.state.rotation, frame.state.centre - frame.state.rotation * centre_in_body},
          factor * frame.covariance});
+  if (factor < 1) add_shared(motion.frames, given, 1 - factor);
   motion.prior.turn *= factor;
   motion.prior.shift *= factor;
   motion.noise_factor = std::sqrt(factor);

@@ -31,8 +31,9 @@ struct SmoothMotion {
   double noise_factor = 1;  ///< of the measured poses' standard deviations
 };
 
-/// Measured covariances as they are stated, or known up to one factor, which then has the largest likelihood
-/// with the prior; it is 1 for fewer than ten measured frames.
+/// Measured covariances as they are stated, or multiplied by one factor, which then has the largest
+/// likelihood with the prior (1 for fewer than ten measured frames). A factor below 1 leaves a rest: errors
+/// that neighbouring frames share, which stay in the result's covariance.
 enum class NoiseScale { stated, by_data };
 
 /// One estimate over all frames: rotation and the centre's place with white jerk, whose size has the largest

@@ -82,6 +82,19 @@ TEST(Smooth, CovariancesThatAreTooSmallAreScaledByTheData) {
   EXPECT_NEAR(double(inside) / all, 0.95, 0.04);
 }
 
+TEST(Smooth, ErrorsThatTheScatterDoesNotShowStayInTheBands) {
+  Data data = measured_at(100, -1, -1, 1);
+  const auto fair = smooth_poses(data.times, data.measured, centre);
+  for (auto& pose : data.measured) pose->covariance *= 9;
+  const auto motion = smooth_poses(data.times, data.measured, centre, NoiseScale::by_data);
+  ASSERT_TRUE(motion && fair);
+  EXPECT_NEAR(motion->noise_factor, 1.0 / 3, 0.05);
+  EXPECT_LT(registration::step_about(motion->frames[50].pose, fair->frames[50].pose, Eigen::Vector3d::Zero())
+                .norm(),
+            0.05);
+  EXPECT_GT(motion->frames[50].covariance(3, 3), 0.8 * data.measured[50]->covariance(3, 3));
+}
+
 TEST(Smooth, GapIsFilledWithAWidthThatGrows) {
   const Data data = measured_at(80, 40, 51, 9);
   const auto motion = smooth_poses(data.times, data.measured, centre);
