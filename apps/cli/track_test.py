@@ -170,6 +170,24 @@ class Track(unittest.TestCase):
         self.assertEqual(done.returncode, 2)
         self.assertIn("another sequence", done.stderr)
 
+    def test_swap_in_mid_sequence_is_repaired_and_named(self):
+        out = self.root / "swapped"
+        shutil.copytree(self.root / "out", out)
+        lines = (out / "sights.csv").read_text().splitlines()
+        at = {tuple(line.split(",")[:3]): i for i, line in enumerate(lines)}
+        for view in CAMERAS:
+            first, second = at["9", "J2", view], at["9", "J4", view]
+            tails = [lines[i].split(",", 3)[3] for i in (first, second)]
+            lines[first], lines[second] = f"9,J2,{view},{tails[1]}", f"9,J4,{view},{tails[0]}"
+        (out / "sights.csv").write_text("\n".join(lines) + "\n")
+        done = self.track(self.root / "case", "swapped", f"1-{FRAMES}", "--resume", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        answer = json.loads(done.stdout)
+        self.assertEqual(answer["swaps_repaired"], 1)
+        self.assertIn('frame 9: the images of "J2" and "J4" were exchanged',
+                      " ".join(warning["message"] for warning in answer["warnings"]))
+        self.check_places(out)
+
     def test_bright_markers_are_followed(self):
         make_case(self.root / "bright", bright=True)
         done = self.track(self.root / "bright", "bright-out")
