@@ -94,6 +94,8 @@ TEST(RunSweep, FromAMotionOfThePhantomOnTheImagesAreRefused) {
       EXPECT_EQ(frame.failure->reason, Reason::phantom_changed);
     }
   }
+  EXPECT_GT(sweep.acquisitions.size(), 0U);
+  EXPECT_LE(sweep.acquisitions.size(), 17U) << "refused images stay out of the C-arm's record";
 }
 
 TEST(RunSweep, FewImagesAreCalibratedAloneUnlessAPathIsAskedFor) {

@@ -158,5 +158,32 @@ TEST(Sequence, LooseMarkerIsNamed) {
   EXPECT_EQ(sequence.repaired, 0);
 }
 
+TEST(Sequence, SmoothMotionEndsWithItsPoses) {
+  const TrackCase given = two_bodies();
+  auto sights = drawn(given, none);
+  for (std::size_t f = 30; f < sights.size(); ++f)
+    for (std::size_t m = 4; m < 8; ++m) sights[f].of[m].assign(2, std::nullopt);
+  const Sequence sequence = estimate_sequence(given, sights);
+  const BodySequence& skull = sequence.bodies[1];
+  EXPECT_TRUE(skull.smoothed[29].pose);
+  for (std::size_t f = 30; f < sights.size(); ++f) {
+    EXPECT_FALSE(skull.smoothed[f].pose);
+    EXPECT_EQ(skull.smoothed[f].decision, PoseDecision::refuse);
+    EXPECT_FALSE(sequence.relative[0][f].pose);
+  }
+  EXPECT_FALSE(sequence.failure);
+}
+
+TEST(Sequence, WhereNoBodyHasAPoseNothingWasFollowed) {
+  const TrackCase given = two_bodies();
+  auto sights = drawn(given, none);
+  for (FrameSights& frame : sights)
+    for (std::size_t m = 0; m < given.markers.size(); ++m)
+      if (m % 4 >= 2) frame.of[m].assign(2, std::nullopt);
+  const Sequence sequence = estimate_sequence(given, sights);
+  ASSERT_TRUE(sequence.failure);
+  EXPECT_EQ(sequence.failure->reason, Reason::marker_lost);
+}
+
 }  // namespace
 }  // namespace helicarm::track
