@@ -158,6 +158,15 @@ TEST(Sequence, LooseMarkerIsNamed) {
   EXPECT_EQ(sequence.repaired, 0);
 }
 
+TEST(Sequence, NamesExchangedBetweenBodiesAreSuspected) {
+  TrackCase given = two_bodies();
+  std::swap(given.bodies[0].markers[2], given.bodies[1].markers[1]);
+  const Sequence sequence = estimate_sequence(given, drawn(given, none));
+  const Warning* warning = warning_of(sequence, Reason::marker_loose);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(warning->message.find("exchanged names"), std::string::npos);
+}
+
 TEST(Sequence, SmoothMotionEndsWithItsPoses) {
   const TrackCase given = two_bodies();
   auto sights = drawn(given, none);
