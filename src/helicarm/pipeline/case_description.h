@@ -84,7 +84,8 @@ void describe_view(Codec& codec, View& view, const std::filesystem::path& folder
   describe_elsewhere(
       codec, "frames", "string",
       "makes the view a run of images: calibrate it with `helicarm sweep`, or name one image by \"frame\"",
-      "of `helicarm sweep` and `phantom measure`: `\"all\"` or `\"A-B[:STEP]\"`, frames of the file or of numbered files "
+      "of `helicarm sweep` and `phantom measure`: `\"all\"` or `\"A-B[:STEP]\"`, frames of the file or of "
+      "numbered files "
       "(`{frame}` or `{frame:04d}` in `image`); each is a view `NAME/12`, up to 1000");
   codec.file("plate_image", view.plate_image, folder,
              "image of the plate alone, acquired in the same C-arm position; needs a `plate`");
