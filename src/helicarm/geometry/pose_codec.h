@@ -15,7 +15,7 @@ namespace helicarm::geometry {
 RigidTransform written_pose(JsonReader& reader, const char* key);
 /// The same of a matrix. Fails with bad_value.
 Expected<RigidTransform> pose_as_written(const Eigen::Matrix4d& matrix, const std::string& what);
-/// `exact_pose_from`, of any place in a room.
+/// `exact_pose_from`, with translations up to 1 km.
 RigidTransform recorded_pose(JsonReader& reader, const char* key);
 
 Json pose_schema();

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "helicarm/core/reason_code.h"
 #include "helicarm/operation/guidance_description.h"
 
 namespace helicarm::operation {
@@ -94,9 +95,8 @@ void read_decision(JsonReader& reader, std::optional<Failure>& why_not) {
   const auto message = reader.optional_text("message", 10000);
   why_not.reset();
   if (decision == on_target) return;
-  const auto reason = std::ranges::find(all_reasons(), decision, code);
-  if (reason == all_reasons().end())
-    reader.refuse(Reason::bad_value, "decision", fmt::format("\"{}\" is none", decision));
+  const auto reason = reason_of(decision);
+  if (!reason) reader.refuse(Reason::bad_value, "decision", fmt::format("\"{}\" is none", decision));
   why_not = Failure{*reason, message.value_or("")};
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "helicarm/core/reason_code.h"
 #include "helicarm/pipeline/result.h"
 #include "helicarm/track/model_sequence.h"
 
@@ -51,9 +51,8 @@ Json json_of(const Registration& model) {
 
 Failure failure_from(const Json& json) {
   const auto word = json.at("code").get<std::string>();
-  const auto all = all_reasons();
-  const auto reason = std::ranges::find(all, word, [](Reason each) { return code(each); });
-  if (reason == all.end()) throw BadInput(Reason::bad_value, word + " is no code");
+  const auto reason = reason_of(word);
+  if (!reason) throw BadInput(Reason::bad_value, word + " is no code");
   Failure failure{*reason, json.at("message").get<std::string>()};
   if (!json.at("view").is_null()) failure.view = json.at("view").get<std::string>();
   for (const auto& [name, value] : json.at("figures").items())

@@ -181,24 +181,22 @@ void warn_of_lost_markers(const SequenceData& work, Sequence& sequence) {
 }
 
 /// Markers in one bone keep their places to hundredths of a millimetre, also when it bends.
-void warn_of_bodies_that_are_none(const SequenceData& work, Sequence& sequence) {
+void warn_of_bodies_that_are_not_rigid(const SequenceData& work, Sequence& sequence) {
   constexpr double usual_mm = 0.25;
   for (std::size_t b = 0; b < sequence.bodies.size(); ++b) {
     const BodySequence& body = sequence.bodies[b];
     if (body.deviation_mm < usual_mm || body.markers.empty()) continue;
     if (std::ranges::any_of(body.markers, [](const PlacedMarker& one) { return one.moved_at.has_value(); }))
       continue;  // named already
-    const auto worst = std::ranges::max_element(body.markers, {}, &PlacedMarker::loose_mm);
     sequence.warnings.push_back(
         {Reason::marker_loose,
          fmt::format(
-             "the markers of the body \"{}\" move by {:.2f} mm against each other, \"{}\" most ({:.2f} mm): "
-             "it moves in its bone, or it is another body's, by exchanged names; the body's poses are "
-             "not better than this",
-             work.given.bodies[b].name, body.deviation_mm, work.given.markers[worst->marker],
-             worst->loose_mm),
+             "the markers of the body \"{}\" move by {:.2f} mm against each other: one moves in its bone, or "
+             "is another body's, by exchanged names (\"distances\" in track.json); the body's poses are not "
+             "better than this",
+             work.given.bodies[b].name, body.deviation_mm),
          {},
-         {{"deviation_mm", body.deviation_mm}, {"marker_mm", worst->loose_mm}}});
+         {{"deviation_mm", body.deviation_mm}}});
   }
 }
 
@@ -247,7 +245,7 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
       return marker.status == MarkerStatus::tracked;
     });
   warn_of_lost_markers(work, sequence);
-  warn_of_bodies_that_are_none(work, sequence);
+  warn_of_bodies_that_are_not_rigid(work, sequence);
   sequence.relative = relative_motions(sequence.bodies);
   sequence.failure = nothing_followed(work, sequence);
   return sequence;

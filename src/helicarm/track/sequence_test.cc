@@ -165,6 +165,18 @@ TEST(Sequence, NamesExchangedBetweenBodiesAreSuspected) {
   EXPECT_TRUE(warning_of(sequence, Reason::marker_loose));
 }
 
+TEST(Sequence, MarkersThatMoveAgainstEachOtherAllTheTimeAreNoBody) {
+  const TrackCase given = two_bodies();
+  const Shift wobble = [](std::size_t marker, int frame) {
+    return Eigen::Vector3d(marker == 5 ? 1.5 * std::sin(0.9 * frame) : 0, 0, 0);
+  };
+  const Sequence sequence = estimate_sequence(given, drawn(given, wobble));
+  const Warning* warning = warning_of(sequence, Reason::marker_loose);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(warning->message.find("\"skull\" move by"), std::string::npos) << warning->message;
+  EXPECT_FALSE(warning_of(estimate_sequence(given, drawn(given, none)), Reason::marker_loose));
+}
+
 TEST(Sequence, SmoothMotionEndsWithItsPoses) {
   const TrackCase given = two_bodies();
   auto sights = drawn(given, none);
