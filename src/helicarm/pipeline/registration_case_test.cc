@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/pipeline/model_description.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
+#include "helicarm/pipeline/model_description.h"
 
 namespace helicarm::pipeline {
 namespace {
