@@ -9,6 +9,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/core/random.h"
 #include "helicarm/detection/find_dots.h"
+#include "helicarm/fiducials/candidates.h"
 #include "helicarm/fiducials/label_fiducials.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/phantom/calibrator.h"
@@ -41,9 +42,18 @@ const xray::XrayImage& xray_image() {
   return read;
 }
 
+detection::ImageDots& dots() {
+  static detection::ImageDots detected = [] {
+    auto of_image = detection::unsearched(xray_image(), detection::DotOptions{}.min_radius_px);
+    detection::dots_of(of_image, xray_image(), detection::Polarity::dark);
+    return of_image;
+  }();
+  return detected;
+}
+
 const rectification::Rectification& rectification() {
   static const rectification::Rectification rectified =
-      value_or_throw(rectification::rectify(xray_image(), *simulated_case().plate, {}));
+      value_or_throw(rectification::rectify(xray_image(), dots(), *simulated_case().plate, {}));
   return rectified;
 }
 
@@ -60,16 +70,15 @@ BENCHMARK(search_blobs)->Unit(benchmark::kMillisecond);
 
 /// The final fit of the balls: from the detected centres, with the image's estimated blur.
 void fit_one_ball(benchmark::State& state) {
-  const fiducials::Candidates candidates = fiducials::detect_candidates(xray_image(), rectification(), 0);
   const auto found = value_or_throw(
-      fiducials::label_fiducials(xray_image(), rectification(), candidates, simulated_case().calibrator, {}));
+      fiducials::label_fiducials(xray_image(), dots(), rectification(), simulated_case().calibrator, {}));
   std::vector<detection::Dot> balls;
-  for (const detection::Dot& dot : candidates.dots)
+  for (const detection::Dot& dot : fiducials::ball_candidates(dots(), rectification()))
     for (const fiducials::Fiducial& ball : found.fiducials)
       if (ball.status == fiducials::FiducialStatus::used && (ball.uv_raw - dot.centre_px).norm() < 1)
         balls.push_back(dot);
   const detection::DotAppearance appearance =
-      detection::estimate_appearance(xray_image(), rectification().noise, balls);
+      detection::estimate_appearance(xray_image(), dots().noise, balls);
   for (auto _ : state)
     benchmark::DoNotOptimize(detection::refit_dots(xray_image(), {balls.front()}, appearance, {}));
 }
@@ -77,15 +86,14 @@ BENCHMARK(fit_one_ball)->Unit(benchmark::kMicrosecond);
 
 void rectify_view(benchmark::State& state) {
   for (auto _ : state)
-    benchmark::DoNotOptimize(rectification::rectify(xray_image(), *simulated_case().plate, {}));
+    benchmark::DoNotOptimize(rectification::rectify(xray_image(), dots(), *simulated_case().plate, {}));
 }
 BENCHMARK(rectify_view)->Unit(benchmark::kMillisecond);
 
 void label_candidates(benchmark::State& state) {
-  const fiducials::Candidates candidates = fiducials::detect_candidates(xray_image(), rectification(), 0);
   for (auto _ : state)
-    benchmark::DoNotOptimize(fiducials::label_fiducials(xray_image(), rectification(), candidates,
-                                                        simulated_case().calibrator, {}));
+    benchmark::DoNotOptimize(
+        fiducials::label_fiducials(xray_image(), dots(), rectification(), simulated_case().calibrator, {}));
 }
 BENCHMARK(label_candidates)->Unit(benchmark::kMillisecond);
 

@@ -154,28 +154,30 @@ ViewPoints view_points(const std::string& name, const Doubles& xyz_mm, const Dou
 
 using GivenMap = std::variant<std::monostate, rectification::Rectification, rectification::DistortionMap>;
 
-Expected<rectification::Rectification> rectification_of(const xray::XrayImage& image, const GivenMap& given) {
-  if (const auto* whole = std::get_if<rectification::Rectification>(&given)) return *whole;
+Expected<rectification::Rectification> rectification_of(pipeline::DetectedView& view, const GivenMap& given) {
+  if (const auto* whole = std::get_if<rectification::Rectification>(&given)) {
+    detection::dots_of(view.dots, *view.xray_image, whole->metal);
+    return *whole;
+  }
   const auto* map = std::get_if<rectification::DistortionMap>(&given);
-  return rectification::with_map(image, map ? *map : rectification::flat_panel_map(image), std::nullopt);
+  return rectification::with_map(*view.xray_image, view.dots,
+                                 map ? *map : rectification::flat_panel_map(*view.xray_image), std::nullopt);
 }
 
 /// The stages of a run for one image.
 pipeline::OrRefusal<std::vector<pipeline::LabelledView>> labelled_views(
     const std::shared_ptr<xray::XrayImage>& image, const GivenMap& map, const pipeline::Case& given,
     const pipeline::RunOptions& options) {
-  auto rectification = rectification_of(*image, map);
-  if (!rectification) {
-    rectification.error().view = image->name;
-    return tl::unexpected(pipeline::Refusal{rectification.error(), pipeline::Stage::rectify, {}});
-  }
-  pipeline::RectifiedView view;
-  view.name = image->name;
-  view.xray_image = image;
-  view.rectification = *std::move(rectification);
-  return pipeline::detect_in_views({view}, given, options).and_then([&](auto detected) {
-    return pipeline::label_views(std::move(detected), given, options);
-  });
+  return pipeline::detect_in_views({{{image->name}, image}}, given, options)
+      .and_then([&](auto detected) -> pipeline::OrRefusal<std::vector<pipeline::LabelledView>> {
+        auto rectification = rectification_of(detected.front(), map);
+        if (!rectification) {
+          rectification.error().view = image->name;
+          return tl::unexpected(pipeline::Refusal{rectification.error(), pipeline::Stage::rectify, {}});
+        }
+        return pipeline::label_views({{std::move(detected.front()), *std::move(rectification)}}, given,
+                                     options);
+      });
 }
 
 ViewPoints labelled(const std::shared_ptr<xray::XrayImage>& image, const phantom::Calibrator& calibrator,

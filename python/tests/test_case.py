@@ -10,7 +10,7 @@ import helicarm
 
 
 def test_run_announces_its_stages(result, stages):
-    assert stages == ["read", "rectify", "detect", "label", "calibrate", "locate"]
+    assert stages == ["read", "detect", "rectify", "label", "calibrate", "locate"]
 
 
 def test_targets_are_within_their_regions(case, result):

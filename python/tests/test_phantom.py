@@ -63,7 +63,7 @@ def test_progress_names_the_stages_and_ends_the_measurement(views):
 
     with pytest.raises(StopIteration):
         helicarm.measure_phantom(views, progress=progress)
-    assert stages == ["read", "rectify", "detect", "adjust"]
+    assert stages == ["read", "detect", "rectify", "adjust"]
 
 
 def test_ctrl_c_ends_the_measurement(views):

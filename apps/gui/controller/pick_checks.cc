@@ -11,11 +11,11 @@ namespace {
 /// Nothing if the view shows it; also where that is not known before a calibration.
 std::optional<Failure> looked_for(const ApplicationState& state, const pipeline::ViewResult& view,
                                   const pipeline::Pick& pick) {
-  if (!view.calibrated || !view.rectification || !view.xray_image) return std::nullopt;
+  if (!view.calibrated || !view.rectification || !view.xray_image || !view.dots) return std::nullopt;
   if (!view.rectification->map.shows(pick.uv_raw))
     return Failure{Reason::not_seen, "the pick lies outside the image", view.name, {}};
-  auto seen = pipeline::observe_pick(pick, *view.xray_image, *view.rectification, *view.calibrated,
-                                     phantom::middle_of(state.calibrator));
+  auto seen = pipeline::observe_pick(pick, *view.xray_image, view.rectification->map, view.dots->noise,
+                                     *view.calibrated, phantom::middle_of(state.calibrator));
   if (seen) return std::nullopt;
   seen.error().view = view.name;
   return seen.error();

@@ -151,7 +151,7 @@ std::vector<Dot> find_dots(const xray::XrayImage& xray_image, const DotOptions& 
     const auto dot =
         fit_dot(xray_image.pixels, blob, profiles[std::min(octave, profiles.size() - 1)], {}, fit);
     if (!dot || dot->sigma_px > options.max_sigma_px || dot->misfit > options.max_misfit) continue;
-    if (dot->radius_px < 0.8 * options.min_radius_px || dot->radius_px > 1.2 * options.max_radius_px)
+    if (dot->radius_px < fit_reach * options.min_radius_px || dot->radius_px > 1.2 * options.max_radius_px)
       continue;
     const double contrast = options.polarity == Polarity::dark ? dot->contrast : -dot->contrast;
     if (contrast < least_contrast) continue;

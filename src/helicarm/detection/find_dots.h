@@ -19,6 +19,9 @@ struct DotOptions {
   double min_contrast_share = 0.012;  ///< contrast over the image's range of grey values
 };
 
+/// Least radius of a fitted dot over the smallest that is searched for.
+inline constexpr double fit_reach = 0.8;
+
 /// Fit options for one image: its clipping limits.
 DotFitOptions fit_options_for(const xray::XrayImage& xray_image);
 

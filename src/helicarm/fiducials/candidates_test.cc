@@ -21,19 +21,18 @@ xray::XrayImage two_balls() {
   return xray_image;
 }
 
-std::size_t candidates(double least_radius_px) {
+std::size_t candidates(double from_px) {
   const xray::XrayImage xray_image = two_balls();
+  auto dots = detection::unsearched(xray_image, from_px);
   const auto rectification =
-      rectification::with_map(xray_image, rectification::flat_panel_map(xray_image), {});
+      rectification::with_map(xray_image, dots, rectification::flat_panel_map(xray_image), {});
   EXPECT_TRUE(rectification) << rectification.error().message;
-  return detect_candidates(xray_image, *rectification, least_radius_px).dots.size();
+  return ball_candidates(dots, *rectification).size();
 }
 
-TEST(Candidates, SmallBallsOfAFlatPanelAreSearchedForWhereTheCalibratorHasThem) {
-  EXPECT_EQ(candidates(2), 2u);
-}
+TEST(Candidates, SmallBallsOfAFlatPanelAreAmongThemWhereTheyWereSearchedFor) { EXPECT_EQ(candidates(2), 2u); }
 
-TEST(Candidates, SmallDotsAreNotSearchedForWhereNoBallIsSoSmall) { EXPECT_EQ(candidates(7), 1u); }
+TEST(Candidates, SmallDotsAreNotWhereNoneSoSmallWasSearchedFor) { EXPECT_EQ(candidates(4.5), 1u); }
 
 }  // namespace
 }  // namespace helicarm::fiducials

@@ -9,6 +9,7 @@
 
 #include "helicarm/core/statistics.h"
 #include "helicarm/detection/find_dots.h"
+#include "helicarm/fiducials/candidates.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/label.h"
 #include "helicarm/fiducials/paper_circles.h"
@@ -71,12 +72,11 @@ double predicted_radius(const geometry::View& view, const phantom::CalibratorBal
 /// Fits fiducials with the profile common to the labelled ones.
 class BallFitter {
  public:
-  BallFitter(const xray::XrayImage& xray_image, const rectification::Rectification& rectification,
-             const Candidates& candidates, const std::vector<detection::Dot>& labelled_dots)
+  BallFitter(const xray::XrayImage& xray_image, const detection::NoiseCorrelation& noise,
+             std::vector<detection::Dot> neighbours, const std::vector<detection::Dot>& labelled_dots)
       : image_(xray_image),
-        appearance_(detection::estimate_appearance(xray_image, rectification.noise, labelled_dots)),
-        neighbours_(candidates.dots) {
-    neighbours_.insert(neighbours_.end(), rectification.plate_dots.begin(), rectification.plate_dots.end());
+        appearance_(detection::estimate_appearance(xray_image, noise, labelled_dots)),
+        neighbours_(std::move(neighbours)) {
     std::vector<double> contrasts;
     for (const detection::Dot& dot : labelled_dots) contrasts.push_back(dot.contrast);
     typical_contrast_ = median(contrasts);
@@ -218,9 +218,9 @@ struct LabellingInput {
 };
 
 LabellingInput labelling_input(const xray::XrayImage& xray_image, const rectification::DistortionMap& map,
-                               const Candidates& candidates, const phantom::Calibrator& calibrator,
-                               const FiducialOptions& options) {
-  LabellingInput input{plausible_balls(candidates.dots, map, calibrator), {}, {}, {}};
+                               const std::vector<detection::Dot>& candidates,
+                               const phantom::Calibrator& calibrator, const FiducialOptions& options) {
+  LabellingInput input{plausible_balls(candidates, map, calibrator), {}, {}, {}};
   for (const detection::Dot& ball : input.balls) {
     const Vector2d uv = *map.rectified_from_raw(ball.centre_px);
     input.rectified.push_back({uv, std::max(0.05, ball.sigma_px), ball.radius_px, 0.02 * ball.radius_px + 0.1,
@@ -239,12 +239,12 @@ LabellingInput labelling_input(const xray::XrayImage& xray_image, const rectific
 
 }  // namespace
 
-std::vector<GuessedLabel> guess_labels(const xray::XrayImage& xray_image,
+std::vector<GuessedLabel> guess_labels(const xray::XrayImage& xray_image, const detection::ImageDots& dots,
                                        const rectification::Rectification& rectification,
-                                       const Candidates& candidates, const phantom::Calibrator& calibrator,
+                                       const phantom::Calibrator& calibrator,
                                        const FiducialOptions& options) {
-  auto [balls, rectified, prior, labelling_options] =
-      labelling_input(xray_image, rectification.map, candidates, calibrator, options);
+  auto [balls, rectified, prior, labelling_options] = labelling_input(
+      xray_image, rectification.map, ball_candidates(dots, rectification), calibrator, options);
   labelling_options.tolerance_mm = printed_tolerance_mm;
   const LabellingAttempt attempt = attempt_labels(calibrator, rectified, prior, labelling_options);
   std::vector<GuessedLabel> guessed;
@@ -275,13 +275,14 @@ bool is_plausible(const detection::Dot& fitted, const detection::Dot& predicted,
 }
 
 Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
+                                            const detection::ImageDots& dots,
                                             const rectification::Rectification& rectification,
-                                            const Candidates& candidates,
                                             const phantom::Calibrator& calibrator,
                                             const FiducialOptions& options) {
   const rectification::DistortionMap& map = rectification.map;
+  std::vector<detection::Dot> seen = ball_candidates(dots, rectification);
   const auto [balls, rectified, prior, given_options] =
-      labelling_input(xray_image, map, candidates, calibrator, options);
+      labelling_input(xray_image, map, seen, calibrator, options);
   LabellingOptions labelling_options = given_options;
   auto labelling = label_balls(calibrator, rectified, prior, labelling_options);
   if (may_be_displaced(labelling, calibrator)) {
@@ -305,7 +306,8 @@ Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
   std::vector<detection::Dot> labelled_dots;
   for (const int candidate : labelling->candidate_of_ball)
     if (candidate >= 0) labelled_dots.push_back(balls[static_cast<std::size_t>(candidate)]);
-  const BallFitter fitter(xray_image, rectification, candidates, labelled_dots);
+  seen.insert(seen.end(), rectification.plate_dots.begin(), rectification.plate_dots.end());
+  const BallFitter fitter(xray_image, dots.noise, std::move(seen), labelled_dots);
   const double tolerance_mm = std::hypot(calibrator.tolerance_mm, labelling_options.tolerance_mm);
   const bool by_circles = options.method == rectification::Method::paper;
   const std::vector<detection::Dot> circles =

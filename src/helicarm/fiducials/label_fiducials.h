@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "helicarm/core/json.h"
-#include "helicarm/detection/dot.h"
-#include "helicarm/fiducials/candidates.h"
+#include "helicarm/detection/image_dots.h"
 #include "helicarm/fiducials/fiducial.h"
 #include "helicarm/fiducials/hypothesis.h"
 #include "helicarm/geometry/view.h"
@@ -51,12 +50,12 @@ struct FiducialOptions {
   std::optional<ExpectedView> expected = {};
 };
 
-/// Stage 3 (2.3.4): labels the fiducials among the candidates, refits them, fits those without a candidate at
-/// their predicted positions, and gives each of the others the status that says why it is not used. Refuses
-/// as `label_balls`.
+/// 2.3.4: labels the fiducials among the image's dots that are not the plate's (`ball_candidates`), refits
+/// them, fits those without a candidate at their predicted positions, and gives each of the others the status
+/// that says why it is not used. Refuses as `label_balls`.
 Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
+                                            const detection::ImageDots& dots,
                                             const rectification::Rectification& rectification,
-                                            const Candidates& candidates,
                                             const phantom::Calibrator& calibrator,
                                             const FiducialOptions& options);
 
@@ -69,9 +68,8 @@ struct GuessedLabel {
 
 /// The labels that explain the image best although they are refused: to be shown, never to be used. Empty if
 /// no pose explains four candidates. Costs as much as `label_fiducials`.
-std::vector<GuessedLabel> guess_labels(const xray::XrayImage& xray_image,
+std::vector<GuessedLabel> guess_labels(const xray::XrayImage& xray_image, const detection::ImageDots& dots,
                                        const rectification::Rectification& rectification,
-                                       const Candidates& candidates, const phantom::Calibrator& calibrator,
-                                       const FiducialOptions& options);
+                                       const phantom::Calibrator& calibrator, const FiducialOptions& options);
 
 }  // namespace helicarm::fiducials

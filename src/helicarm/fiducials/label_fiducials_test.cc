@@ -30,12 +30,19 @@ const SimulatedCase& faulty_case() {
   return simulated_case;
 }
 
+detection::ImageDots dots_in(const xray::XrayImage& xray_image,
+                             detection::Polarity metal = detection::Polarity::dark) {
+  auto dots = detection::unsearched(xray_image, 2);
+  detection::dots_of(dots, xray_image, metal);
+  return dots;
+}
+
 Expected<LabelledFiducials> label(const xray::XrayImage& xray_image,
                                   const rectification::Rectification& rectification,
                                   const phantom::Calibrator& calibrator,
                                   const FiducialOptions& options = {}) {
-  return label_fiducials(xray_image, rectification, detect_candidates(xray_image, rectification, 0),
-                         calibrator, options);
+  return label_fiducials(xray_image, dots_in(xray_image, rectification.metal), rectification, calibrator,
+                         options);
 }
 
 LabelledFiducials found_in(const SimulatedCase& simulated_case, const SimulatedView& view,
@@ -131,14 +138,15 @@ TEST(LabelFiducials, MissingBallsAreNotFoundAndDecoysAreUnlabelled) {
 TEST(LabelFiducials, BallOutsideTheFieldIsOutside) {
   xray::XrayImage xray_image = exposure_of(sound_case().views[0]);
   const auto& lost = sound_case().views[0].balls[5];
-  rectification::Rectification rectification =
+  const rectification::Rectification rectification =
       rectification::rectify(xray_image, phantom::plate48(), {}).value();
+  auto dots = dots_in(xray_image);
   for (int v = 0; v < 512; ++v)
     for (int u = 0; u < 512; ++u)
       if ((Vector2d(u, v) - lost.raw).norm() < 10) xray_image.pixels(u, v) = xray_image.lowest;
-  std::erase_if(*rectification.other_dots,
+  std::erase_if(*dots.dark,
                 [&](const detection::Dot& dot) { return (dot.centre_px - lost.raw).norm() < 20; });
-  const auto found = label(xray_image, rectification, sound_case().calibrator);
+  const auto found = label_fiducials(xray_image, dots, rectification, sound_case().calibrator, {});
   ASSERT_TRUE(found) << found.error().message;
   for (const Fiducial& fiducial : found->fiducials)
     EXPECT_EQ(fiducial.status == FiducialStatus::outside, fiducial.label == lost.name) << fiducial.label;
@@ -148,11 +156,11 @@ TEST(LabelFiducials, BallWithoutACandidateIsFittedAtItsPrediction) {
   const xray::XrayImage xray_image = exposure_of(sound_case().views[0]);
   const auto& ball = sound_case().views[0].balls[6];
   ASSERT_EQ(ball.visibility, Visibility::clear);
-  rectification::Rectification rectification =
+  const rectification::Rectification rectification =
       rectification::rectify(xray_image, phantom::plate48(), {}).value();
-  std::erase_if(*rectification.other_dots,
-                [&](const detection::Dot& dot) { return (dot.centre_px - ball.raw).norm() < 4; });
-  const auto found = label(xray_image, rectification, sound_case().calibrator);
+  auto dots = dots_in(xray_image);
+  std::erase_if(*dots.dark, [&](const detection::Dot& dot) { return (dot.centre_px - ball.raw).norm() < 4; });
+  const auto found = label_fiducials(xray_image, dots, rectification, sound_case().calibrator, {});
   ASSERT_TRUE(found);
   EXPECT_EQ(found->fiducials[6].status, FiducialStatus::used);
   EXPECT_LT((found->fiducials[6].uv_raw - ball.raw).norm(), 0.1);
@@ -160,10 +168,11 @@ TEST(LabelFiducials, BallWithoutACandidateIsFittedAtItsPrediction) {
 
 TEST(LabelFiducials, NoCandidatesAreRefused) {
   const xray::XrayImage xray_image = exposure_of(sound_case().views[0]);
-  rectification::Rectification rectification =
+  const rectification::Rectification rectification =
       rectification::rectify(xray_image, phantom::plate48(), {}).value();
-  rectification.other_dots->clear();
-  const auto found = label(xray_image, rectification, sound_case().calibrator);
+  auto dots = dots_in(xray_image);
+  dots.dark->clear();
+  const auto found = label_fiducials(xray_image, dots, rectification, sound_case().calibrator, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::too_few_fiducials);
 }

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/fiducials/candidates.h"
 #include "helicarm/phantom_calibration/correspondence.h"
 #include "helicarm/phantom_calibration/from_scratch.h"
 #include "helicarm/pipeline/diagnosis/calibrator_checks.h"
@@ -17,21 +18,21 @@
 namespace helicarm::phantom_calibration {
 namespace {
 
-std::optional<bool> mirrored(const pipeline::DetectedView& detected, const pipeline::CaseView& view,
+std::optional<bool> mirrored(const pipeline::RectifiedView& detected, const pipeline::CaseView& view,
                              bool from_scratch) {
   if (view.mirrored) return view.mirrored;
   if (from_scratch && detected.xray_image->acquisition.flip_hint) return true;
   return std::nullopt;
 }
 
-std::vector<std::optional<geometry::View>> labelled_views(const std::vector<pipeline::DetectedView>& detected,
-                                                          const pipeline::Case& given) {
+std::vector<std::optional<geometry::View>> labelled_views(
+    const std::vector<pipeline::RectifiedView>& detected, const pipeline::Case& given) {
   std::vector<std::optional<geometry::View>> views;
   for (std::size_t v = 0; v < detected.size(); ++v) {
     fiducials::FiducialOptions options;
     options.mirrored = given.views[v].mirrored;
-    const auto labelled = fiducials::label_fiducials(*detected[v].xray_image, detected[v].rectification,
-                                                     detected[v].candidates, given.calibrator, options);
+    const auto labelled = fiducials::label_fiducials(*detected[v].xray_image, detected[v].dots,
+                                                     detected[v].rectification, given.calibrator, options);
     views.push_back(labelled ? std::optional(labelled->view) : std::nullopt);
   }
   return views;
@@ -40,11 +41,12 @@ std::vector<std::optional<geometry::View>> labelled_views(const std::vector<pipe
 /// A fiducial without a candidate at its place may have moved by more than the assignment's gate: its image
 /// is the nearest free candidate of its size, unless something else covers its place. The adjustment rejects
 /// it where it does not fit.
-void follow_moved(const pipeline::DetectedView& detected, const PreparedView& prepared, Reconstruction& r,
+void follow_moved(const pipeline::RectifiedView& detected, const PreparedView& prepared, Reconstruction& r,
                   std::size_t v) {
   constexpr double reach_mm = 8, alike = 0.15;
   const geometry::View& pose = *r.views[v];
   const rectification::DistortionMap& map = detected.rectification.map;
+  const auto candidates = fiducials::ball_candidates(detected.dots, detected.rectification);
   for (std::size_t ball = 0; ball < r.centres.size(); ++ball) {
     if (r.candidate_of[v][ball] >= 0) continue;
     const Eigen::Vector2d raw = map.raw_from_rectified(pose.project(r.centres[ball]));
@@ -65,7 +67,7 @@ void follow_moved(const pipeline::DetectedView& detected, const PreparedView& pr
     const auto covers = [&](const detection::Dot& dot) {
       return dot.centre_px != there && (dot.centre_px - raw).norm() < dot.radius_px;
     };
-    if (std::ranges::none_of(detected.candidates.dots, covers) &&
+    if (std::ranges::none_of(candidates, covers) &&
         std::ranges::none_of(detected.rectification.plate_dots, covers))
       r.candidate_of[v][ball] = which;
   }
@@ -73,7 +75,7 @@ void follow_moved(const pipeline::DetectedView& detected, const PreparedView& pr
 
 using Observations = std::vector<std::vector<std::optional<Observed>>>;
 
-Observations observe_all(const std::vector<pipeline::DetectedView>& detected,
+Observations observe_all(const std::vector<pipeline::RectifiedView>& detected,
                          const std::vector<PreparedView>& views, const Reconstruction& r, unsigned threads) {
   Observations observed(views.size());
   parallel_for(views.size(), threads, [&](std::size_t v) {
@@ -84,7 +86,7 @@ Observations observe_all(const std::vector<pipeline::DetectedView>& detected,
 }
 
 /// The problem of the fiducials that two views or more show; `balls` and `used` index the reconstruction.
-BundleProblem problem_of(const std::vector<pipeline::DetectedView>& detected,
+BundleProblem problem_of(const std::vector<pipeline::RectifiedView>& detected,
                          const std::vector<PreparedView>& views, const Reconstruction& r,
                          const Observations& observed, std::vector<std::size_t>& balls,
                          std::vector<std::size_t>& used) {
@@ -121,7 +123,7 @@ BundleProblem problem_of(const std::vector<pipeline::DetectedView>& detected,
 
 /// Poses and centres by the observed images, which then are observed again: the offset of a ball's blob from
 /// its centre depends on them, and balls that were missed are looked for.
-Expected<Observations> observe_twice(const std::vector<pipeline::DetectedView>& detected,
+Expected<Observations> observe_twice(const std::vector<pipeline::RectifiedView>& detected,
                                      const std::vector<PreparedView>& views, Reconstruction& r,
                                      unsigned threads) {
   Observations observed = observe_all(detected, views, r, threads);
@@ -184,7 +186,7 @@ void warn_of_missing(const Reconstruction& r, const std::vector<std::size_t>& ba
 
 }  // namespace
 
-Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>& detected,
+Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::RectifiedView>& detected,
                                        const pipeline::Case& given, KnownCentres known,
                                        std::size_t least_views, unsigned threads,
                                        std::vector<Warning>& warnings) {
@@ -241,7 +243,7 @@ Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>
 }
 
 Expected<void> check_handedness(const AdjustedViews& found, const pipeline::Case& given,
-                                const std::vector<pipeline::DetectedView>& detected) {
+                                const std::vector<pipeline::RectifiedView>& detected) {
   for (std::size_t v = 0; v < found.view_of_case.size(); ++v) {
     const std::size_t i = found.view_of_case[v];
     if (!pipeline::is_mirrored_without_statement(found.consistent.fit.views[v].intrinsics.fx < 0,

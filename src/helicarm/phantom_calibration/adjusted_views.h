@@ -32,7 +32,7 @@ enum class KnownCentres {
 /// Labels (by the calibrator file) or finds (`KnownCentres::none`) the fiducials, observes them in the pixels
 /// and adjusts them. Warns of views and balls that are not part of it; `too_few_views` where fewer than
 /// `least_views` are.
-Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>& detected,
+Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::RectifiedView>& detected,
                                        const pipeline::Case& given, KnownCentres known,
                                        std::size_t least_views, unsigned threads,
                                        std::vector<Warning>& warnings);
@@ -40,7 +40,7 @@ Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>
 /// `ambiguous_handedness` where every image is mirrored and neither the case nor a tag says so: the
 /// calibrator file may be a mirror image.
 Expected<void> check_handedness(const AdjustedViews& found, const pipeline::Case& given,
-                                const std::vector<pipeline::DetectedView>& detected);
+                                const std::vector<pipeline::RectifiedView>& detected);
 
 /// The note that an explained mirror image of every view calls for.
 std::vector<Warning> handedness_notes(const AdjustedViews& found);

@@ -112,7 +112,7 @@ std::vector<Sizes> possible_sizes(const std::vector<double>& seen, const std::ve
   return sizes;
 }
 
-Expected<void> settle_sizes(AdjustedViews& found, const std::vector<pipeline::DetectedView>& detected,
+Expected<void> settle_sizes(AdjustedViews& found, const std::vector<pipeline::RectifiedView>& detected,
                             const pipeline::Case& given, std::optional<double> factor_by_hand,
                             std::vector<Warning>& warnings) {
   const double factor = diameter_scale(found).factor;

@@ -21,7 +21,7 @@ std::vector<Sizes> possible_sizes(const std::vector<double>& seen, const std::ve
 /// assign them give different scales: `factor_by_hand` (that of hand-measured distances) decides, or the
 /// source distance, or the measurement is refused (`uncertain`). Warns of listed sizes without a ball
 /// (`not_seen`).
-Expected<void> settle_sizes(AdjustedViews& found, const std::vector<pipeline::DetectedView>& detected,
+Expected<void> settle_sizes(AdjustedViews& found, const std::vector<pipeline::RectifiedView>& detected,
                             const pipeline::Case& given, std::optional<double> factor_by_hand,
                             std::vector<Warning>& warnings);
 

@@ -31,7 +31,7 @@ std::vector<std::optional<double>> seen_diameters(const AdjustedViews& found) {
   return seen;
 }
 
-DepthLimits depth_limits(const AdjustedViews& found, const std::vector<pipeline::DetectedView>& detected) {
+DepthLimits depth_limits(const AdjustedViews& found, const std::vector<pipeline::RectifiedView>& detected) {
   DepthLimits limits;
   std::vector<double> factors, sigmas;
   const BundleFit& fit = found.consistent.fit;

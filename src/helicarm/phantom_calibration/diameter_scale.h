@@ -26,6 +26,6 @@ struct DepthLimits {
   /// True lengths over the fit's by Distance Source to Patient (0018,1111), and the relative error of that.
   std::optional<DiameterScale> by_tag = {};
 };
-DepthLimits depth_limits(const AdjustedViews& found, const std::vector<pipeline::DetectedView>& detected);
+DepthLimits depth_limits(const AdjustedViews& found, const std::vector<pipeline::RectifiedView>& detected);
 
 }  // namespace helicarm::phantom_calibration

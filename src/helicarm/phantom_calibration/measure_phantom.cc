@@ -224,7 +224,7 @@ void describe_source(const PhantomOptions& options, PhantomResult& result) {
 
 /// Everything after the adjustment; stops at the first refusal.
 Expected<void> conclude(AdjustedViews& found, const pipeline::Case& given,
-                        const std::vector<pipeline::DetectedView>& detected, const PhantomOptions& options,
+                        const std::vector<pipeline::RectifiedView>& detected, const PhantomOptions& options,
                         PhantomResult& result) {
   const BundleFit& fit = found.consistent.fit;
   result.rms_px = fit.rms_px;
@@ -300,7 +300,7 @@ Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const Phant
   pipeline::RunOptions stages;
   stages.threads = options.threads;
   for (Warning& warning : sizes_stated_twice(given)) result.warnings.push_back(std::move(warning));
-  const auto detected = pipeline::detected_views(given, stages, {options.on_stage, options.on_view});
+  const auto detected = pipeline::rectified_views(given, stages, {options.on_stage, options.on_view});
   if (!detected) return refuse(detected.error().failure);
   if (options.on_stage) options.on_stage("adjust");
   const auto begin = std::chrono::steady_clock::now();

@@ -213,7 +213,7 @@ TEST(MeasurePhantom, StagesAreAnnouncedAndAnExceptionBetweenViewsEndsIt) {
     if (++views > 7) throw std::runtime_error("stop");
   };
   EXPECT_THROW(measure_phantom(folder.given, options), std::runtime_error);
-  EXPECT_EQ(stages, (std::vector<std::string>{"read", "rectify"}));
+  EXPECT_EQ(stages, (std::vector<std::string>{"read", "detect"}));
 }
 
 TEST(MeasurePhantom, ListedSizeThatNoBallHasIsNotTakenForTheOthers) {

@@ -7,6 +7,7 @@
 
 #include "helicarm/core/statistics.h"
 #include "helicarm/detection/find_dots.h"
+#include "helicarm/fiducials/candidates.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/label_fiducials.h"
 #include "helicarm/pipeline/diagnosis/calibrator_checks.h"
@@ -60,7 +61,7 @@ bool is_overlapped(std::size_t ball, const geometry::View& pose, const std::vect
 
 }  // namespace
 
-PreparedView prepared(const pipeline::DetectedView& detected, const std::vector<double>& diameters_mm,
+PreparedView prepared(const pipeline::RectifiedView& detected, const std::vector<double>& diameters_mm,
                       std::optional<bool> mirrored) {
   const rectification::DistortionMap& map = detected.rectification.map;
   PreparedView result;
@@ -71,7 +72,7 @@ PreparedView prepared(const pipeline::DetectedView& detected, const std::vector<
   const Range radii = map.rectified_pixel_mm
                           ? fiducials::ball_radii_px(balls_of(diameters_mm), *map.rectified_pixel_mm)
                           : Range{2, 1e9};
-  for (const detection::Dot& dot : detected.candidates.dots)
+  for (const detection::Dot& dot : fiducials::ball_candidates(detected.dots, detected.rectification))
     if (radii.low <= dot.radius_px && dot.radius_px <= radii.high && dot.sigma_px < largest_sigma_px &&
         map.rectified_from_raw(dot.centre_px))
       result.dots.push_back(dot);
@@ -85,7 +86,7 @@ PreparedView prepared(const pipeline::DetectedView& detected, const std::vector<
   return result;
 }
 
-std::vector<std::optional<Observed>> observe(const pipeline::DetectedView& detected,
+std::vector<std::optional<Observed>> observe(const pipeline::RectifiedView& detected,
                                              const PreparedView& prepared, const geometry::View& pose,
                                              const std::vector<Eigen::Vector3d>& centres,
                                              const std::vector<double>& diameters_mm,
@@ -97,7 +98,7 @@ std::vector<std::optional<Observed>> observe(const pipeline::DetectedView& detec
   std::vector<double> kinds = diameters_mm;
   std::ranges::sort(kinds);
   kinds.erase(std::unique(kinds.begin(), kinds.end()), kinds.end());
-  std::vector<detection::Dot> neighbours = detected.candidates.dots;
+  std::vector<detection::Dot> neighbours = fiducials::ball_candidates(detected.dots, detected.rectification);
   neighbours.insert(neighbours.end(), detected.rectification.plate_dots.begin(),
                     detected.rectification.plate_dots.end());
   std::vector<detection::Dot> all;
@@ -110,8 +111,8 @@ std::vector<std::optional<Observed>> observe(const pipeline::DetectedView& detec
     for (std::size_t ball = 0; ball < centres.size(); ++ball)
       if (diameters_mm[ball] == kind && candidate_of[ball] >= 0)
         labelled.push_back(prepared.dots[std::size_t(candidate_of[ball])]);
-    const detection::DotAppearance appearance = detection::estimate_appearance(
-        xray_image, detected.rectification.noise, labelled.empty() ? all : labelled);
+    const detection::DotAppearance appearance =
+        detection::estimate_appearance(xray_image, detected.dots.noise, labelled.empty() ? all : labelled);
     for (std::size_t ball = 0; ball < centres.size(); ++ball) {
       if (diameters_mm[ball] != kind || is_overlapped(ball, pose, centres, diameters_mm)) continue;
       const Eigen::Vector2d predicted = pose.project(centres[ball]);

@@ -17,7 +17,7 @@ struct PreparedView {
   PhantomView view;
   std::vector<detection::Dot> dots;
 };
-PreparedView prepared(const pipeline::DetectedView& detected, const std::vector<double>& diameters_mm,
+PreparedView prepared(const pipeline::RectifiedView& detected, const std::vector<double>& diameters_mm,
                       std::optional<bool> mirrored);
 
 /// The image of a fiducial's centre, measured in the pixels.
@@ -31,7 +31,7 @@ struct Observed {
 
 /// Fits every fiducial's image with the appearance of this image's balls: at its candidate, or where the pose
 /// puts it. Nothing for one that is not seen or overlaps another.
-std::vector<std::optional<Observed>> observe(const pipeline::DetectedView& detected,
+std::vector<std::optional<Observed>> observe(const pipeline::RectifiedView& detected,
                                              const PreparedView& prepared, const geometry::View& pose,
                                              const std::vector<Eigen::Vector3d>& centres,
                                              const std::vector<double>& diameters_mm,

@@ -182,7 +182,8 @@ std::optional<double> factor_by_hand(const AdjustedViews& found, const PhantomOp
   return measured / fitted;
 }
 
-Expected<ScaledPoints> scaled(const AdjustedViews& found, const std::vector<pipeline::DetectedView>& detected,
+Expected<ScaledPoints> scaled(const AdjustedViews& found,
+                              const std::vector<pipeline::RectifiedView>& detected,
                               const Eigen::MatrixXd& covariance_mm2, const PhantomOptions& options,
                               PhantomResult& result) {
   const auto& centres = found.consistent.fit.centres;

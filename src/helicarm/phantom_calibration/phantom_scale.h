@@ -20,7 +20,8 @@ std::optional<double> factor_by_hand(const AdjustedViews& found, const PhantomOp
 /// other evidence: those diameters, the nominal file, the receiver's and the patient's distance from the
 /// source. A contradiction is refused (`scale_disagrees`), or warned of and added to the scale's error. What
 /// one distance leaves unchecked is a note. Sets `scale` and `pair` of the result.
-Expected<ScaledPoints> scaled(const AdjustedViews& found, const std::vector<pipeline::DetectedView>& detected,
+Expected<ScaledPoints> scaled(const AdjustedViews& found,
+                              const std::vector<pipeline::RectifiedView>& detected,
                               const Eigen::MatrixXd& covariance_mm2, const PhantomOptions& options,
                               PhantomResult& result);
 

@@ -9,7 +9,7 @@
 
 namespace helicarm::phantom_calibration {
 
-void add_images(const std::vector<pipeline::DetectedView>& detected,
+void add_images(const std::vector<pipeline::RectifiedView>& detected,
                 const std::vector<std::size_t>& view_of_case, unsigned threads, PhantomResult& result) {
   constexpr int largest_width = 800;
   parallel_for(result.views.size(), threads, [&](std::size_t v) {

@@ -9,6 +9,7 @@
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/core/statistics.h"
+#include "helicarm/fiducials/candidates.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
 #include "helicarm/phantom_calibration/diameter_scale.h"
@@ -178,15 +179,16 @@ void judge(PhantomVerification& result) {
 
 /// A ball in whose place one of another size is seen, in two views or more.
 bool is_swapped(const phantom::CalibratorBall& ball, const phantom::Calibrator& file,
-                const std::vector<pipeline::DetectedView>& detected, const std::vector<geometry::View>& views,
-                const std::vector<std::size_t>& view_of_case) {
+                const std::vector<pipeline::RectifiedView>& detected,
+                const std::vector<geometry::View>& views, const std::vector<std::size_t>& view_of_case) {
   constexpr double reach_px = 6, alike = 0.1;
   int seen = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const rectification::DistortionMap& map = detected[view_of_case[v]].rectification.map;
+    const pipeline::RectifiedView& image = detected[view_of_case[v]];
+    const rectification::DistortionMap& map = image.rectification.map;
     const Eigen::Vector2d uv = views[v].project(ball.centre_in_calibrator);
     const double px_per_mm = views[v].intrinsics.fy / views[v].depth(ball.centre_in_calibrator);
-    for (const detection::Dot& dot : detected[view_of_case[v]].candidates.dots) {
+    for (const detection::Dot& dot : fiducials::ball_candidates(image.dots, image.rectification)) {
       const auto at = map.rectified_from_raw(dot.centre_px);
       if (!at || (*at - uv).norm() > reach_px) continue;
       seen += std::ranges::any_of(file.balls, [&](const phantom::CalibratorBall& other) {
@@ -200,12 +202,12 @@ bool is_swapped(const phantom::CalibratorBall& ball, const phantom::Calibrator& 
 
 /// Whether it is missing: in two views or more its place is in the image and free of any other dot that could
 /// hide it or be it.
-bool is_missing(const phantom::CalibratorBall& ball, const std::vector<pipeline::DetectedView>& detected,
+bool is_missing(const phantom::CalibratorBall& ball, const std::vector<pipeline::RectifiedView>& detected,
                 const std::vector<geometry::View>& views, const std::vector<std::size_t>& view_of_case) {
   constexpr double reach = 2;  // radii
   int empty = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const pipeline::DetectedView& image = detected[view_of_case[v]];
+    const pipeline::RectifiedView& image = detected[view_of_case[v]];
     const Eigen::Vector2d raw =
         image.rectification.map.raw_from_rectified(views[v].project(ball.centre_in_calibrator));
     const double radius_px =
@@ -214,7 +216,7 @@ bool is_missing(const phantom::CalibratorBall& ball, const std::vector<pipeline:
       return (dot.centre_px - raw).norm() < reach * std::max(radius_px, dot.radius_px);
     };
     if (!image.rectification.map.shows(raw)) continue;
-    empty += std::ranges::none_of(image.candidates.dots, is_near) &&
+    empty += std::ranges::none_of(fiducials::ball_candidates(image.dots, image.rectification), is_near) &&
              std::ranges::none_of(image.rectification.plate_dots, is_near);
   }
   return empty >= 2;
@@ -222,7 +224,7 @@ bool is_missing(const phantom::CalibratorBall& ball, const std::vector<pipeline:
 
 /// A ball of which no two images agree.
 BallState unlocated(const phantom::CalibratorBall& ball, const phantom::Calibrator& file,
-                    const std::vector<pipeline::DetectedView>& detected,
+                    const std::vector<pipeline::RectifiedView>& detected,
                     const std::vector<geometry::View>& views, const std::vector<std::size_t>& view_of_case) {
   if (is_swapped(ball, file, detected, views, view_of_case)) return BallState::swapped;
   return is_missing(ball, detected, views, view_of_case) ? BallState::lost : BallState::not_verified;
@@ -241,7 +243,7 @@ Warning not_verified(const VerifiedBall& ball) {
 
 /// The file's scale, by the diameters of the balls' images and the distance from the source.
 void compare_scale(const AdjustedViews& found, const pipeline::Case& given,
-                   const std::vector<pipeline::DetectedView>& detected, PhantomVerification& result) {
+                   const std::vector<pipeline::RectifiedView>& detected, PhantomVerification& result) {
   constexpr double warned_sigmas = 3, refused_sigmas = 10;  // as a run's
   const auto evidence_of = [](const DiameterScale& scale) {
     return pipeline::ScaleEvidence{1 / scale.factor - 1, scale.sigma};
@@ -289,7 +291,7 @@ Warning scale_note(const phantom::Calibrator& file, const pipeline::ScaleEvidenc
 }
 
 void describe(const AdjustedViews& found, const pipeline::Case& given,
-              const std::vector<pipeline::DetectedView>& detected, unsigned threads,
+              const std::vector<pipeline::RectifiedView>& detected, unsigned threads,
               PhantomVerification& result) {
   const auto covariances = phantom::ball_covariances(given.calibrator);
   BundleProblem problem = with_file_centres(found, given.calibrator, covariances);
@@ -359,7 +361,7 @@ Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsign
                    {{"views", double(given.views.size())}, {"needed", double(least_views)}}});
   pipeline::RunOptions stages;
   stages.threads = threads;
-  const auto detected = pipeline::detected_views(given, stages);
+  const auto detected = pipeline::rectified_views(given, stages);
   if (!detected) return refuse(detected.error().failure);
   const auto found =
       adjusted_views(*detected, given, KnownCentres::file, least_views, threads, result.warnings);

@@ -150,8 +150,8 @@ OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& give
 void add_guesses(Refusal& refusal, const Case& given, const RunOptions& options) {
   for (std::size_t i = 0; i < refusal.views.size(); ++i) {
     ViewResult& view = refusal.views[i];
-    if (!view.found && view.candidates && view.rectification)
-      view.guessed = fiducials::guess_labels(*view.xray_image, *view.rectification, *view.candidates,
+    if (!view.found && view.rectification)
+      view.guessed = fiducials::guess_labels(*view.xray_image, *view.dots, *view.rectification,
                                              given.calibrator, {options.method, {}, given.views[i].mirrored});
   }
 }
@@ -173,8 +173,8 @@ OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& o
   };
   progress.begin("read");
   return timed(time.read, [&] { return read_views(given, options, progress); })
-      .and_then(stage("rectify", time.rectify, rectify_views))      // 2.1, Eq. 1-3
       .and_then(stage("detect", time.detect, detect_in_views))      // 2.1
+      .and_then(stage("rectify", time.rectify, rectify_views))      // 2.1, Eq. 1-3
       .and_then(stage("label", time.label, label_views))            // 2.3.4
       .and_then(stage("calibrate", time.calibrate, calibrate_all))  // 2.2, Eq. 4-7
       .map([&](CaseCalibration calibration) {

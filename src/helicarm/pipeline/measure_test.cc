@@ -143,7 +143,7 @@ TEST_F(SimulatedNavigation, StagesAreAnnouncedInOrderAndMayBeStopped) {
   Progress progress;
   progress.stage = [&](std::string_view stage) { stages.emplace_back(stage); };
   ASSERT_TRUE(result_of(given_, {}, progress).has_value());
-  EXPECT_EQ(stages, (std::vector<std::string>{"read", "rectify", "detect", "label", "calibrate", "locate"}));
+  EXPECT_EQ(stages, (std::vector<std::string>{"read", "detect", "rectify", "label", "calibrate", "locate"}));
   progress.stage = [&](std::string_view stage) {
     if (stage == "rectify") throw std::runtime_error("stopped");
   };
@@ -337,7 +337,9 @@ TEST_F(SimulatedNavigation, WrongPixelSizeIsRefusedWithTheOneThatFits) {
   const double right_mm = changed.acquisition.pixel_mm->mean();
   *changed.acquisition.pixel_mm *= 1.15;
   read->front().xray_image = std::make_shared<const xray::XrayImage>(std::move(changed));
-  const auto rectified = rectify_views(*read, given_, {});
+  const auto rectified = detect_in_views(*read, given_, {}).and_then([&](auto detected) {
+    return rectify_views(std::move(detected), given_, {});
+  });
   ASSERT_FALSE(rectified.has_value());
   EXPECT_EQ(rectified.error().failure.reason, Reason::plate_mismatch);
   const Failure failure = with_cause(rectified.error(), given_, {});

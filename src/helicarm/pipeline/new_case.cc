@@ -237,12 +237,16 @@ void name_views(std::vector<InspectedImage>& images) {
 
 PlateChoice choose_plate(const std::vector<InspectedImage>& images) {
   const phantom::Plate built_in = phantom::plate48();
-  const auto dots_of = [&](const InspectedImage& image, const phantom::Plate& plate) {
-    const auto found = rectification::rectify(image.xray_image, plate, {});
+  std::vector<detection::ImageDots> searched;
+  for (const InspectedImage& image : images)
+    searched.push_back(detection::unsearched(image.xray_image,
+                                             rectification::least_dot_radius_px(image.xray_image, built_in)));
+  const auto dots_of = [&](std::size_t i, const phantom::Plate& plate) {
+    const auto found = rectification::rectify(images[i].xray_image, searched[i], plate, {});
     return found ? found->dots_found : 0;
   };
   std::vector<int> dots;
-  for (const InspectedImage& image : images) dots.push_back(dots_of(image, built_in));
+  for (std::size_t i = 0; i < images.size(); ++i) dots.push_back(dots_of(i, built_in));
   if (std::ranges::min(dots) > 0)
     return {built_in.name, fmt::format("its dots are found in every image: {}", fmt::join(dots, ", "))};
   const auto round =
@@ -253,10 +257,10 @@ PlateChoice choose_plate(const std::vector<InspectedImage>& images) {
   for (const auto& [lattice, word] :
        {std::pair{Lattice::square, "square"}, {Lattice::hexagonal, "hexagonal"}}) {
     const phantom::Plate any{"any plate", phantom::DotKind::balls, lattice, {}, built_in.diameter_mm, {}, {}};
-    for (const InspectedImage& image : images)
-      if (const int found = dots_of(image, any); found >= least_dots_of_any_plate)
+    for (std::size_t i = 0; i < images.size(); ++i)
+      if (const int found = dots_of(i, any); found >= least_dots_of_any_plate)
         return {{},
-                fmt::format("{} shows a {} lattice of {} dots, which is not that of {}", image.view, word,
+                fmt::format("{} shows a {} lattice of {} dots, which is not that of {}", images[i].view, word,
                             found, built_in.name)};
   }
   return {{},

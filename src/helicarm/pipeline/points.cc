@@ -20,14 +20,14 @@ double radius_px(double diameter_mm, const geometry::View& camera, const Eigen::
 }
 
 Expected<fiducials::ImagePoint> ball_at(const Pick& pick, const xray::XrayImage& image,
-                                        const rectification::Rectification& rectification,
+                                        const rectification::DistortionMap& map,
+                                        const detection::NoiseCorrelation& noise,
                                         const calibration::CalibratedView& calibrated,
                                         const Eigen::Vector3d& centre) {
-  const rectification::DistortionMap& map = rectification.map;
   const geometry::View& camera = calibrated.view;
   if (!calibrated.by_paper)
     return fiducials::snap_to_ball(image, map, camera, camera.depth(centre), pick.uv_raw, pick.diameter_mm,
-                                   rectification.noise);
+                                   noise);
   return fiducials::point_of_click(map, pick.uv_raw, 0).and_then([&](const fiducials::ImagePoint& click) {
     return fiducials::circle_near(image, map, click.uv, radius_px(pick.diameter_mm, camera, centre));
   });
@@ -36,15 +36,16 @@ Expected<fiducials::ImagePoint> ball_at(const Pick& pick, const xray::XrayImage&
 }  // namespace
 
 Expected<fiducials::ImagePoint> observe_pick(const Pick& pick, const xray::XrayImage& image,
-                                             const rectification::Rectification& rectification,
+                                             const rectification::DistortionMap& map,
+                                             const detection::NoiseCorrelation& noise,
                                              const calibration::CalibratedView& calibrated,
                                              const Eigen::Vector3d& centre) {
   if (pick.snap == Snap::ball) {
-    auto seen = ball_at(pick, image, rectification, calibrated, centre);
+    auto seen = ball_at(pick, image, map, noise, calibrated, centre);
     if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
     return seen;
   }
-  return fiducials::point_of_click(rectification.map, pick.uv_raw, pick.sigma_px);
+  return fiducials::point_of_click(map, pick.uv_raw, pick.sigma_px);
 }
 
 namespace {
@@ -87,8 +88,7 @@ Expected<fiducials::ImagePoint> observe_target(const phantom::CalibratorTarget& 
     return fiducials::circle_near(*image.xray_image, map, camera.project(place),
                                   radius_px(target.diameter_mm, camera, place));
   return fiducials::find_target(*image.xray_image, map, camera, target,
-                                detections_of(image, camera, fiducials, calibrator),
-                                image.rectification.noise);
+                                detections_of(image, camera, fiducials, calibrator), image.dots.noise);
 }
 
 /// A pick or a target in one view.
@@ -190,10 +190,10 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
     const Task& task = tasks[i];
     const LabelledView& image = calibration.images[task.view];
     const calibration::CalibratedView& view = calibration.views[task.view];
-    const auto seen =
-        task.pick
-            ? observe_pick(*task.pick, *image.xray_image, image.rectification, view, centre)
-            : observe_target(*task.target, image, view, calibration.fiducials[task.view], given.calibrator);
+    const auto seen = task.pick ? observe_pick(*task.pick, *image.xray_image, image.rectification.map,
+                                               image.dots.noise, view, centre)
+                                : observe_target(*task.target, image, view, calibration.fiducials[task.view],
+                                                 given.calibrator);
     if (seen)
       points[task.point].seen[task.view] = *seen;
     else

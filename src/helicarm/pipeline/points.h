@@ -13,7 +13,8 @@ namespace helicarm::pipeline {
 /// The image of a pick in its calibrated view: of the ball that it snaps to, else of the click. `centre`: of
 /// the calibrator, at whose depth the ball is. Fails as `snap_to_ball` and `point_of_click`.
 Expected<fiducials::ImagePoint> observe_pick(const Pick& pick, const xray::XrayImage& image,
-                                             const rectification::Rectification& rectification,
+                                             const rectification::DistortionMap& map,
+                                             const detection::NoiseCorrelation& noise,
                                              const calibration::CalibratedView& calibrated,
                                              const Eigen::Vector3d& centre);
 

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/fiducials/candidates.h"
 #include "helicarm/fiducials/status_words.h"
 #include "helicarm/pipeline/diagnosis/advice.h"
 #include "helicarm/pipeline/view_parameters.h"
@@ -90,13 +91,22 @@ Json intrinsics_of(const ViewResult& view) {
           {"pixel_mm", optional_number(pixel_mm)}};
 }
 
+}  // namespace
+
+std::vector<detection::Dot> unlabelled_candidates(const ViewResult& view) {
+  if (view.found || !view.dots || !view.rectification) return {};
+  return fiducials::ball_candidates(*view.dots, *view.rectification);
+}
+
+namespace {
+
 /// Candidates and best labels, of a view whose labelling was refused.
 void add_guess(Json& json, const ViewResult& view) {
   json["candidates"] = nullptr;
   json["guessed"] = Json::array();
-  if (view.found || !view.candidates) return;
+  if (view.found || !view.rectification) return;
   json["candidates"] = Json::array();
-  for (const detection::Dot& dot : view.candidates->dots)
+  for (const detection::Dot& dot : unlabelled_candidates(view))
     json["candidates"].push_back({{"uv_raw", vector(dot.centre_px)}, {"radius_px", dot.radius_px}});
   for (const fiducials::GuessedLabel& guess : view.guessed)
     json["guessed"].push_back(

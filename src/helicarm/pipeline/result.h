@@ -52,12 +52,15 @@ struct RunOptions {
 struct ViewResult {
   std::string name;
   std::shared_ptr<const xray::XrayImage> xray_image;
+  std::optional<detection::ImageDots> dots;
   std::optional<rectification::Rectification> rectification;
   std::optional<fiducials::LabelledFiducials> found;  ///< with residuals and rejections after calibration
   std::optional<calibration::CalibratedView> calibrated;
-  std::optional<fiducials::Candidates> candidates = {};  ///< raw px
-  std::vector<fiducials::GuessedLabel> guessed = {};     ///< the best labelling where it was refused
+  std::vector<fiducials::GuessedLabel> guessed = {};  ///< the best labelling where it was refused
 };
+
+/// The dots that may be fiducials, of a view whose labelling was refused; else none.
+std::vector<detection::Dot> unlabelled_candidates(const ViewResult& view);
 
 /// One pick or check target: observations and position, or the reason why it was not located.
 struct PointResult {

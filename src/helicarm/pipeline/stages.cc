@@ -7,6 +7,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/parallel.h"
+#include "helicarm/detection/find_dots.h"
 #include "helicarm/pipeline/map_cache.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/intrinsics_prior.h"
@@ -56,24 +57,50 @@ Expected<rectification::DistortionMap> map_of(const xray::XrayImage& xray_image,
   return rectification::flat_panel_map(xray_image);
 }
 
-Expected<rectification::Rectification> rectify_view(const xray::XrayImage& xray_image, const CaseView& from,
+/// Whether the map comes from the plate in the image itself.
+bool shows_plate(const CaseView& view, const std::optional<phantom::Plate>& plate) {
+  return plate && !view.map && !view.plate_image;
+}
+
+Expected<rectification::Rectification> rectify_view(DetectedView& view, const CaseView& from,
                                                     const std::optional<phantom::Plate>& plate,
                                                     const RunOptions& options) {
-  if (plate && !from.map && !from.plate_image)
-    return rectification::rectify(xray_image, *plate, {options.method, {}});
-  return map_of(xray_image, from, plate, options).and_then([&](const rectification::DistortionMap& map) {
-    return rectification::with_map(xray_image, map, plate);
-  });
+  const xray::XrayImage& xray_image = *view.xray_image;
+  auto rectified =
+      shows_plate(from, plate)
+          ? rectification::rectify(xray_image, view.dots, *plate, {options.method, {}})
+          : map_of(xray_image, from, plate, options).and_then([&](const rectification::DistortionMap& map) {
+              return rectification::with_map(xray_image, view.dots, map, plate);
+            });
+  if (rectified) detection::dots_of(view.dots, xray_image, rectified->metal);
+  return rectified;
 }
 
 /// Of a fiducial's image, with a margin; 0 where the pixel size or the fiducials' sizes are unknown.
-double least_radius_px(const Case& given, const rectification::DistortionMap& map) {
+double least_fiducial_px(const xray::XrayImage& xray_image, const Case& given) {
   constexpr double margin = 0.9;
-  if (!map.rectified_pixel_mm) return 0;
+  const auto& pixel = xray_image.acquisition.pixel_mm;
+  if (!pixel) return 0;
+  const double pixel_mm = std::sqrt(pixel->x() * pixel->y());
   if (!given.calibrator.balls.empty())
-    return margin * fiducials::ball_radii_px(given.calibrator, *map.rectified_pixel_mm).low;
+    return margin * fiducials::ball_radii_px(given.calibrator, pixel_mm).low;
   if (given.diameters_mm.empty()) return 0;
-  return margin * std::ranges::min(given.diameters_mm) / 2 / *map.rectified_pixel_mm;
+  return margin * std::ranges::min(given.diameters_mm) / 2 / pixel_mm;
+}
+
+/// The dots that the rectification and the labelling choose from.
+detection::ImageDots detect_in_view(const xray::XrayImage& xray_image, const CaseView& from,
+                                    const Case& given) {
+  const bool plated = shows_plate(from, given.plate);
+  const double of_plate = plated ? rectification::least_dot_radius_px(xray_image, *given.plate)
+                                 : rectification::least_checked_radius_px(xray_image, given.plate);
+  const double of_fiducials =
+      std::max(detection::DotOptions{}.min_radius_px, least_fiducial_px(xray_image, given));
+  detection::ImageDots dots = detection::unsearched(xray_image, std::min(of_plate, of_fiducials));
+  detection::dots_of(dots, xray_image, detection::Polarity::dark);
+  if (plated && given.plate->kind == phantom::DotKind::holes)
+    detection::dots_of(dots, xray_image, detection::Polarity::bright);
+  return dots;
 }
 
 bool is_ambiguous(const Expected<fiducials::LabelledFiducials>& labels) {
@@ -81,16 +108,14 @@ bool is_ambiguous(const Expected<fiducials::LabelledFiducials>& labels) {
 }
 
 /// The plate's kind determines the polarity of metal: it is wrong if the opposite polarity gives labels.
-bool is_plate_of_other_kind(const DetectedView& view, const Case& given,
+bool is_plate_of_other_kind(RectifiedView view, const Case& given,
                             const fiducials::FiducialOptions& options) {
   if (view.rectification.dots_found == 0) return false;
-  rectification::Rectification inverted = view.rectification;
-  inverted.metal = detection::opposite(inverted.metal);
-  inverted.other_dots.reset();
-  const auto labels = fiducials::label_fiducials(
-      *view.xray_image, inverted,
-      fiducials::detect_candidates(*view.xray_image, inverted, least_radius_px(given, inverted.map)),
-      given.calibrator, options);
+  detection::Polarity& metal = view.rectification.metal;
+  metal = detection::opposite(metal);
+  detection::dots_of(view.dots, *view.xray_image, metal);
+  const auto labels =
+      fiducials::label_fiducials(*view.xray_image, view.dots, view.rectification, given.calibrator, options);
   return labels || is_ambiguous(labels);
 }
 
@@ -140,26 +165,26 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
       });
 }
 
-OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views, const Case& given,
+OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<ReadView> views, const Case& given,
+                                                     const RunOptions& options, const Progress& progress) {
+  auto dots = of_each(views.size(), options, progress, [&](std::size_t i) -> Expected<detection::ImageDots> {
+    return rectification::check_usable(*views[i].xray_image).map([&] {
+      return detect_in_view(*views[i].xray_image, given.views[i], given);
+    });
+  });
+  return joined<DetectedView>(Stage::rectify, std::move(views), std::move(dots));
+}
+
+OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<DetectedView> views, const Case& given,
                                                     const RunOptions& options, const Progress& progress) {
   auto rectified = of_each(views.size(), options, progress, [&](std::size_t i) {
-    return rectify_view(*views[i].xray_image, given.views[i], given.plate, options);
+    return rectify_view(views[i], given.views[i], given.plate, options);
   });
   return joined<RectifiedView>(Stage::rectify, std::move(views), std::move(rectified));
 }
 
-OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case& given,
-                                                     const RunOptions& options, const Progress& progress) {
-  auto candidates =
-      of_each(views.size(), options, progress, [&](std::size_t i) -> Expected<fiducials::Candidates> {
-        return fiducials::detect_candidates(*views[i].xray_image, views[i].rectification,
-                                            least_radius_px(given, views[i].rectification.map));
-      });
-  return joined<DetectedView>(Stage::label, std::move(views), std::move(candidates));
-}
-
-OrRefusal<std::vector<DetectedView>> detected_views(const Case& given, const RunOptions& options,
-                                                    const Progress& progress) {
+OrRefusal<std::vector<RectifiedView>> rectified_views(const Case& given, const RunOptions& options,
+                                                      const Progress& progress) {
   const auto stage = [&](std::string_view name, auto work) {
     return [&, name, work](auto views) {
       progress.begin(name);
@@ -168,8 +193,8 @@ OrRefusal<std::vector<DetectedView>> detected_views(const Case& given, const Run
   };
   progress.begin("read");
   return read_views(given, options, progress)
-      .and_then(stage("rectify", rectify_views))
-      .and_then(stage("detect", detect_in_views));
+      .and_then(stage("detect", detect_in_views))
+      .and_then(stage("rectify", rectify_views));
 }
 
 calibration::ViewFiducials fiducials_of(const LabelledView& view) {
@@ -181,12 +206,12 @@ calibration::ViewFiducials fiducials_of(const LabelledView& view) {
           view.fiducials.view, map.covariance_px2(used)};
 }
 
-OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views, const Case& given,
+OrRefusal<std::vector<LabelledView>> label_views(std::vector<RectifiedView> views, const Case& given,
                                                  const RunOptions& options, const Progress& progress) {
   const auto label = [&](std::size_t i, std::optional<double> radius_bias) {
     const fiducials::FiducialOptions how{options.method, radius_bias, given.views[i].mirrored};
-    auto labels = fiducials::label_fiducials(*views[i].xray_image, views[i].rectification,
-                                             views[i].candidates, given.calibrator, how);
+    auto labels = fiducials::label_fiducials(*views[i].xray_image, views[i].dots, views[i].rectification,
+                                             given.calibrator, how);
     if (!labels && !is_ambiguous(labels) && is_plate_of_other_kind(views[i], given, how))
       labels = fail(Reason::plate_mismatch,
                     "the calibrator is found with the opposite polarity of metal: exchange \"holes\" and "

@@ -22,13 +22,13 @@ struct NamedView {
 struct ReadView : NamedView {
   std::shared_ptr<const xray::XrayImage> xray_image;
 };
-struct RectifiedView : ReadView {
+struct DetectedView : ReadView {
+  detection::ImageDots dots;
+};
+struct RectifiedView : DetectedView {
   rectification::Rectification rectification;
 };
-struct DetectedView : RectifiedView {
-  fiducials::Candidates candidates;
-};
-struct LabelledView : DetectedView {
+struct LabelledView : RectifiedView {
   fiducials::LabelledFiducials fiducials;
 };
 
@@ -38,8 +38,8 @@ ViewResult reported(const View& view) {
   ViewResult result;
   result.name = view.name;
   if constexpr (std::derived_from<View, ReadView>) result.xray_image = view.xray_image;
+  if constexpr (std::derived_from<View, DetectedView>) result.dots = view.dots;
   if constexpr (std::derived_from<View, RectifiedView>) result.rectification = view.rectification;
-  if constexpr (std::derived_from<View, DetectedView>) result.candidates = view.candidates;
   if constexpr (std::derived_from<View, LabelledView>) result.found = view.fiducials;
   return result;
 }
@@ -62,25 +62,25 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
 /// As `read_views` refuses.
 Expected<void> check_images_belong_together(const std::vector<ReadView>& views);
 
-/// 2.1, Eq. 1-3: by the plate in the image, a separate plate image, a known map, or none (flat panel).
-OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views, const Case& given,
-                                                    const RunOptions& options, const Progress& progress = {});
-
-/// 2.1: candidates, once per image.
-OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case& given,
+/// 2.1: the dots of every image, of the plate and of metal.
+OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<ReadView> views, const Case& given,
                                                      const RunOptions& options,
                                                      const Progress& progress = {});
 
+/// 2.1, Eq. 1-3: by the plate among the dots, a separate plate image, a known map, or none (flat panel).
+OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<DetectedView> views, const Case& given,
+                                                    const RunOptions& options, const Progress& progress = {});
+
 /// These three stages, announced by `progress`.
-OrRefusal<std::vector<DetectedView>> detected_views(const Case& given, const RunOptions& options,
-                                                    const Progress& progress = {});
+OrRefusal<std::vector<RectifiedView>> rectified_views(const Case& given, const RunOptions& options,
+                                                      const Progress& progress = {});
 
 /// The calibration's input from a labelled view.
 calibration::ViewFiducials fiducials_of(const LabelledView& view);
 
 /// 2.3.4. Ambiguous labels of a view are tried again with the radius bias of the view with the largest
 /// margin.
-OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views, const Case& given,
+OrRefusal<std::vector<LabelledView>> label_views(std::vector<RectifiedView> views, const Case& given,
                                                  const RunOptions& options, const Progress& progress = {});
 
 }  // namespace helicarm::pipeline

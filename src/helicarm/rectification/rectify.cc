@@ -20,7 +20,6 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double pitch_tolerance = 0.04;  // measured relative to expected pitch
-constexpr double max_ball_radius = 0.04;  // relative to the image width: no larger ball is accepted
 
 /// Refits the lattice's dots with their own profile and their neighbours masked.
 detection::DotAppearance refit_lattice_dots(const xray::XrayImage& xray_image,
@@ -87,19 +86,14 @@ void fit_missing_dots(const xray::XrayImage& xray_image, const phantom::Plate& p
   }
 }
 
-/// Of the dots that are searched for to find the plate, px.
-double smallest_radius(const phantom::Plate& plate, double scale) {
-  return std::max(detection::DotOptions{}.min_radius_px, 0.75 * 0.5 * plate.diameter_mm * scale);
-}
-
-std::vector<detection::Dot> search(const xray::XrayImage& xray_image, const phantom::Plate& plate,
-                                   detection::Polarity polarity, Method method, std::optional<double> scale) {
+/// Dots that may be the plate's.
+std::vector<detection::Dot> possible_dots(const xray::XrayImage& xray_image, detection::ImageDots& dots,
+                                          const phantom::Plate& plate, detection::Polarity polarity,
+                                          Method method, std::optional<double> scale) {
+  if (method == Method::best)
+    return detection::from_radius(detection::dots_of(dots, xray_image, polarity),
+                                  least_dot_radius_px(xray_image, plate));
   const double radius = scale ? 0.5 * plate.diameter_mm * *scale : 0.0055 * xray_image.pixels.width();
-  if (method == Method::best) {
-    detection::DotOptions options = metal_search(xray_image, polarity);
-    if (scale) options.min_radius_px = smallest_radius(plate, *scale);
-    return detection::find_dots(xray_image, options);
-  }
   return find_dots_paper(xray_image.pixels, xray_image.lowest, xray_image.highest, 0.7 * radius,
                          1.35 * radius);
 }
@@ -112,10 +106,10 @@ struct Attempt {
 };
 
 /// Metal is dark and holes are bright, unless the whole image is inverted.
-Attempt find_lattice(const xray::XrayImage& xray_image, const phantom::Plate& plate, Method method,
-                     std::optional<double> scale) {
+Attempt find_lattice(const xray::XrayImage& xray_image, detection::ImageDots& dots,
+                     const phantom::Plate& plate, Method method, std::optional<double> scale) {
   const auto attempt = [&](detection::Polarity polarity) {
-    Attempt now{polarity, search(xray_image, plate, polarity, method, scale), {}};
+    Attempt now{polarity, possible_dots(xray_image, dots, plate, polarity, method, scale), {}};
     now.seen = seen_lattice(now.all, plate, scale);
     return now;
   };
@@ -128,11 +122,11 @@ Attempt find_lattice(const xray::XrayImage& xray_image, const phantom::Plate& pl
 }
 
 /// Why the plate's lattice was not found: there is none, or one of the other kind.
-Failure without_lattice(const xray::XrayImage& xray_image, phantom::Plate plate, Method method,
-                        std::optional<double> scale, std::size_t found) {
+Failure without_lattice(const xray::XrayImage& xray_image, detection::ImageDots& dots, phantom::Plate plate,
+                        Method method, std::optional<double> scale, std::size_t found) {
   const bool square = plate.lattice == phantom::Lattice::square;
   plate.lattice = square ? phantom::Lattice::hexagonal : phantom::Lattice::square;
-  const std::size_t of_other_kind = find_lattice(xray_image, plate, method, scale).size();
+  const std::size_t of_other_kind = find_lattice(xray_image, dots, plate, method, scale).size();
   if (of_other_kind >= least_plate_dots)
     return {Reason::plate_mismatch,
             fmt::format("{} dots form a {} lattice, that of \"{}\" is {}", of_other_kind,
@@ -148,20 +142,33 @@ Failure without_lattice(const xray::XrayImage& xray_image, phantom::Plate plate,
 
 }  // namespace
 
+double least_dot_radius_px(const xray::XrayImage& xray_image, const phantom::Plate& plate) {
+  constexpr double smaller = 0.75;  // than the file's
+  const double least = detection::DotOptions{}.min_radius_px;
+  const auto scale = expected_scale(xray_image, plate);
+  return scale ? std::max(least, smaller * 0.5 * plate.diameter_mm * *scale) : least;
+}
+
 Expected<Rectification> rectify(const xray::XrayImage& xray_image, const phantom::Plate& plate,
                                 const RectificationOptions& options) {
+  auto dots = detection::unsearched(xray_image, least_dot_radius_px(xray_image, plate));
+  return rectify(xray_image, dots, plate, options);
+}
+
+Expected<Rectification> rectify(const xray::XrayImage& xray_image, detection::ImageDots& image_dots,
+                                const phantom::Plate& plate, const RectificationOptions& options) {
   if (auto usable = check_usable(xray_image); !usable) return tl::unexpected<Failure>(usable.error());
   const auto scale = expected_scale(xray_image, plate);
   const int width = xray_image.pixels.width();
   const int height = xray_image.pixels.height();
-  Attempt attempt = find_lattice(xray_image, plate, options.method, scale);
+  Attempt attempt = find_lattice(xray_image, image_dots, plate, options.method, scale);
   if (attempt.size() < least_plate_dots)
-    return tl::unexpected<Failure>(without_lattice(xray_image, plate, options.method, scale, attempt.size()));
+    return tl::unexpected<Failure>(
+        without_lattice(xray_image, image_dots, plate, options.method, scale, attempt.size()));
 
-  const detection::NoiseCorrelation noise = detection::noise_correlation(xray_image);
   std::optional<detection::DotAppearance> appearance;
   if (options.method == Method::best)
-    appearance = refit_lattice_dots(xray_image, noise, attempt.all, attempt.seen);
+    appearance = refit_lattice_dots(xray_image, image_dots.noise, attempt.all, attempt.seen);
   const Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
   const auto matched = match_plate(attempt.seen.lattice, attempt.seen.dots, plate, middle);
   if (!matched) return tl::unexpected<Failure>(matched.error());
@@ -188,7 +195,6 @@ Expected<Rectification> rectify(const xray::XrayImage& xray_image, const phantom
 
   Rectification result;
   result.map = fit->map;
-  result.noise = noise;
   set_metric(result.map, xray_image, plate, fit->px_per_mm);
   for (std::size_t i = 0; i < dots.size(); ++i) {
     if (!fit->used[i]) continue;
@@ -204,10 +210,6 @@ Expected<Rectification> rectify(const xray::XrayImage& xray_image, const phantom
   if (!plate.dots_mm.empty()) result.dots_expected = static_cast<int>(plate.dots_mm.size());
   result.metal =
       plate.kind == phantom::DotKind::balls ? attempt.polarity : detection::opposite(attempt.polarity);
-  if (options.method == Method::best && plate.kind == phantom::DotKind::balls) {
-    result.other_dots = detection::dots_except(attempt.all, result.plate_dots);
-    if (scale) result.other_dots_from_px = smallest_radius(plate, *scale);
-  }
   return result;
 }
 
@@ -215,13 +217,6 @@ DistortionMap flat_panel_map(const xray::XrayImage& xray_image) {
   const auto& pixel = xray_image.acquisition.pixel_mm;
   return identity_map(xray_image.pixels.width(), xray_image.pixels.height(),
                       pixel ? std::optional(std::sqrt(pixel->x() * pixel->y())) : std::nullopt);
-}
-
-detection::DotOptions metal_search(const xray::XrayImage& xray_image, detection::Polarity metal) {
-  detection::DotOptions options;
-  options.polarity = metal;
-  options.max_radius_px = std::max(16.0, max_ball_radius * xray_image.pixels.width());
-  return options;
 }
 
 image::Image<float> resample(const xray::XrayImage& xray_image, const DistortionMap& map) {

@@ -191,11 +191,10 @@ TEST(Rectify, PlateOfTheOtherLatticeIsAMismatch) {
   EXPECT_EQ(square.error().reason, Reason::plate_mismatch);
 }
 
-TEST(Rectify, BallsOfThePhantomAreLeftAsCandidates) {
+TEST(Rectify, BallsOfThePhantomAreNotAmongThePlatesDots) {
   for (const auto& ball : simulated_case().views[0].balls) {
     if (ball.visibility != simulation::Visibility::clear) continue;
-    const auto& dots = *rectified_ap().other_dots;
-    EXPECT_TRUE(std::any_of(dots.begin(), dots.end(), [&](const detection::Dot& dot) {
+    EXPECT_TRUE(std::ranges::none_of(rectified_ap().plate_dots, [&](const detection::Dot& dot) {
       return (dot.centre_px - ball.raw).norm() < 1;
     })) << ball.name;
   }
@@ -255,12 +254,13 @@ TEST(Rectify, PlateOfHoles) {
   EXPECT_LT(result->raw_max_px, 0.1);
 }
 
-TEST(WithMap, OwnMapIsAcceptedAndTheBallsFound) {
+TEST(WithMap, OwnMapIsConfirmed) {
   const auto result =
       with_map(exposure_of(simulated_case().views[0]), rectified_ap().map, phantom::plate48());
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_EQ(to_json(result->map), to_json(rectified_ap().map));
-  EXPECT_GE(result->other_dots->size(), 10u);
+  EXPECT_TRUE(result->map_confirmed);
+  EXPECT_GE(result->confirming_dots.size(), 40u);
 }
 
 TEST(WithMap, MapOfAnotherAngleIsAMismatch) {
@@ -292,7 +292,7 @@ TEST(FlatPanel, CurvedPlateInTheImageIsAMismatch) {
 TEST(WithMap, UndescribedPlateIsDetected) {
   const auto result = with_map(exposure_of(simulated_case().views[0]), rectified_ap().map, {});
   ASSERT_TRUE(result) << result.error().message;
-  EXPECT_LT(result->other_dots->size(), 25u);
+  EXPECT_GE(result->confirming_dots.size(), 40u);
 }
 
 TEST(FlatPanel, MapIsTheIdentityWithTheDetectorsPixelSize) {

@@ -29,17 +29,6 @@ std::vector<phantom::Plate> plates_of(const std::optional<phantom::Plate>& plate
           {"", kind, Lattice::hexagonal, {}, any_diameter_mm, {}, {}}};
 }
 
-/// Options to search for dots of the plate's size, or of a plate's that is not described.
-detection::DotOptions dot_search(const xray::XrayImage& xray_image, detection::Polarity polarity,
-                                 const std::optional<phantom::Plate>& plate) {
-  detection::DotOptions search = metal_search(xray_image, polarity);
-  const phantom::Plate sought = plate.value_or(plates_of({}, DotKind::balls).front());
-  const auto scale = expected_scale(xray_image, sought);
-  search.min_radius_px = std::clamp(scale ? 0.4 * sought.diameter_mm * *scale : 2, search.min_radius_px,
-                                    largest_radius_searched_from_px);
-  return search;
-}
-
 /// A plate in the image.
 struct SeenPlate {
   SeenLattice seen;
@@ -97,8 +86,23 @@ double bend_limit_px(const SeenPlate& plate, const DistortionMap& map) {
 
 }  // namespace
 
+double least_checked_radius_px(const xray::XrayImage& xray_image,
+                               const std::optional<phantom::Plate>& plate) {
+  const double least = detection::DotOptions{}.min_radius_px;
+  const phantom::Plate sought = plate.value_or(plates_of({}, DotKind::balls).front());
+  const auto scale = expected_scale(xray_image, sought);
+  return std::clamp(scale ? 0.4 * sought.diameter_mm * *scale : least, least,
+                    largest_radius_searched_from_px);
+}
+
 Expected<Rectification> with_map(const xray::XrayImage& xray_image, const DistortionMap& map,
                                  const std::optional<phantom::Plate>& plate) {
+  auto dots = detection::unsearched(xray_image, least_checked_radius_px(xray_image, plate));
+  return with_map(xray_image, dots, map, plate);
+}
+
+Expected<Rectification> with_map(const xray::XrayImage& xray_image, detection::ImageDots& dots,
+                                 const DistortionMap& map, const std::optional<phantom::Plate>& plate) {
   if (map.width != xray_image.pixels.width() || map.height != xray_image.pixels.height())
     return fail(Reason::plate_mismatch,
                 fmt::format("the map is for {} x {} pixels, the image has {} x {}", map.width, map.height,
@@ -106,18 +110,17 @@ Expected<Rectification> with_map(const xray::XrayImage& xray_image, const Distor
   if (auto usable = check_usable(xray_image); !usable) return tl::unexpected<Failure>(usable.error());
   Rectification result;
   result.map = map;
-  result.noise = detection::noise_correlation(xray_image);
-  const detection::DotOptions search = dot_search(xray_image, result.metal, plate);
-  result.other_dots = detection::find_dots(xray_image, search);
-  result.other_dots_from_px = search.min_radius_px;
+  const auto possible_dots = [&](detection::Polarity polarity) {
+    return detection::from_radius(detection::dots_of(dots, xray_image, polarity),
+                                  least_checked_radius_px(xray_image, plate));
+  };
   // A plate in the image verifies the map: rectified, its dots must form a lattice.
   const std::size_t least = plate ? least_plate_dots : least_dots_of_any_plate;
-  const auto balls = plate_among(*result.other_dots, xray_image, plates_of(plate, DotKind::balls), least);
+  const auto balls =
+      plate_among(possible_dots(result.metal), xray_image, plates_of(plate, DotKind::balls), least);
   auto seen = balls;
   if (const auto holes = plates_of(plate, DotKind::holes); !seen && !holes.empty())
-    seen = plate_among(
-        detection::find_dots(xray_image, dot_search(xray_image, detection::opposite(result.metal), plate)),
-        xray_image, holes, least);
+    seen = plate_among(possible_dots(detection::opposite(result.metal)), xray_image, holes, least);
   if (!seen) return result;
   const auto bend = bend_px(*seen, map);
   const double limit = bend_limit_px(*seen, map);
@@ -131,9 +134,8 @@ Expected<Rectification> with_map(const xray::XrayImage& xray_image, const Distor
         {{"residual_rms_px", *bend}});
   result.map_confirmed = bend.has_value();
   if (!balls) return result;
-  std::vector<detection::Dot> members;
-  for (const IndexedDot& d : balls->seen.lattice.dots) members.push_back(balls->seen.dots[d.dot]);
-  result.other_dots = detection::dots_except(*result.other_dots, members);
+  for (const IndexedDot& d : balls->seen.lattice.dots)
+    result.confirming_dots.push_back(balls->seen.dots[d.dot]);
   return result;
 }
 

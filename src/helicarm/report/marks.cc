@@ -83,8 +83,8 @@ ViewMarks marks_of(const pipeline::Result& result, std::size_t index) {
   if (view.rectification && view.found)
     marks.false_blobs = rectified_dots(view.rectification->map, view.found->false_blobs);
   if (view.found) marks.balls = balls_of(view, result.failure.has_value());
-  if (view.rectification && view.candidates && !view.found) {
-    marks.candidates = rectified_dots(view.rectification->map, view.candidates->dots);
+  if (view.rectification && !view.found) {
+    marks.candidates = rectified_dots(view.rectification->map, pipeline::unlabelled_candidates(view));
     for (const fiducials::GuessedLabel& guess : view.guessed)
       marks.guessed.push_back(
           {fmt::format("{}? {:.1f} px", guess.label, guess.residual_px), guess.uv, false});

@@ -221,10 +221,10 @@ std::array<CentreSums, 2> try_case(std::uint64_t seed) {
     xray::XrayImage xray_image = xray_image_of(view.pixels, view.true_view.imaging);
     xray_image.acquisition.pixel_mm = Vector2d::Constant(view.true_view.pixel_mm());
     xray_image.acquisition.source_detector_mm = view.true_view.nominal_f_mm;
-    const rectification::Rectification plain =
-        value_or_throw(rectification::with_map(xray_image, rectification::flat_panel_map(xray_image), {}));
-    const auto found = fiducials::label_fiducials(
-        xray_image, plain, fiducials::detect_candidates(xray_image, plain, 0), simulated_case.calibrator, {});
+    auto dots = detection::unsearched(xray_image, detection::DotOptions{}.min_radius_px);
+    const rectification::Rectification plain = value_or_throw(
+        rectification::with_map(xray_image, dots, rectification::flat_panel_map(xray_image), {}));
+    const auto found = fiducials::label_fiducials(xray_image, dots, plain, simulated_case.calibrator, {});
     for (std::size_t k = 0; k < view.balls.size(); ++k) {
       const simulation::TruePoint& truth = view.balls[k];
       if (truth.visibility == simulation::Visibility::outside) continue;

@@ -43,11 +43,11 @@ void keep_used_rows(calibration::ViewFiducials& view, const std::vector<fiducial
   view.map_covariance_px2 = view.map_covariance_px2(kept, kept).eval();
 }
 
-pipeline::LabelledView labelled_near(pipeline::DetectedView view, const fiducials::ExpectedView& expected,
+pipeline::LabelledView labelled_near(pipeline::RectifiedView view, const fiducials::ExpectedView& expected,
                                      const pipeline::Case& one, const pipeline::RunOptions& options) {
   const fiducials::FiducialOptions how{options.method, {}, one.views.front().mirrored, expected};
   auto labels = value_or_throw(
-      fiducials::label_fiducials(*view.xray_image, view.rectification, view.candidates, one.calibrator, how));
+      fiducials::label_fiducials(*view.xray_image, view.dots, view.rectification, one.calibrator, how));
   return {std::move(view), std::move(labels)};
 }
 
@@ -58,14 +58,14 @@ void estimate_from(FrameEstimate& estimate, const Frame& frame, xray::XrayImage 
   pipeline::Case one = base;
   one.views = {frame.view};
   pipeline::ReadView read{{frame.view.name}, std::make_shared<const xray::XrayImage>(std::move(image))};
-  auto rectified = passed(pipeline::rectify_views({std::move(read)}, one, options));
+  auto detected = passed(pipeline::detect_in_views({std::move(read)}, one, options));
+  auto rectified = passed(pipeline::rectify_views(std::move(detected), one, options));
   const auto& map = rectified.front().rectification.map;
   if (map.rectified_plane == rectification::RectifiedPlane::detector || map.is_identity())
     estimate.pixel_mm = map.rectified_pixel_mm;
-  auto detected = passed(pipeline::detect_in_views(std::move(rectified), one, options));
   const pipeline::LabelledView labelled =
-      expected ? labelled_near(std::move(detected.front()), *expected, one, options)
-               : passed(pipeline::label_views(std::move(detected), one, options)).front();
+      expected ? labelled_near(std::move(rectified.front()), *expected, one, options)
+               : passed(pipeline::label_views(std::move(rectified), one, options)).front();
   estimate.fiducials = pipeline::fiducials_of(labelled);
   for (const Warning& warning : labelled.fiducials.warnings) estimate.warnings.push_back(warning);
   value_or_throw(calibrate_alone(estimate, base));

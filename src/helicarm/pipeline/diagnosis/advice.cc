@@ -86,8 +86,7 @@ Advice of_mismatch(const Result& result) {
 
 Advice of_few(const Result& result) {
   const ViewResult* view = view_of(result);
-  const bool many =
-      view && view->candidates && view->candidates->dots.size() > result.calibrator.balls.size();
+  const bool many = view && unlabelled_candidates(*view).size() > result.calibrator.balls.size();
   Advice advice{
       {"the calibrator is only partly in the field, or behind shutters or metal",
        "its balls are of another diameter than the file states",

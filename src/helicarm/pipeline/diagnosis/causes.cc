@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/detection/find_dots.h"
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/rectification/round_field.h"
 
@@ -19,8 +20,9 @@ struct Trial {
   const RunOptions& options;
   std::string name;
   const xray::XrayImage& image;
+  detection::ImageDots dots;  ///< of any size
 
-  ReadView with(std::optional<double> pixel_factor, std::optional<double> distance_factor) const {
+  DetectedView with(std::optional<double> pixel_factor, std::optional<double> distance_factor) const {
     xray::XrayImage changed = image;
     xray::Acquisition& tags = changed.acquisition;
     if (!pixel_factor)
@@ -28,9 +30,19 @@ struct Trial {
     else if (tags.pixel_mm)
       *tags.pixel_mm *= *pixel_factor;
     if (tags.source_detector_mm) *tags.source_detector_mm *= distance_factor.value_or(1);
-    return {{name}, std::make_shared<const xray::XrayImage>(std::move(changed))};
+    return {{{name}, std::make_shared<const xray::XrayImage>(std::move(changed))}, dots};
   }
 };
+
+/// For trials with other tags, which change how large the plate's dots and the fiducials are expected.
+detection::ImageDots dots_of_any_size(const xray::XrayImage& xray_image,
+                                      const std::optional<phantom::Plate>& plate) {
+  auto dots = detection::unsearched(xray_image, detection::DotOptions{}.min_radius_px);
+  detection::dots_of(dots, xray_image, detection::Polarity::dark);
+  if (plate && plate->kind == phantom::DotKind::holes)
+    detection::dots_of(dots, xray_image, detection::Polarity::bright);
+  return dots;
+}
 
 /// Mean pixel size on the detector that a rectification by the plate implies.
 std::optional<double> pixel_by_plate(const Trial& trial) {
@@ -79,12 +91,10 @@ std::optional<FittedFocal> fitted_focal(const Trial& trial, unsigned threads) {
   std::vector<std::optional<FittedFocal>> found(2 * each_way + 1);
   parallel_for(found.size(), threads, [&](std::size_t i) {
     const double factor = std::pow(ratio, double(i) - each_way);
-    const ReadView view = trial.given.plate ? trial.with(1, factor) : trial.with(1 / factor, 1);
-    const auto labelled =
-        rectify_views({view}, trial.given, trial.options)
-            .and_then(
-                [&](auto views) { return detect_in_views(std::move(views), trial.given, trial.options); })
-            .and_then([&](auto views) { return label_views(std::move(views), trial.given, trial.options); });
+    const DetectedView view = trial.given.plate ? trial.with(1, factor) : trial.with(1 / factor, 1);
+    const auto labelled = rectify_views({view}, trial.given, trial.options).and_then([&](auto views) {
+      return label_views(std::move(views), trial.given, trial.options);
+    });
     if (labelled) found[i] = focal_of(labelled->front(), factor);
   });
   std::optional<FittedFocal> best;
@@ -138,9 +148,9 @@ bool is_labelled(const Trial& trial, double factor) {
   xray::XrayImage resampled = trial.image;
   if (factor != 1) resampled.pixels = widened(trial.image.pixels, factor);
   resampled.acquisition.pixel_mm.reset();
-  return rectify_views({{{trial.name}, std::make_shared<const xray::XrayImage>(std::move(resampled))}},
-                       trial.given, trial.options)
-      .and_then([&](auto views) { return detect_in_views(std::move(views), trial.given, trial.options); })
+  return detect_in_views({{{trial.name}, std::make_shared<const xray::XrayImage>(std::move(resampled))}},
+                         trial.given, trial.options)
+      .and_then([&](auto views) { return rectify_views(std::move(views), trial.given, trial.options); })
       .and_then([&](auto views) { return label_views(std::move(views), trial.given, trial.options); })
       .has_value();
 }
@@ -182,19 +192,19 @@ Failure with_cause(const Refusal& refusal, const Case& given, const RunOptions& 
   one.views = {given.views[std::size_t(at - refusal.views.begin())]};
   RunOptions alone = options;
   alone.threads = 1;
-  const Trial trial{one, alone, at->name, *at->xray_image};
   const bool of_plate = failure.reason == Reason::plate_mismatch || failure.reason == Reason::plate_not_found;
+  const bool of_labels = failure.reason == Reason::calibrator_mismatch ||
+                         failure.reason == Reason::ambiguous_labels ||
+                         failure.reason == Reason::too_few_fiducials;
+  if (!of_plate && !of_labels) return failure;
+  const Trial trial{one, alone, at->name, *at->xray_image, dots_of_any_size(*at->xray_image, given.plate)};
   if (of_plate && tags.pixel_mm && given.plate) {
     const auto pixel = pixel_by_plate(trial);
     if (pixel && std::abs(*pixel / tags.pixel_mm->mean() - 1) > least_change)
       add_pixel(failure, tags.pixel_mm->mean(), *pixel);
   }
-  const bool of_labels = failure.reason == Reason::calibrator_mismatch ||
-                         failure.reason == Reason::ambiguous_labels ||
-                         failure.reason == Reason::too_few_fiducials;
-  if (of_plate || of_labels)
-    if (const auto factor = excess_width(trial))
-      return unequal_pixels(failure, at->xray_image->pixels, *factor);
+  if (const auto factor = excess_width(trial))
+    return unequal_pixels(failure, at->xray_image->pixels, *factor);
   if (!of_labels || !tags.pixel_mm || !tags.source_detector_mm) return failure;
   const auto focal = fitted_focal(trial, options.threads);
   if (!focal) return failure;
