@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Times each stage and the whole of `helicarm run` on a simulated pair of 1024 x 1024 images.
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include <benchmark/benchmark.h>
@@ -144,7 +145,8 @@ void locate_ten_picks(benchmark::State& state) {
   pipeline::RunOptions options;
   options.threads = 1;
   pipeline::Case given = simulated_case();
-  const auto calibration = pipeline::calibrate_case(given, options);
+  const auto calibration = std::make_shared<const pipeline::CaseCalibration>(
+      pipeline::calibrate_case(given, options).value());
   if (!calibration) return state.SkipWithError(calibration.error().failure.message.c_str());
   given.calibrator.targets.clear();
   given.picks.clear();
@@ -159,7 +161,7 @@ void locate_ten_picks(benchmark::State& state) {
       pick.uv_raw = calibration->images[view].rectification.map.raw_from_rectified(uv);
       given.picks.push_back(pick);
     }
-  for (auto _ : state) benchmark::DoNotOptimize(pipeline::locate_case(given, *calibration, options));
+  for (auto _ : state) benchmark::DoNotOptimize(pipeline::locate_case(given, calibration, options));
 }
 BENCHMARK(locate_ten_picks)->Unit(benchmark::kMillisecond);
 

@@ -52,7 +52,7 @@ def table(schema, path):
     for key in path:
         schema = schema["properties"][key]
         schema = schema.get("items", schema)
-    required = schema.get("required", schema.get("anyOf", [{}])[0].get("required", []))
+    required = schema.get("required", []) + schema.get("anyOf", [{}])[0].get("required", [])
     rows = [row(key, value, key in required) for key, value in schema["properties"].items()]
     return "\n".join(["", "| key | value | |", "| --- | --- | --- |", *rows, "", ""])
 

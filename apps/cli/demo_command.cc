@@ -78,7 +78,7 @@ CommandResult demo_command(const DemoArguments& arguments, Console& console) {
     pipeline::RunOptions run;
     run.threads = console.threads;
     const pipeline::Result result =
-        value_or_throw(pipeline::measure(value_or_throw(pipeline::read_case(folder)), run)).result;
+        value_or_throw(pipeline::measure(value_or_throw(pipeline::read_case(folder)), run));
     print_warnings(result.warnings, console);
     print_notes(result.notes, console);
     value_or_throw(write_result(result, out, false));

@@ -10,7 +10,7 @@
 #include "helicarm/case_registration/register_fields.h"
 #include "helicarm/case_registration/registration_tables.h"
 #include "helicarm/core/json.h"
-#include "helicarm/pipeline/registration_case.h"
+#include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/earlier_results.h"
 #include "helicarm/track/model_sequence.h"
@@ -61,7 +61,8 @@ void print(const RegisteredModel& model, std::ostream& out) {
 void follow(const RegisterArguments& arguments, const case_registration::RegisterOptions& options,
             const case_registration::Progress& steps, Console& console) {
   const auto range = value_or_throw(case_registration::frame_range_from(arguments.frames));
-  const auto given = value_or_throw(pipeline::read_registration_case(arguments.run.folder));
+  const auto given =
+      value_or_throw(pipeline::read_case(arguments.run.folder, pipeline::Purpose::registration));
   ProgressLine progress(console);
   const auto sequence = value_or_throw(track::follow_models(
       given, range, options, {.out = arguments.run.out, .resume = arguments.resume},
@@ -102,7 +103,8 @@ CommandResult register_command(const RegisterArguments& arguments, Console& cons
         console.progress << fmt::format("helicarm: {}{}{}\n", model, model.empty() ? "" : ": ", step);
       };
     if (!arguments.frames.empty()) return follow(arguments, options, progress, console);
-    const auto given = value_or_throw(pipeline::read_registration_case(arguments.run.folder));
+    const auto given =
+        value_or_throw(pipeline::read_case(arguments.run.folder, pipeline::Purpose::registration));
     const auto result = value_or_throw(case_registration::register_case(given, options, progress));
     value_or_throw(case_registration::write_registration(result, arguments.run.out));
     print_warnings(result.warnings, console);

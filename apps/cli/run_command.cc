@@ -7,8 +7,8 @@
 
 #include "findings.h"
 #include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/map_cache.h"
-#include "helicarm/pipeline/registration_case.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/earlier_results.h"
 #include "result_files.h"
@@ -22,14 +22,14 @@ using case_registration::Measurement;
 /// Adds each image once; nothing if the residuals are inconsistent with the noise model.
 Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pipeline::Result& result,
                                     Console& console) {
-  const auto growth = calibration::add_to_history(path, result.entries);
+  const auto growth = calibration::add_to_history(path, result.calibration->entries);
   if (!growth) return tl::unexpected<Failure>(growth.error());
   if (!console.quiet)
-    console.progress << (result.variance_scale > 1
+    console.progress << (result.calibration->variance_scale > 1
                              ? fmt::format(
                                    "helicarm: {}: not added to the C-arm history: residuals are {:.2g} times "
                                    "the noise model\n",
-                                   path.string(), std::sqrt(result.variance_scale))
+                                   path.string(), std::sqrt(result.calibration->variance_scale))
                              : fmt::format("helicarm: {}: {} earlier acquisitions, {} added\n", path.string(),
                                            growth->earlier, growth->added));
   return {};
@@ -39,7 +39,7 @@ Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pip
 Expected<Measurement> measurement_of(const std::filesystem::path& folder,
                                      const case_registration::RegisterOptions& options,
                                      const case_registration::Progress& progress) {
-  const auto given = pipeline::read_measured_case(folder);
+  const auto given = pipeline::read_case(folder);
   if (given) return case_registration::measure_case(*given, options, progress);
   if (exit_code(given.error().reason) == 2) return tl::unexpected<Failure>(given.error());
   Measurement refused;

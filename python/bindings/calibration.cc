@@ -126,10 +126,6 @@ HeldCalibration calibrated(const std::vector<ViewPoints>& views, const calibrati
   HeldCalibration held;
   static_cast<calibration::Calibration&>(held) = result;
   for (const ViewPoints& view : views) held.maps.push_back(view.map);
-  held.fiducials = std::move(result.fiducials);
-  held.chi2 = result.chi2;
-  held.dof = result.dof;
-  held.variance_scale = result.variance_scale;
   held.warnings = std::move(result.warnings);
   check_views(views, least_angle_deg, held);
   return held;
@@ -143,12 +139,17 @@ HeldCalibration loaded(const std::filesystem::path& path) {
 
 using Held = HeldCalibration;
 
+/// Files of earlier versions have no chi-square.
+template <class Number>
+std::optional<Number> if_known(const Held& calibration, Number value) {
+  return calibration.dof > 0 ? std::optional(value) : std::nullopt;
+}
+
 std::string words_of_held(const Held& calibration) {
   std::vector<std::string> names;
   for (const calibration::CalibratedView& view : calibration.views) names.push_back(view.name);
   std::string text = fmt::format("<Calibration of {}", fmt::join(names, ", "));
-  if (calibration.chi2 && calibration.dof)
-    text += fmt::format(": chi2 / dof {:.1f} / {}", *calibration.chi2, *calibration.dof);
+  if (calibration.dof > 0) text += fmt::format(": chi2 / dof {:.1f} / {}", calibration.chi2, calibration.dof);
   for (const Warning& warning : calibration.warnings)
     text += fmt::format(", warning {}", code(warning.reason));
   return text + ">";
@@ -197,11 +198,13 @@ void add_parameters(py::class_<Held>& held) {
           "List of {label, status, xyz_mm, uv_raw, uv, sigma_px, residual_px}, one for each ball of any "
           "view; "
           "empty in files of earlier versions.")
-      .def_readonly("chi2", &Held::chi2,
-                    "Of the fiducials' residuals in all views; None in files of earlier versions.")
-      .def_readonly("dof", &Held::dof, "Degrees of freedom of chi2, or None.")
-      .def_readonly(
-          "variance_scale", &Held::variance_scale,
+      .def_property_readonly(
+          "chi2", [](const Held& c) { return if_known(c, c.chi2); },
+          "Of the fiducials' residuals in all views; None in files of earlier versions.")
+      .def_property_readonly(
+          "dof", [](const Held& c) { return if_known(c, c.dof); }, "Degrees of freedom of chi2, or None.")
+      .def_property_readonly(
+          "variance_scale", [](const Held& c) { return if_known(c, c.variance_scale); },
           "chi2 / dof where the residuals exceed the sigmas by more than three standard deviations: "
           "all covariances are multiplied by it; else 1. None in files of earlier versions.")
       .def_property_readonly(

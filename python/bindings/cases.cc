@@ -40,18 +40,18 @@ case_registration::Measurement run(const std::filesystem::path& folder, const st
   if (history) value_or_raise(calibration::check_history_file(*history));
   const RunHooks hooks = run_hooks(progress);
   case_registration::Measurement measured = value_or_raise(without_gil([&] {
-    return pipeline::read_measured_case(folder).and_then([&](const pipeline::RegistrationCase& given) {
+    return pipeline::read_case(folder).and_then([&](const pipeline::Case& given) {
       return case_registration::measure_case(given, options, progress_of(hooks));
     });
   }));
   if (measured.result.failure) raise(*measured.result.failure, py::cast(measured));
-  if (history) value_or_raise(calibration::add_to_history(*history, measured.result.entries));
+  if (history) value_or_raise(calibration::add_to_history(*history, measured.result.calibration->entries));
   return measured;
 }
 
 HeldCalibration calibration_of(const pipeline::Result& result) {
   HeldCalibration held;
-  held.joint_covariance = result.joint_covariance;
+  if (result.calibration) static_cast<calibration::Calibration&>(held) = *result.calibration;
   held.warnings.assign(result.warnings.begin(), result.warnings.end());
   for (const pipeline::ViewResult& view : result.views) {
     if (!view.calibrated || !view.rectification || !view.found)
@@ -59,13 +59,8 @@ HeldCalibration calibration_of(const pipeline::Result& result) {
              "the views were not calibrated",
              {},
              {}});
-    held.views.push_back(*view.calibrated);
     held.maps.emplace_back(view.rectification->map);
-    held.fiducials.push_back(view.found->fiducials);
   }
-  held.chi2 = result.chi2;
-  held.dof = result.dof;
-  held.variance_scale = result.variance_scale;
   return held;
 }
 

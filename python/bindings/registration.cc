@@ -4,7 +4,7 @@
 
 #include "arrays.h"
 #include "helicarm/case_registration/register_case.h"
-#include "helicarm/pipeline/registration_case.h"
+#include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/registration/follow.h"
 #include "helicarm/report/earlier_results.h"
@@ -28,8 +28,8 @@ py::object register_models(const std::filesystem::path& folder,
                                          search_deg, threads, history, cache);
   const RunHooks hooks = run_hooks(progress);
   const auto result = value_or_raise(without_gil([&] {
-    return pipeline::read_registration_case(folder)
-        .and_then([&](const pipeline::RegistrationCase& given) {
+    return pipeline::read_case(folder, pipeline::Purpose::registration)
+        .and_then([&](const pipeline::Case& given) {
           return case_registration::register_case(given, options, progress_of(hooks));
         })
         .and_then([&](case_registration::CaseRegistration made) {
@@ -153,8 +153,8 @@ py::object register_sequence(const std::filesystem::path& folder, const Frames& 
   };
   if (out && !resume) report::forget_registration(*out);
   const auto sequence = value_or_raise(without_gil([&] {
-    return pipeline::read_registration_case(folder)
-        .and_then([&](const pipeline::RegistrationCase& given) {
+    return pipeline::read_case(folder, pipeline::Purpose::registration)
+        .and_then([&](const pipeline::Case& given) {
           return track::follow_models(given, range, options, {.out = out, .resume = resume}, on_frame,
                                       {{}, hooks.on_view});
         })

@@ -11,8 +11,8 @@ Expected<CaseRegistration> register_models(Equipment& equipment, const std::vect
                                            const std::optional<NudgedModel>& from,
                                            const std::function<void(const std::string& step)>& tell) {
   return guarded([&] {
-    pipeline::RegistrationCase given = value_or_throw(*equipment.with_models);
-    given.base.picks = picks;
+    pipeline::Case given = *equipment.given;
+    given.picks = picks;
     if (from) given.models.at(from->model).world_from_model = from->world_from_model;
     const case_registration::RegisterOptions& options = equipment.options;
     equipment.registered_by = options;

@@ -192,7 +192,6 @@ TEST_F(ControllerRegistration, CancelEndsIt) {
 TEST_F(ControllerRegistration, CancelDuringTheSearchEndsIt) {
   Equipment equipment;
   equipment.given = pipeline::read_case(folder_->path()).value();
-  equipment.with_models = pipeline::read_registration_case(folder_->path());
   ASSERT_TRUE(measure(equipment, {}));
   std::vector<std::string> told;
   const auto done = gui::register_models(equipment, {}, {}, [&](const std::string& step) {

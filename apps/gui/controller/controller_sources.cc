@@ -6,7 +6,7 @@
 #include "gui/controller/equipment.h"
 #include "gui/controller/unsaved_picks.h"
 #include "helicarm/operation/plan_fields.h"
-#include "helicarm/pipeline/registration_case.h"
+#include "helicarm/pipeline/case.h"
 #include "helicarm/rehearsal/rehearse.h"
 
 namespace helicarm::gui {
@@ -18,7 +18,7 @@ constexpr double bone_step_mm = 5;
 
 /// Names and bones of a case's tunnels; the two of an ACL reconstruction if it has the knee's calibrator and
 /// neither tunnels nor models.
-std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given, bool has_models) {
+std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given) {
   std::vector<operation::PlannedTunnel> tunnels;
   for (const pipeline::TunnelPlan& tunnel : given.tunnels) {
     const auto pick = std::ranges::find(given.picks, tunnel.start, &pipeline::Pick::name);
@@ -27,7 +27,7 @@ std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given, bo
   }
   const bool is_of_the_knee =
       given.bones == guidance::knee_bones() && given.calibrator.name == phantom::udcsc().name;
-  if (given.picks.empty() && tunnels.empty() && !has_models && is_of_the_knee)
+  if (given.picks.empty() && tunnels.empty() && given.models.empty() && is_of_the_knee)
     tunnels = {{"femur", "femur", "FS", "FE", operation::TunnelEnd::end}, {"tibia", "tibia", "TS", "TE"}};
   return tunnels;
 }
@@ -168,7 +168,6 @@ void Controller::open_case(const fs::path& folder, bool keeps_picks) {
   open(Source::files, folder, "reading " + folder.filename().string(),
        [=, this](Equipment& equipment) -> Change {
          pipeline::Case given = value_or_throw(pipeline::read_case(folder));
-         if (pipeline::has_models(folder)) equipment.with_models = pipeline::read_registration_case(folder);
          if (!keeps_picks) return with_case(std::move(given), equipment);
          const auto unsaved = unsaved_picks(folder, given);
          return [this, change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)),
@@ -223,28 +222,22 @@ Controller::Change Controller::with_case(pipeline::Case given, Equipment& equipm
   equipment.given = given;
   const std::vector<ViewFile> files = files_of(given);
   const Change found = measured(equipment, unsaved.value_or(given.picks));
-  const std::optional<Failure> unreadable = equipment.with_models && !*equipment.with_models
-                                                ? std::optional(equipment.with_models->error())
-                                                : std::nullopt;
   std::vector<std::string> models;
-  if (equipment.with_models && *equipment.with_models)
-    for (const pipeline::CaseModel& model : (*equipment.with_models)->models) models.push_back(model.name);
-  return
-      [this, given = std::move(given), unsaved = std::move(unsaved), files, found, unreadable,
-       models = std::move(models), has_models = equipment.with_models.has_value()](ApplicationState& state) {
-        for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
-        state.files = files;
-        state.calibrator = given.calibrator;
-        state.tunnels = tunnels_of(given, has_models);
-        state.picks = unsaved.value_or(given.picks);
-        state.has_unsaved_picks = unsaved.has_value();
-        if (unsaved) earlier_picks_.push_back(given.picks);
-        complete_landmarks(state);
-        found(state);
-        state.has_models = has_models;
-        state.models = models;
-        if (unreadable) state.refusals.insert_or_assign(Phase::registration, *unreadable);
-      };
+  for (const pipeline::CaseModel& model : given.models) models.push_back(model.name);
+  return [this, given = std::move(given), unsaved = std::move(unsaved), files, found,
+          models = std::move(models)](ApplicationState& state) {
+    for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
+    state.files = files;
+    state.calibrator = given.calibrator;
+    state.tunnels = tunnels_of(given);
+    state.picks = unsaved.value_or(given.picks);
+    state.has_unsaved_picks = unsaved.has_value();
+    if (unsaved) earlier_picks_.push_back(given.picks);
+    complete_landmarks(state);
+    found(state);
+    state.has_models = !models.empty();
+    state.models = models;
+  };
 }
 
 }  // namespace helicarm::gui

@@ -92,7 +92,7 @@ Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipel
     auto measured = pipeline::measure_again(equipment.measurement, picked, equipment.options.run);
     if (!measured) return tl::unexpected<Failure>(measured.error());
     equipment.measurement = *std::move(measured);
-    return equipment.measurement->result;
+    return *equipment.measurement;
   }
   equipment.operation->pick(picks);
   const auto done = equipment.operation->measure();

@@ -25,8 +25,7 @@ struct Equipment {
   std::unique_ptr<operation::Operation> operation;
   operation::TrackerPlan tracker;  ///< of the operation; any thread may read it
   std::optional<pipeline::Case> given;
-  std::optional<pipeline::Measurement> measurement;                 ///< of `given`
-  std::optional<Expected<pipeline::RegistrationCase>> with_models;  ///< `given`, if it names models
+  std::optional<pipeline::Result> measurement;  ///< of `given`
   case_registration::RegisterOptions options;
   std::optional<case_registration::RegisterOptions> registered_by;  ///< of the registered models
   std::optional<robot::RobotOrder> last_order;

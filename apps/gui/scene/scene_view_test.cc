@@ -61,7 +61,7 @@ class ShownScene : public testing::Test {
 
   static localization::TreVolume tre() {
     const pipeline::Result& result = *simulated().result;
-    calibration::Calibration calibration{{}, result.joint_covariance};
+    calibration::Calibration calibration{{}, pipeline::joint_covariance(result)};
     for (const pipeline::ViewResult& view : result.views) calibration.views.push_back(*view.calibrated);
     localization::TreVolume volume = localization::predict_tre(calibration, {0, 0, 40}, 100, 10, 0.5, 0);
     volume.rms_mm[std::size_t((10 * 21 + 3) * 21 + 4)] = std::nan("");

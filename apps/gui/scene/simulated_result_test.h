@@ -30,7 +30,7 @@ inline const Simulated& simulated() {
     Simulated fresh{*simulation::simulate_case(options), {}, nullptr};
     if (!simulation::write_case(folder, fresh.truth)) std::abort();
     fresh.given = *pipeline::read_case(folder);
-    fresh.result = std::make_shared<const pipeline::Result>(pipeline::measure(fresh.given, {})->result);
+    fresh.result = std::make_shared<const pipeline::Result>(*pipeline::measure(fresh.given, {}));
     std::filesystem::remove_all(folder);
     return fresh;
   }();

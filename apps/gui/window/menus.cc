@@ -207,7 +207,7 @@ void MainWindow::show_tre() {
   if (tre_of_ == shown_)
     return scene_->show_tre(tre_, cut_->axis, middle[int(cut_->axis)] + cut_->from_middle_mm);
   scene_->show_tre({}, SliceAxis::z, 0);
-  calibration::Calibration calibration{{}, shown_->joint_covariance};
+  calibration::Calibration calibration{{}, pipeline::joint_covariance(*shown_)};
   for (const pipeline::ViewResult& view : shown_->views)
     if (view.calibrated) calibration.views.push_back(*view.calibrated);
   QPointer<MainWindow> self(this);

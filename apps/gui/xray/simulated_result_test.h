@@ -24,7 +24,7 @@ inline std::shared_ptr<const pipeline::Result> simulated_result() {
         !written)
       throw std::runtime_error(written.error().message);
     return std::make_shared<const pipeline::Result>(
-        pipeline::measure(pipeline::read_case(path).value(), {}).value().result);
+        pipeline::measure(pipeline::read_case(path).value(), {}).value());
   }();
   return result;
 }

@@ -45,12 +45,7 @@ struct ImageResidual {
 };
 
 struct CalibrationResult : Calibration {
-  std::vector<std::vector<fiducials::Fiducial>>
-      fiducials;  ///< per view, with residuals; outliers are `rejected`
   std::vector<std::vector<ImageResidual>> image_residuals;  ///< per view, of the used fiducials
-  double chi2 = 0;
-  int dof = 0;
-  double variance_scale = 1;  ///< covariance inflation where chi2 is inconsistent with the fiducials' sigmas
   /// Of the fiducials' coordinates per axis, estimated where the residuals require more than the file's.
   double found_tolerance_mm = 0;
   double strain_sigma = 0;  ///< relative, of the calibrator's least observable strain; 0: not known

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "helicarm/fiducials/fiducial.h"
 #include "helicarm/geometry/dlt.h"
 #include "helicarm/geometry/view.h"
 
@@ -37,7 +38,12 @@ Eigen::Matrix3d source_covariance(const CalibratedView& view);
 struct Calibration {
   std::vector<CalibratedView> views;
   /// Of all views' parameters (CalibratedView::covariance), 11 n x 11 n. Empty: not computed.
-  Eigen::MatrixXd joint_covariance;
+  Eigen::MatrixXd joint_covariance = {};
+  std::vector<std::vector<fiducials::Fiducial>> fiducials =
+      {};                     ///< per view, with residuals; outliers are `rejected`
+  double chi2 = 0;            ///< of all views together
+  int dof = 0;                ///< 0: chi2 is not known
+  double variance_scale = 1;  ///< covariance inflation where chi2 contradicts the fiducials' sigmas
 };
 
 }  // namespace helicarm::calibration

@@ -104,9 +104,9 @@ void read_figures(JsonReader calibration, SavedCalibration& saved) {
       saved.views[i].covariance = saved.joint_covariance.block<view_parameters, view_parameters>(at, at);
     }
   }
-  saved.chi2 = calibration.optional_number("chi2", any_number);
-  saved.variance_scale = calibration.optional_number("variance_scale", any_number);
-  if (const auto dof = calibration.optional_number("dof", {0, 1e6})) saved.dof = int(*dof);
+  saved.chi2 = calibration.optional_number("chi2", any_number).value_or(0);
+  saved.variance_scale = calibration.optional_number("variance_scale", any_number).value_or(1);
+  saved.dof = int(calibration.optional_number("dof", {0, 1e6}).value_or(0));
 }
 
 }  // namespace
@@ -134,7 +134,7 @@ Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const s
 }
 
 Json to_json(const SavedCalibration& calibration) {
-  const auto if_known = [](const auto& value) { return value ? Json(*value) : Json(nullptr); };
+  const auto if_known = [&](auto value) { return calibration.dof > 0 ? Json(value) : Json(nullptr); };
   Json json = {{"format", calibration_format}, {"views", Json::array()}};
   for (std::size_t i = 0; i < calibration.views.size(); ++i) {
     const CalibratedView& view = calibration.views[i];

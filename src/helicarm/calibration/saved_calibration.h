@@ -13,14 +13,11 @@
 
 namespace helicarm::calibration {
 
-/// A calibration from a file.
+/// A calibration from a file, whose fiducials may be missing.
 struct SavedCalibration : Calibration {
   std::vector<std::optional<rectification::DistortionMap>>
       maps;                                    ///< per view; nothing if the image was not rectified
   std::vector<phantom::CalibratorBall> balls;  ///< empty in results of earlier versions
-  std::vector<std::vector<fiducials::Fiducial>> fiducials;  ///< per view; empty where the file has none
-  std::optional<double> chi2, variance_scale;
-  std::optional<int> dof;
 };
 
 /// From "views" (name, projection, camera_from_calibrator, rectification.map, fiducials) and "calibration"

@@ -31,20 +31,19 @@ bool is_landmark(const pipeline::CaseModel& model, const PlanPoint& point) {
   return false;
 }
 
-void check_points(const Plan& plan, const pipeline::RegistrationCase& given,
-                  const pipeline::CaseModel& model) {
+void check_points(const Plan& plan, const pipeline::Case& given, const pipeline::CaseModel& model) {
   for (const PlanPoint& point : plan.points)
-    if (std::ranges::find(given.base.picks, point.name, &pipeline::Pick::name) != given.base.picks.end() &&
+    if (std::ranges::find(given.picks, point.name, &pipeline::Pick::name) != given.picks.end() &&
         !is_landmark(model, point))
       refuse_name(point.name, fmt::format("a point of \"{}\"'s plan", model.name),
                   "another point, of the picks");
 }
 
 /// Gives the lines that the case's tunnels name their names and sizes.
-void name_lines(const pipeline::RegistrationCase& given, const pipeline::CaseModel& model, Plan& plan) {
+void name_lines(const pipeline::Case& given, const pipeline::CaseModel& model, Plan& plan) {
   const std::vector<PlanTunnel> lines = plan.tunnels;
   std::vector<std::string> taken;
-  for (const pipeline::ModelTunnelPlan& tunnel : given.tunnels) {
+  for (const pipeline::ModelTunnelPlan& tunnel : given.model_tunnels) {
     if (tunnel.model != model.name) continue;
     const auto refuse = [&](const std::string& problem) {
       throw BadInput(Reason::bad_value,
@@ -69,9 +68,9 @@ void name_lines(const pipeline::RegistrationCase& given, const pipeline::CaseMod
 
 }  // namespace
 
-std::vector<std::optional<Plan>> read_plans(const pipeline::RegistrationCase& given) {
+std::vector<std::optional<Plan>> read_plans(const pipeline::Case& given) {
   std::map<std::string, std::string> owners;
-  for (const pipeline::TunnelPlan& tunnel : given.base.tunnels)
+  for (const pipeline::TunnelPlan& tunnel : given.tunnels)
     owners.emplace(tunnel.name, "a tunnel of the case's picks");
   std::vector<std::optional<Plan>> plans;
   for (const pipeline::CaseModel& model : given.models) {

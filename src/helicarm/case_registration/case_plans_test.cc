@@ -32,14 +32,14 @@ class CasePlans : public testing::Test {
   void add_pick(const char* name) {
     pipeline::Pick pick;
     pick.name = name;
-    given_.base.picks.push_back(pick);
+    given_.picks.push_back(pick);
   }
   Expected<std::vector<std::optional<Plan>>> plans() {
     return guarded([&] { return read_plans(given_); });
   }
 
   const TemporaryFolder folder_;
-  pipeline::RegistrationCase given_;
+  pipeline::Case given_;
 };
 
 TEST_F(CasePlans, PointsOfTwoPlansMayShareANameTunnelsMayNot) {
@@ -57,7 +57,7 @@ TEST_F(CasePlans, ATunnelOfThePicksIsAnother) {
   add_model("femur", "one", "F-1");
   pipeline::TunnelPlan tunnel;
   tunnel.name = "one";
-  given_.base.tunnels.push_back(tunnel);
+  given_.tunnels.push_back(tunnel);
   EXPECT_EQ(plans().error().reason, Reason::name_clash);
 }
 
@@ -87,7 +87,7 @@ TEST_F(CasePlans, APickedLandmarkMayBePlanned) {
 
 TEST_F(CasePlans, ATunnelOfTheCaseNamesALineAndGivesItsDiameter) {
   add_model("femur", "one", "F-1");
-  given_.tunnels.push_back({"ACL", "femur", "one", 8.0, 3});
+  given_.model_tunnels.push_back({"ACL", "femur", "one", 8.0, 3});
   const auto read = plans();
   ASSERT_TRUE(read) << read.error().message;
   const PlanTunnel& tunnel = (*read)[0]->tunnels.at(0);
@@ -98,10 +98,10 @@ TEST_F(CasePlans, ATunnelOfTheCaseNamesALineAndGivesItsDiameter) {
 
 TEST_F(CasePlans, ATunnelOfNoLineOrOfALineOfAnotherIsRefused) {
   add_model("femur", "one", "F-1");
-  given_.tunnels.push_back({"ACL", "femur", "two", 8.0});
+  given_.model_tunnels.push_back({"ACL", "femur", "two", 8.0});
   EXPECT_EQ(plans().error().reason, Reason::bad_value);
   EXPECT_THAT(plans().error().message, HasSubstr("is not a line of femur.mrk.json, which has: one"));
-  given_.tunnels = {{"ACL", "femur", "one", 8.0}, {"PCL", "femur", "one", 7.0}};
+  given_.model_tunnels = {{"ACL", "femur", "one", 8.0}, {"PCL", "femur", "one", 7.0}};
   EXPECT_THAT(plans().error().message, HasSubstr("is a line of two tunnels"));
 }
 

@@ -29,7 +29,7 @@ namespace {
 
 using registration::Registration;
 
-std::vector<std::unique_ptr<FollowedModel>> followed_models(const pipeline::RegistrationCase& given,
+std::vector<std::unique_ptr<FollowedModel>> followed_models(const pipeline::Case& given,
                                                             const RegisterOptions& options,
                                                             const Progress& progress,
                                                             const LoadedViews& loaded,
@@ -127,13 +127,13 @@ std::optional<Failure> refusal_of(const std::vector<RegisteredFrame>& frames) {
 CaseFollower::CaseFollower(CaseFollower&&) noexcept = default;
 CaseFollower::~CaseFollower() = default;
 
-Expected<CaseFollower> CaseFollower::begin(const pipeline::RegistrationCase& first,
-                                           const RegisterOptions& options, const Progress& progress) {
+Expected<CaseFollower> CaseFollower::begin(const pipeline::Case& first, const RegisterOptions& options,
+                                           const Progress& progress) {
   return guarded([&] {
     CaseFollower made;
     made.max_error_mm_ = options.run.max_error_mm;
     made.loaded_ = value_or_throw(load_views(first, options.run, progress.of_views()));
-    made.warnings_ = first.base.warnings;
+    made.warnings_ = first.warnings;
     // The polarity of a run is not that of its first image.
     std::ranges::copy_if(
         made.loaded_.warnings, std::back_inserter(made.warnings_),

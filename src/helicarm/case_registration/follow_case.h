@@ -40,7 +40,7 @@ class CaseFollower {
  public:
   /// `first`: the case with the images of the first frame, which calibrate the views. Fails as `load_views`
   /// and `load_model`; a model of landmarks alone is bad_value.
-  static Expected<CaseFollower> begin(const pipeline::RegistrationCase& first, const RegisterOptions& options,
+  static Expected<CaseFollower> begin(const pipeline::Case& first, const RegisterOptions& options,
                                       const Progress& progress = {});
   CaseFollower(CaseFollower&&) noexcept;
   ~CaseFollower();

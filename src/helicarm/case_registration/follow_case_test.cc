@@ -22,34 +22,6 @@ TEST(FrameRange, RefusesWhatIsNoRange) {
   }
 }
 
-pipeline::RegistrationCase sequence_of(const char* image) {
-  pipeline::RegistrationCase given;
-  pipeline::CaseView view;
-  view.name = "AP";
-  view.image = std::filesystem::path("/case") / image;
-  given.base.views.push_back(view);
-  return given;
-}
-
-TEST(Sequence, ImagesAreNumbered) {
-  EXPECT_EQ(pipeline::at_frame(sequence_of("ap_{frame:04d}.tif"), 12)->base.views[0].image,
-            "/case/ap_0012.tif");
-  EXPECT_EQ(pipeline::at_frame(sequence_of("{frame}.png"), 7)->base.views[0].image, "/case/7.png");
-  EXPECT_TRUE(pipeline::is_sequence(sequence_of("{frame}.png")));
-}
-
-TEST(Sequence, FilesWithoutANumberHaveFrames) {
-  const auto made = pipeline::at_frame(sequence_of("ap.dcm"), 7);
-  EXPECT_EQ(made->base.views[0].image, "/case/ap.dcm");
-  EXPECT_EQ(made->base.views[0].frame, 7);
-  EXPECT_FALSE(pipeline::is_sequence(sequence_of("ap.dcm")));
-}
-
-TEST(Sequence, OtherPlaceholdersAreRefused) {
-  for (const char* name : {"{frame:d}.png", "{frame.png", "{frame:3d}.png", "{frame}{frame:x}.png"})
-    EXPECT_FALSE(pipeline::at_frame(sequence_of(name), 1)) << name;
-}
-
 RegisteredFrame two_models() {
   RegisteredFrame frame{4, {}};
   for (const char* name : {"femur", "tibia, left"}) {

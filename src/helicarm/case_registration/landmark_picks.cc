@@ -38,10 +38,10 @@ struct PickedRays {
   double dof() const { return 2 * double(rays.size()) - 3; }
 };
 
-PickedRays rays_of(std::string name, const Vector3d& in_model, const pipeline::RegistrationCase& given,
+PickedRays rays_of(std::string name, const Vector3d& in_model, const pipeline::Case& given,
                    const LoadedViews& loaded, const std::vector<RegistrationView>& views) {
   PickedRays picked{std::move(name), in_model, {}, {}, {}};
-  for (const pipeline::Pick& pick : given.base.picks) {
+  for (const pipeline::Pick& pick : given.picks) {
     if (pick.name != picked.name) continue;
     for (std::size_t i = 0; i < views.size(); ++i) {
       if (views[i].name != pick.view) continue;
@@ -123,8 +123,7 @@ Eigen::MatrixXd by_cameras(const geometry::Intersection& crossing, const PickedR
 }  // namespace
 
 std::vector<registration::Landmark> picked_landmarks(const pipeline::CaseModel& asked,
-                                                     const pipeline::RegistrationCase& given,
-                                                     const LoadedViews& loaded,
+                                                     const pipeline::Case& given, const LoadedViews& loaded,
                                                      const std::vector<RegistrationView>& views) {
   const std::filesystem::path& path = *asked.landmarks;
   std::string missing;

@@ -35,7 +35,7 @@ class LandmarkPicks : public testing::Test {
         pick.view = view.name;
         pick.uv_raw = view.view.project(at);
         pick.sigma_px = 0.2;
-        given_.base.picks.push_back(pick);
+        given_.picks.push_back(pick);
       }
     }
     EXPECT_TRUE(write_file(*asked_.landmarks, rows));
@@ -48,7 +48,7 @@ class LandmarkPicks : public testing::Test {
       {"a", {12, -6, 4}}, {"b", {-15, -10, -15}}, {"c", {-3, 18, 12}}, {"d", {8, 9, -20}}};
   const TemporaryFolder folder_;
   pipeline::CaseModel asked_;
-  pipeline::RegistrationCase given_;
+  pipeline::Case given_;
   LoadedViews loaded_;
 };
 
@@ -61,7 +61,7 @@ TEST_F(LandmarkPicks, LieWhereTheirRaysMeet) {
 }
 
 TEST_F(LandmarkPicks, NamesExchangedInOneViewAreNamed) {
-  std::swap(given_.base.picks[1].uv_raw, given_.base.picks[5].uv_raw);  // a and c in LAT
+  std::swap(given_.picks[1].uv_raw, given_.picks[5].uv_raw);  // a and c in LAT
   const auto landmarks = picked();
   ASSERT_FALSE(landmarks);
   EXPECT_EQ(landmarks.error().reason, Reason::residual_too_large);
@@ -70,7 +70,7 @@ TEST_F(LandmarkPicks, NamesExchangedInOneViewAreNamed) {
 
 TEST_F(LandmarkPicks, RaysThatMissEnlargeTheCovariance) {
   const auto exact = picked();
-  given_.base.picks[1].uv_raw.y() += 8;
+  given_.picks[1].uv_raw.y() += 8;
   const auto missed = picked();
   ASSERT_TRUE(missed) << missed.error().message;
   EXPECT_GT(missed->front().covariance_in_world.trace(), 20 * exact->front().covariance_in_world.trace());

@@ -102,13 +102,13 @@ void take_patient(std::string& known, const xray::XrayImage& image) {
                    fmt::format("{} is of another patient than the images before it", image.name));
 }
 
-LoadedViews views_of_cameras(const pipeline::RegistrationCase& given) {
+LoadedViews views_of_cameras(const pipeline::Case& given) {
   LoadedViews loaded;
-  for (std::size_t i = 0; i < given.base.views.size(); ++i) {
-    const pipeline::CaseView& view = given.base.views[i];
+  for (std::size_t i = 0; i < given.views.size(); ++i) {
+    const pipeline::CaseView& view = given.views[i];
     const xray::XrayImage image = value_or_throw(pipeline::image_of(view));
     take_patient(loaded.patient_key, image);
-    const exchange::ImportedMatrix camera = value_or_throw(exchange::import_matrix(given.cameras[i]));
+    const exchange::ImportedMatrix camera = value_or_throw(exchange::import_matrix(*view.camera));
     if (camera.image_size) check_size(view.name, "the camera is for", *camera.image_size, image.pixels);
     loaded.views.push_back(view_of(image, view.name, camera.view));
     loaded.views.back().grey = std::move(image.pixels);
@@ -147,8 +147,7 @@ Eigen::MatrixXd covariance_by_residuals(const pipeline::CaseCalibration& calibra
 
 }  // namespace
 
-LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
-                                 const pipeline::CaseCalibration& calibration) {
+LoadedViews views_of_calibration(const pipeline::Case& given, const pipeline::CaseCalibration& calibration) {
   LoadedViews loaded;
   for (std::size_t i = 0; i < calibration.views.size(); ++i) {
     const pipeline::LabelledView& image = calibration.images[i];
@@ -156,7 +155,7 @@ LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
     if (loaded.patient_key.empty()) loaded.patient_key = image.xray_image->acquisition.patient_key;
     loaded.views.push_back(view_of(*image.xray_image, view.name, view.view));
     loaded.views.back().grey = rectification::resample(*image.xray_image, image.rectification.map);
-    loaded.views.back().usable = usable_of(image, given.base.calibrator, view.view);
+    loaded.views.back().usable = usable_of(image, given.calibrator, view.view);
     loaded.maps.emplace_back(image.rectification.map);
   }
   loaded.camera_covariance = calibration.joint_covariance.size() > 0 ? calibration.joint_covariance
@@ -165,14 +164,14 @@ LoadedViews views_of_calibration(const pipeline::RegistrationCase& given,
   return loaded;
 }
 
-Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given, const pipeline::RunOptions& run,
+Expected<LoadedViews> load_views(const pipeline::Case& given, const pipeline::RunOptions& run,
                                  const pipeline::Progress& progress) {
   return guarded([&] {
-    if (!given.cameras.empty()) {
+    if (pipeline::brings_cameras(given)) {
       progress.begin("read");
       return views_of_cameras(given);
     }
-    const auto calibration = pipeline::calibrate_case(given.base, run, progress);
+    const auto calibration = pipeline::calibrate_case(given, run, progress);
     if (!calibration) throw BadInput(calibration.error().failure);
     return views_of_calibration(given, *calibration);
   });

@@ -45,14 +45,14 @@ pipeline::Result with_models(pipeline::Result result, const CaseRegistration& re
   return result;
 }
 
-Expected<Measurement> measure_case(const pipeline::RegistrationCase& given, const RegisterOptions& options,
+Expected<Measurement> measure_case(const pipeline::Case& given, const RegisterOptions& options,
                                    const Progress& progress) {
   return guarded([&] {
-    auto done = value_or_throw(pipeline::measure(given.base, options.run, progress.of_views()));
-    if (done.result.failure || given.models.empty()) return Measurement{std::move(done.result), {}};
+    auto done = value_or_throw(pipeline::measure(given, options.run, progress.of_views()));
+    if (done.failure || given.models.empty()) return Measurement{std::move(done), {}};
     auto registration = value_or_throw(
         register_loaded(given, views_of_calibration(given, *done.calibration), options, progress));
-    pipeline::Result result = with_models(std::move(done.result), registration);
+    pipeline::Result result = with_models(std::move(done), registration);
     return Measurement{std::move(result), std::move(registration)};
   });
 }

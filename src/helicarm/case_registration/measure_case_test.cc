@@ -47,7 +47,7 @@ class MeasureCase : public testing::Test {
     json["models"] = Json::array(
         {{{"name", "body"}, {"start", {{"landmarks", "points.csv"}}}, {"plan", "plan.mrk.json"}}});
     ASSERT_TRUE(write_file(folder_->path() / "case.json", to_text(json)));
-    given_ = pipeline::read_measured_case(folder_->path()).value();
+    given_ = pipeline::read_case(folder_->path()).value();
   }
   static void TearDownTestSuite() { folder_.reset(); }
 
@@ -65,7 +65,7 @@ class MeasureCase : public testing::Test {
   }
 
   static inline std::unique_ptr<TemporaryFolder> folder_;
-  static inline pipeline::RegistrationCase given_;
+  static inline pipeline::Case given_;
 };
 
 TEST_F(MeasureCase, RegistersTheModelsAndTakesTheirTunnels) {
@@ -101,7 +101,7 @@ TEST_F(MeasureCase, EveryOptionReachesTheModels) {
   pipeline::RunOptions fresh;
   fresh.history.emplace();
   calibration::CArmHistory learned;
-  const pipeline::Result acquired = pipeline::measure(given_.base, fresh).value().result;
+  const pipeline::Result acquired = pipeline::measure(given_, fresh).value();
   for (int i = 0; i < 3; ++i)
     for (calibration::HistoryEntry entry : acquired.entries) {
       entry.image += std::to_string(i);
@@ -146,7 +146,7 @@ TEST(MeasuredCase, CamerasOfOtherProgramsAreNamed) {
   ASSERT_TRUE(write_file(folder.path() / "case.json",
                          R"({"format": "helicarm-case/1", "views": [{"name": "A", "image": "a.png",
                              "camera": "a.json"}], "models": [{"name": "x", "surface": "x.stl"}]})"));
-  const auto given = pipeline::read_measured_case(folder.path());
+  const auto given = pipeline::read_case(folder.path());
   ASSERT_FALSE(given);
   EXPECT_EQ(given.error().reason, Reason::bad_value);
   EXPECT_NE(given.error().message.find("helicarm register"), std::string::npos) << given.error().message;

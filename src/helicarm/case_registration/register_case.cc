@@ -13,6 +13,7 @@
 #include "helicarm/case_registration/plan_errors.h"
 #include "helicarm/case_registration/registration_figures.h"
 #include "helicarm/case_registration/start_poses.h"
+#include "helicarm/pipeline/case_frames.h"
 #include "helicarm/registration/outline.h"
 
 namespace helicarm::case_registration {
@@ -61,7 +62,7 @@ void add_warnings_of_files(const registration::Model& model, registration::Regis
 
 class Registrar {
  public:
-  Registrar(const pipeline::RegistrationCase& given, const RegisterOptions& options, const Progress& progress,
+  Registrar(const pipeline::Case& given, const RegisterOptions& options, const Progress& progress,
             const LoadedViews& loaded)
       : given_(given), options_(options), progress_(progress), loaded_(loaded) {}
 
@@ -69,8 +70,8 @@ class Registrar {
     RegisteredModel made;
     made.moves_with = asked.moves_with;
     made.registration.name = asked.name;
-    const bool follows = asked.moves_with && tracked(given_.base, *asked.moves_with);
-    const auto views = follows ? following(loaded_.views, given_.base, *asked.moves_with) : loaded_.views;
+    const bool follows = asked.moves_with && tracked(given_, *asked.moves_with);
+    const auto views = follows ? following(loaded_.views, given_, *asked.moves_with) : loaded_.views;
     for (const RegistrationView& view : views) made.views.push_back(view.view);
     LoadedModel files = value_or_throw(load_model(asked, plan && !plan->tunnels.empty()));
     std::optional<registration::Model>& model = files.model;
@@ -102,7 +103,7 @@ class Registrar {
     for (const Warning& warning : outside) add_finding(made.registration, warning, false);
     if (!follows && views.size() > 1) made.registration.notes.push_back(motion_note(asked, motion_sigma_mm));
     if (plan && made.registration.is_determined()) {
-      carry_plan(*plan, given_.base, made);
+      carry_plan(*plan, given_, made);
       limit_error(largest_error(made.points), options_.run.max_error_mm, made.registration);
       made.bone_checks = bone_checks(*plan, files.bone.get());
       judge_tunnels(*plan, made.bone_checks, made.registration);
@@ -137,7 +138,7 @@ class Registrar {
                                     {view.grey.width(), view.grey.height()}, options_.run.threads));
   }
 
-  const pipeline::RegistrationCase& given_;
+  const pipeline::Case& given_;
   const RegisterOptions& options_;
   const Progress& progress_;
   const LoadedViews& loaded_;
@@ -166,12 +167,12 @@ bool CaseRegistration::refused() const {
          });
 }
 
-Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given,
-                                         const RegisterOptions& options, const Progress& progress) {
+Expected<CaseRegistration> register_case(const pipeline::Case& given, const RegisterOptions& options,
+                                         const Progress& progress) {
   return guarded([&] {
     CaseRegistration result;
-    result.bones = given.base.bones;
-    result.warnings = given.base.warnings;
+    result.bones = given.bones;
+    result.warnings = given.warnings;
     if (pipeline::is_sequence(given))
       throw BadInput(Reason::bad_value,
                      "views: \"image\" holds {frame}: name the frames with --frames, such as --frames 1-100");
@@ -185,12 +186,12 @@ Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given
   });
 }
 
-Expected<CaseRegistration> register_loaded(const pipeline::RegistrationCase& given, LoadedViews loaded,
+Expected<CaseRegistration> register_loaded(const pipeline::Case& given, LoadedViews loaded,
                                            const RegisterOptions& options, const Progress& progress) {
   return guarded([&] {
     CaseRegistration result;
-    result.bones = given.base.bones;
-    result.warnings = given.base.warnings;
+    result.bones = given.bones;
+    result.warnings = given.warnings;
     result.loaded = std::move(loaded);
     result.warnings.insert(result.warnings.end(), result.loaded.warnings.begin(),
                            result.loaded.warnings.end());

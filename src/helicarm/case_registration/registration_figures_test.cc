@@ -97,7 +97,7 @@ TEST(DrrImage, ModelBehindTheSourceHasNone) {
 class Report : public testing::Test {
  protected:
   CaseRegistration registered(pipeline::CaseModel asked) {
-    pipeline::RegistrationCase given;
+    pipeline::Case given;
     asked.name = "implant";
     given.models = {asked};
     RegisterOptions options;
@@ -111,13 +111,13 @@ class Report : public testing::Test {
     loaded.maps.resize(2);
     for (const Vector3d& point : landmarks)
       for (const auto& view : loaded.views)
-        given.base.picks.push_back({"p" + std::to_string(int(point.x())),
-                                    view.name,
-                                    view.view.project(point),
-                                    pipeline::Snap::none,
-                                    3,
-                                    {},
-                                    {}});
+        given.picks.push_back({"p" + std::to_string(int(point.x())),
+                               view.name,
+                               view.view.project(point),
+                               pipeline::Snap::none,
+                               3,
+                               {},
+                               {}});
     auto made = register_loaded(given, std::move(loaded), options);
     EXPECT_TRUE(made) << made.error().message;
     return *made;

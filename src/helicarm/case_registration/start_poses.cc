@@ -25,7 +25,7 @@ Eigen::MatrixXd shared_covariance(const LoadedViews& loaded, double motion_sigma
 
 }  // namespace
 
-StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedViews& loaded,
+StartPoses start_poses(const pipeline::Case& given, const LoadedViews& loaded,
                        const pipeline::CaseModel& asked, const std::vector<RegistrationView>& views,
                        double motion_sigma_mm) {
   if (asked.world_from_model) return {{*asked.world_from_model}, {}, {}};

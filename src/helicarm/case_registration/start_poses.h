@@ -21,7 +21,7 @@ struct StartPoses {
 /// The pose or the landmarks that the case gives; none: the model is searched anywhere. `motion_sigma_mm`: of
 /// landmarks, between the acquisitions. Throws BadInput: bad_value without a start in one view, and as
 /// `picked_landmarks`, `register_landmarks`.
-StartPoses start_poses(const pipeline::RegistrationCase& given, const LoadedViews& loaded,
+StartPoses start_poses(const pipeline::Case& given, const LoadedViews& loaded,
                        const pipeline::CaseModel& asked,
                        const std::vector<registration::RegistrationView>& views, double motion_sigma_mm);
 

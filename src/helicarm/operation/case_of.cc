@@ -159,8 +159,8 @@ Expected<void> check_digests(const fs::path& folder, const Digests& files) {
   });
 }
 
-Expected<pipeline::Measurement> measure_case(const pipeline::Case& given, const OperationPlan& plan,
-                                             const std::optional<pipeline::Measurement>& earlier) {
+Expected<pipeline::Result> measure_case(const pipeline::Case& given, const OperationPlan& plan,
+                                        const std::optional<pipeline::Result>& earlier) {
   return pipeline::measure_again(earlier, given, run_options(plan));
 }
 

@@ -23,7 +23,7 @@ const guidance::PropagatedPoint* located_in(const pipeline::Result& result, cons
 
 /// Of all views' parameters, or of the pose of the tunnel's model.
 Eigen::MatrixXd shared_by_ends(const pipeline::Result& result, const PlannedTunnel& tunnel) {
-  if (!tunnel.of_model) return result.joint_covariance;
+  if (!tunnel.of_model) return pipeline::joint_covariance(result);
   for (const pipeline::ModelTunnel& planned : result.model_tunnels)
     if (planned.model == tunnel.of_model->model) return planned.shared_covariance;
   return {};

@@ -23,10 +23,11 @@ using case_registration::CaseRegistration;
 
 constexpr std::uintmax_t most_model_bytes = std::uintmax_t{1} << 31;
 
-pipeline::RegistrationCase with_models_of(const OperationPlan& plan, const pipeline::Case& given) {
-  pipeline::RegistrationCase made{given, {}, plan.models, {}};
+pipeline::Case with_models_of(const OperationPlan& plan, const pipeline::Case& given) {
+  pipeline::Case made = given;
+  made.models = plan.models;
   for (const PlannedTunnel& tunnel : plan.tunnels)
-    if (tunnel.of_model) made.tunnels.push_back(*tunnel.of_model);
+    if (tunnel.of_model) made.model_tunnels.push_back(*tunnel.of_model);
   return made;
 }
 
@@ -127,11 +128,11 @@ Expected<Digests> keep_models(OperationPlan& plan, const fs::path& session) {
 }
 
 Expected<CaseRegistration> register_models(const OperationPlan& plan, const pipeline::Case& given,
-                                           const pipeline::Measurement& measured,
+                                           const pipeline::Result& measured,
                                            const case_registration::Progress& progress) {
   return guarded([&] {
     if (!measured.calibration) throw BadInput(Reason::usage, "no measurement yet");
-    const pipeline::RegistrationCase with_models = with_models_of(plan, given);
+    const pipeline::Case with_models = with_models_of(plan, given);
     case_registration::RegisterOptions options;
     options.run = run_options(plan);
     return value_or_throw(case_registration::register_loaded(

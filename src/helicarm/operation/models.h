@@ -16,7 +16,7 @@ Expected<Digests> keep_models(OperationPlan& plan, const std::filesystem::path& 
 /// Registers the models to a measured case by its calibration. Refusals are in the result.
 Expected<case_registration::CaseRegistration> register_models(const OperationPlan& plan,
                                                               const pipeline::Case& given,
-                                                              const pipeline::Measurement& measured,
+                                                              const pipeline::Result& measured,
                                                               const case_registration::Progress& progress);
 
 /// registration.json without its times, which differ from run to run.

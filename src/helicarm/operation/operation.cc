@@ -144,7 +144,7 @@ pipeline::Result Operation::run(const guidance::Poses& now,
   const auto earlier = measurement_ ? measurement_->calibration : nullptr;
   measurement_ = value_or_throw(measure_case(given, plan_, measurement_));
   if (measurement_->calibration != earlier || !earlier) ++calibrations_;
-  pipeline::Result result = measurement_->result;
+  pipeline::Result result = *measurement_;
   if (registration_confirmed_ && !result.failure)
     result = value_or_throw(with_registration(result, *registration_, plan_, given, of_models));
   const Digests written = value_or_throw(write_result(result, given.folder));

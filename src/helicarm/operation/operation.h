@@ -241,7 +241,7 @@ class Operation {
   std::set<std::string> in_place_;                          ///< check points touched since the last order
   int measurements_ = 0;
   PlanFiles files_;
-  std::optional<pipeline::Measurement> measurement_;  ///< of the present images
+  std::optional<pipeline::Result> measurement_;  ///< of the present images
   int calibrations_ = 0;
   std::optional<pipeline::Case> measured_;  ///< of the last measurement, not of a verification
   std::optional<case_registration::CaseRegistration> registration_;  ///< of `measured_`

@@ -14,7 +14,7 @@
 #include "helicarm/devices/tracker/check_point.h"
 #include "helicarm/devices/tracker/facets.h"
 #include "helicarm/guidance/poses.h"
-#include "helicarm/pipeline/registration_case.h"
+#include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/result.h"
 
 namespace helicarm::operation {

@@ -283,9 +283,9 @@ class Replay {
   bool earlier_ = false;                    ///< the last case is of an earlier version
   bool verifies_ = false;                   ///< the last case is that of a verification
   std::optional<FreehandGuide> guide_;
-  std::optional<pipeline::Case> derived_;             ///< of the last case record
-  std::optional<pipeline::Measurement> measurement_;  ///< of the accepted images
-  std::optional<pipeline::Case> measured_;            ///< of the last measurement
+  std::optional<pipeline::Case> derived_;        ///< of the last case record
+  std::optional<pipeline::Result> measurement_;  ///< of the accepted images
+  std::optional<pipeline::Case> measured_;       ///< of the last measurement
   std::optional<case_registration::CaseRegistration> registration_;
   std::string registered_digest_;
   bool is_confirmed_ = false;                    ///< the registration

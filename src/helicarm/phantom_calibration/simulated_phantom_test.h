@@ -33,7 +33,7 @@ class PhantomFolder {
  public:
   explicit PhantomFolder(const simulation::SimulatedCase& simulated) {
     EXPECT_TRUE(simulation::write_case(folder_.path() / "case", simulated));
-    given = *pipeline::read_phantom_case(folder_.path() / "case");
+    given = *pipeline::read_case(folder_.path() / "case", pipeline::Purpose::phantom);
     given.calibrator.targets.clear();
   }
 

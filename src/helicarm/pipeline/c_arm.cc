@@ -18,15 +18,14 @@ namespace {
 Expected<CArmAcquisitions> measured_acquisitions(const Case& given, unsigned threads) {
   RunOptions options;
   options.threads = threads;
-  return measure(given, options).and_then([](const Measurement& measured) -> Expected<CArmAcquisitions> {
-    const Result& result = measured.result;
+  return measure(given, options).and_then([](const Result& result) -> Expected<CArmAcquisitions> {
     if (result.failure) return tl::unexpected<Failure>(*result.failure);
-    if (result.entries.empty())
+    if (result.calibration->entries.empty())
       return fail(
           Reason::residual_too_large,
           "the residuals contradict the noise model, or no view alone determines its camera: the case "
           "says nothing of the C-arm");
-    return CArmAcquisitions{result.entries, result.warnings};
+    return CArmAcquisitions{result.calibration->entries, result.warnings};
   });
 }
 

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/pipeline/model_description.h"
+#include "helicarm/pipeline/case_description.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -85,16 +85,41 @@ void warn_of_name(Case& read) {
 
 namespace description {
 
-void read_calibrator(Case& read, JsonReader& reader, Purpose purpose) {
-  const bool is_null = reader.raw("calibrator").is_null();
-  if (purpose == Purpose::cameras && is_null) return;
-  if (purpose == Purpose::phantom && is_null) {
-    if (reader.raw("diameters_mm").is_null())
-      reader.refuse(Reason::bad_value, "diameters_mm", "is missing: required where \"calibrator\" is null");
-    return;
-  }
+void read_calibrator(Case& read, JsonReader& reader) {
+  if (reader.raw("calibrator").is_null()) return;
   read.calibrator_name = reader.text("calibrator", 1000);
   read.calibrator = value_or_throw(phantom::calibrator_named(read.calibrator_name, read.folder));
+}
+
+void check_calibrator(const Case& read, JsonReader& reader, Purpose purpose) {
+  if (!read.calibrator_name.empty() || brings_cameras(read)) return;
+  if (purpose != Purpose::phantom) reader.text("calibrator");  // says what is wrong with it
+  if (!reader.has("diameters_mm"))
+    reader.refuse(Reason::bad_value, "diameters_mm", "is missing: required where \"calibrator\" is null");
+}
+
+std::vector<std::string> marker_names_from(JsonReader& reader) {
+  const Json& list = reader.raw("markers");
+  const auto is_text = [](const Json& name) { return name.is_string(); };
+  if (!list.is_array() || list.empty() || list.size() > most_markers || !std::ranges::all_of(list, is_text))
+    reader.refuse(Reason::bad_value, "markers",
+                  fmt::format("is not a list of 1 to {} markers' names", most_markers));
+  return list.get<std::vector<std::string>>();
+}
+
+std::vector<AnyTunnel> all_tunnels(const Case& given) {
+  std::vector<AnyTunnel> all;
+  for (const TunnelPlan& tunnel : given.tunnels) all.push_back({tunnel.name, tunnel.start, tunnel.end});
+  for (const ModelTunnelPlan& line : given.model_tunnels) all.push_back({line.name, {}, {}, line});
+  return all;
+}
+
+void set_tunnels(Case& given, const std::vector<AnyTunnel>& tunnels) {
+  for (const AnyTunnel& tunnel : tunnels)
+    if (tunnel.line)
+      given.model_tunnels.push_back(*tunnel.line);
+    else
+      given.tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
 }
 
 void read_plate(Case& read, JsonReader& reader) {
@@ -104,27 +129,12 @@ void read_plate(Case& read, JsonReader& reader) {
 
 }  // namespace description
 
-Json take_model_tunnels(Json& json) {
-  Json taken = Json::array();
-  if (!json.is_object() || !json.contains("tunnels") || !json["tunnels"].is_array()) return taken;
-  Json others = Json::array();
-  for (const Json& tunnel : json["tunnels"])
-    (tunnel.is_object() && tunnel.contains("model") ? taken : others).push_back(tunnel);
-  json["tunnels"] = others;
-  return taken;
+bool brings_camera(const Case& given, const CaseView& view) {
+  return view.camera || view.calibration || given.calibration;
 }
 
-Case case_of(Json json, const std::string& origin, const fs::path& folder, Purpose purpose) {
-  if (json.is_object() && json.contains("models")) take_model_tunnels(json);
-  JsonReader reader(json, origin);
-  Case read;
-  read.folder = folder;
-  FromJson codec(reader);
-  description::describe_case(codec, read, purpose);
-  reader.finish();
-  refuse_metres(read);
-  warn_of_name(read);
-  return read;
+bool brings_cameras(const Case& given) {
+  return std::ranges::all_of(given.views, [&](const CaseView& view) { return brings_camera(given, view); });
 }
 
 Json to_json(const Case& written) {
@@ -135,36 +145,20 @@ Json to_json(const Case& written) {
 
 Json to_json(const Pick& pick) {
   ToJson codec;
-  description::describe_pick(codec, pick, {}, {});
+  description::describe_pick(codec, pick, {}, {}, Purpose::track);
   return std::move(codec.json);
 }
 
 Json case_schema() {
-  const Case shape;
-  Json schema = schema_of("case.json",
-                          [&](ToSchema& codec) { description::describe_case(codec, shape, Purpose::run); });
-  ToSchema models, line;
-  std::vector<CaseModel> of_case;
-  ModelTunnelPlan of_model;
-  description::describe_models(models, of_case, false, {}, {});
-  description::describe_model_line(line, of_model, of_case, {});
-  schema["properties"]["models"] = models.json["properties"]["models"];
+  Json schema = schema_of("case.json", [&](ToSchema& codec) {
+    Case read;
+    description::describe_case(codec, read, Purpose::run);
+  });
   // A tunnel is one of picks, or a line of a model's plan.
-  Json& tunnel = schema["properties"]["tunnels"]["items"];
-  tunnel["anyOf"] = Json::array({{{"required", tunnel["required"]}}, {{"required", {"name", "model"}}}});
-  tunnel.erase("required");
-  tunnel["properties"].update(line.json["properties"]);
+  schema["properties"]["tunnels"]["items"]["anyOf"] =
+      Json::array({{{"required", {"start", "end"}}}, {{"required", {"model"}}}});
   return schema;
 }
-
-namespace {
-
-Case case_from(const fs::path& path, Purpose purpose) {
-  const fs::path file = case_file(path);
-  return case_of(value_or_throw(read_json(file)), file.filename().string(), folder_of_case(path), purpose);
-}
-
-}  // namespace
 
 Expected<Case> checked_case(Case given) {
   return guarded([&] {
@@ -189,7 +183,7 @@ Expected<std::vector<Pick>> picks_from(const Json& picks, const std::string& ori
     JsonReader reader(json, origin);
     std::vector<Pick> read;
     FromJson codec(reader);
-    description::describe_picks(codec, read, views, bones, {});
+    description::describe_picks(codec, read, views, bones, {}, Purpose::run);
     return read;
   });
 }
@@ -200,16 +194,26 @@ fs::path folder_of_case(const fs::path& path) {
   return fs::is_regular_file(path) ? fs::absolute(path).parent_path() : path;
 }
 
-Expected<Case> case_from_json(const Json& json, const std::string& origin, const fs::path& folder) {
-  return guarded([&] { return case_of(json, origin, folder, Purpose::run); });
+Expected<Case> case_from_json(const Json& json, const std::string& origin, const fs::path& folder,
+                              Purpose purpose) {
+  return guarded([&] {
+    JsonReader reader(json, origin);
+    Case read;
+    read.folder = folder;
+    FromJson codec(reader);
+    description::describe_case(codec, read, purpose);
+    reader.finish();
+    refuse_metres(read);
+    warn_of_name(read);
+    return read;
+  });
 }
 
-Expected<Case> read_case(const fs::path& path) {
-  return guarded([&] { return case_from(path, Purpose::run); });
-}
-
-Expected<Case> read_phantom_case(const fs::path& path) {
-  return guarded([&] { return case_from(path, Purpose::phantom); });
+Expected<Case> read_case(const fs::path& path, Purpose purpose) {
+  const fs::path file = case_file(path);
+  return read_json(file).and_then([&](const Json& json) {
+    return case_from_json(json, file.filename().string(), folder_of_case(path), purpose);
+  });
 }
 
 }  // namespace helicarm::pipeline

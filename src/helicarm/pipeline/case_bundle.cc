@@ -238,7 +238,7 @@ std::string line_of(const char* kind, const Failure& failure) {
 
 /// result.json of the bundled case without times, which differ from run to run.
 Json measured(const Case& bundled, const RunOptions& options, std::string& log) {
-  const Result result = value_or_throw(measure(bundled, options)).result;
+  const Result result = value_or_throw(measure(bundled, options));
   if (result.failure) log += line_of("refused", *result.failure);
   for (const Warning& warning : result.warnings) log += line_of("warning", warning);
   Json json = to_json(result);

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
-#include <set>
-
-#include "helicarm/core/codec.h"
-#include "helicarm/pipeline/case_json.h"
-#include "helicarm/pipeline/poses_json.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/model_description.h"
 #include "helicarm/xray/dicom_acquisition.h"
 
 /// The keys of case.json, once for reader, writer and schema (core/codec.h). The help texts are the table in
@@ -15,22 +11,12 @@ namespace helicarm::pipeline::description {
 
 inline constexpr std::size_t most_views = 50;
 inline constexpr std::size_t most_picks = 1000;
+inline constexpr std::size_t most_bodies = 50, most_markers = 200;
+inline constexpr int most_number = 1000000;  // of an image
 inline constexpr Range pixel_range{-0.5, 65535};
 inline constexpr Range place_range{-10000, 10000};
 inline constexpr std::array<std::string_view, 2> snap_words{"none", "ball"};
-inline constexpr std::array<std::string_view, 2> side_words{"left", "right"};
 inline constexpr std::array<std::string_view, 2> samples_words{"shared", "independent"};
-
-template <class T, class Name>
-const T* find_named(const std::vector<T>& all, const std::string& name, Name name_of) {
-  const auto found = std::ranges::find(all, name, name_of);
-  return found == all.end() ? nullptr : &*found;
-}
-
-inline void take_name(const JsonReader& reader, std::set<std::string>& names, const std::string& name) {
-  if (!names.insert(name).second)
-    reader.refuse(Reason::name_clash, "name", fmt::format("\"{}\" is given twice", name));
-}
 
 inline bool has_reading(const guidance::Poses& poses) {
   return poses.tracker_from_calibrator || poses.tracker_from_tool || !poses.tracker_from_bone.empty();
@@ -51,42 +37,61 @@ void describe_poses(Codec& codec, const char* key, Poses& poses, const std::vect
 inline constexpr const char* of_track =
     "makes the case a sequence of markers: follow them with `helicarm track CASE --frames A-B`";
 
-/// A key of another command, which takes it out before this description reads the rest.
+/// Refuses a key that belongs to other purposes.
 template <class Codec>
-void describe_elsewhere(Codec& codec, const char* key, const char* type, const char* refusal,
-                        const char* help) {
-  codec.custom(
-      key, false, {{"type", type}}, help,
-      [&](JsonReader& reader) {
-        if (!reader.raw(key).is_null()) reader.refuse(Reason::bad_value, key, refusal);
-      },
-      [] { return std::optional<Json>(); });
+void check_purpose(Codec& codec, const char* key, bool belongs, const char* refusal) {
+  codec.check([&](JsonReader& reader) {
+    if (!belongs && reader.has(key)) reader.refuse(Reason::bad_value, key, refusal);
+  });
+}
+
+template <class Codec>
+void check_track(Codec& codec, const char* key, Purpose purpose) {
+  check_purpose(codec, key, purpose == Purpose::track, of_track);
+}
+
+template <class Codec, class View>
+void describe_images(Codec& codec, View& view, const std::filesystem::path& folder, Purpose purpose) {
+  codec.text("name", view.name, "unique");
+  codec.file("image", view.image, folder, "path of an [image file](#images-and-sidecars)");
+  codec.integer("frame", view.frame, 1, 100000, "1-based; needed only if the file has several frames");
+  check_purpose(codec, "camera", purpose == Purpose::registration || purpose == Purpose::track,
+                "is for `helicarm register`, which uses cameras of other programs; here each view is "
+                "calibrated");
+  codec.file(
+      "camera", view.camera, folder,
+      "of `helicarm register` and `helicarm track`: path of a [camera of another "
+      "program](#projections-of-other-programs), for all views or for none; the image is taken as free of "
+      "distortion. Then `calibrator` and `plate` may be left out, and the world is the cameras'");
+  check_track(codec, "calibration", purpose);
+  codec.file("calibration", view.calibration, folder,
+             "of [`helicarm track`](motion.md#run-it): path of a result.json that holds this view's camera");
+  codec.check([&](JsonReader& reader) {
+    if (view.camera && view.calibration)
+      reader.refuse(Reason::bad_value, "calibration", "cannot be combined with \"camera\"");
+  });
+  check_purpose(codec, "frame_offset", purpose == Purpose::registration || purpose == Purpose::track,
+                of_track);
+  codec.integer("frame_offset", view.frame_offset, -most_number, most_number,
+                "of `helicarm track` and `helicarm register --frames`: the image's number is the "
+                "sequence's frame plus this");
+  check_purpose(
+      codec, "frames", purpose == Purpose::sweep || purpose == Purpose::phantom,
+      "makes the view a run of images: calibrate it with `helicarm sweep`, or name one image by \"frame\"");
+  codec.text(
+      "frames", view.frames,
+      "of `helicarm sweep` and `phantom measure`: `\"all\"` or `\"A-B[:STEP]\"`, frames of the file or of "
+      "numbered files (`{frame}` or `{frame:04d}` in `image`); each is a view `NAME/12`, up to 1000");
+  codec.check([&](JsonReader& reader) {
+    if (view.frames && view.frame)
+      reader.refuse(Reason::bad_value, "frame", "cannot be combined with \"frames\"");
+  });
 }
 
 template <class Codec, class View>
 void describe_view(Codec& codec, View& view, const std::filesystem::path& folder,
-                   const std::vector<guidance::Bone>& bones) {
-  codec.text("name", view.name, "unique");
-  codec.file("image", view.image, folder, "path of an [image file](#images-and-sidecars)");
-  codec.integer("frame", view.frame, 1, 100000, "1-based; needed only if the file has several frames");
-  describe_elsewhere(
-      codec, "camera", "string",
-      "is for `helicarm register`, which uses cameras of other programs; here each view is calibrated",
-      "of `helicarm register` and `helicarm track`: path of a [camera of another "
-      "program](#projections-of-other-programs), for all views or for none; the image is taken as free of "
-      "distortion. Then `calibrator` and `plate` may be left out, and the world is the cameras'");
-  describe_elsewhere(
-      codec, "calibration", "string", of_track,
-      "of [`helicarm track`](motion.md#run-it): path of a result.json that holds this view's camera");
-  describe_elsewhere(codec, "frame_offset", "integer", of_track,
-                     "of `helicarm track` and `helicarm register --frames`: the image's number is the "
-                     "sequence's frame plus this");
-  describe_elsewhere(
-      codec, "frames", "string",
-      "makes the view a run of images: calibrate it with `helicarm sweep`, or name one image by \"frame\"",
-      "of `helicarm sweep` and `phantom measure`: `\"all\"` or `\"A-B[:STEP]\"`, frames of the file or of "
-      "numbered files "
-      "(`{frame}` or `{frame:04d}` in `image`); each is a view `NAME/12`, up to 1000");
+                   const std::vector<guidance::Bone>& bones, Purpose purpose) {
+  describe_images(codec, view, folder, purpose);
   codec.file("plate_image", view.plate_image, folder,
              "image of the plate alone, acquired in the same C-arm position; needs a `plate`");
   codec.file("map", view.map, folder, "path of a [map.json](#mapjson); not beside `plate_image`");
@@ -120,14 +125,15 @@ void describe_bone_label(Codec& codec, Label& label) {
 
 template <class Codec, class PickValue>
 void describe_pick(Codec& codec, PickValue& pick, const std::vector<CaseView>& views,
-                   const std::vector<guidance::Bone>& bones) {
+                   const std::vector<guidance::Bone>& bones, Purpose purpose) {
   codec.text("name", pick.name, "one pick per name and view; not the name of a target");
   codec.text("view", pick.view, "name of a view");
   codec.check([&](JsonReader& reader) {
     if (!find_named(views, pick.view, &CaseView::name))
       reader.refuse(Reason::bad_value, "view", fmt::format("\"{}\" is not a view of the case", pick.view));
   });
-  describe_elsewhere(codec, "frame", "integer", of_track, "of `helicarm track`: the sequence's first frame");
+  check_track(codec, "frame", purpose);
+  codec.integer("frame", pick.frame, 0, most_number, "of `helicarm track`: the sequence's first frame");
   codec.vector("uv", pick.uv_raw, pixel_range, "raw pixel `[u, v]`, inside the image");
   if (codec.wants(pick.snap != Snap::none))
     codec.choice(
@@ -149,13 +155,6 @@ void describe_pick(Codec& codec, PickValue& pick, const std::vector<CaseView>& v
                [](auto& inner, auto& label) { describe_bone_label(inner, label); });
 }
 
-template <class Codec, class Plan>
-void describe_tunnel(Codec& codec, Plan& tunnel) {
-  codec.text("name", tunnel.name, "unique");
-  codec.text("start", tunnel.start, "name of a pick");
-  codec.text("end", tunnel.end, "name of a pick");
-}
-
 template <class Codec, class Line>
 void describe_tool_line(Codec& codec, Line& line) {
   codec.text("name", line.name, "unique");
@@ -175,14 +174,14 @@ void describe_tracker(Codec& codec, Noise& noise) {
 template <class Codec, class Picks>
 void describe_picks(Codec& codec, Picks& picks, const std::vector<CaseView>& views,
                     const std::vector<guidance::Bone>& bones,
-                    const std::vector<phantom::CalibratorTarget>& targets) {
-  std::set<std::pair<std::string, std::string>> clicks;
+                    const std::vector<phantom::CalibratorTarget>& targets, Purpose purpose) {
+  std::set<std::tuple<std::string, std::string, std::optional<int>>> clicks;
   codec.list("picks", picks, false, most_picks,
              "image points in one view each; picks with the same name in several views are one point",
              [&](auto& entry, auto& pick) {
-               describe_pick(entry, pick, views, bones);
+               describe_pick(entry, pick, views, bones, purpose);
                entry.check([&](JsonReader& reader) {
-                 if (!clicks.emplace(pick.name, pick.view).second)
+                 if (!clicks.emplace(pick.name, pick.view, pick.frame).second)
                    reader.refuse(Reason::name_clash, "name",
                                  fmt::format("\"{}\" is given twice in {}", pick.name, pick.view));
                  if (find_named(targets, pick.name, &phantom::CalibratorTarget::name))
@@ -201,7 +200,7 @@ void describe_views(Codec& codec, CaseValue& given, Purpose purpose) {
   std::set<std::string> names;
   codec.list("views", given.views, true, purpose == Purpose::sweep ? most_frames : most_views,
              "at least one; one view is calibrated, points need two", [&](auto& entry, auto& view) {
-               describe_view(entry, view, given.folder, given.bones);
+               describe_view(entry, view, given.folder, given.bones, purpose);
                entry.check([&](JsonReader& reader) {
                  take_name(reader, names, view.name);
                  if (view.plate_image && !given.plate)
@@ -211,22 +210,66 @@ void describe_views(Codec& codec, CaseValue& given, Purpose purpose) {
   codec.check([&](JsonReader& reader) {
     if (given.views.empty())
       reader.refuse(Reason::bad_value, "views", "is empty: at least one view is required");
+    const auto brings = [&](const CaseView& view) { return brings_camera(given, view); };
+    if (std::ranges::any_of(given.views, brings) && !brings_cameras(given))
+      reader.refuse(Reason::bad_value, "views",
+                    purpose == Purpose::track
+                        ? "\"camera\" or \"calibration\" must be given for all views or "
+                          "for none: their world is one"
+                        : "\"camera\" must be given for all views or for none: their "
+                          "world is one");
+  });
+}
+
+/// An element of "tunnels": from pick to pick, or a line of a model's plan.
+struct AnyTunnel {
+  std::string name, start, end;
+  std::optional<ModelTunnelPlan> line = {};
+};
+std::vector<AnyTunnel> all_tunnels(const Case& given);
+void set_tunnels(Case& given, const std::vector<AnyTunnel>& tunnels);
+
+template <class Codec, class Tunnel>
+void describe_any_tunnel(Codec& codec, Tunnel& tunnel, const Case& given, std::vector<CaseModel>& models) {
+  codec.text("name", tunnel.name, "unique");
+  codec.form("model", false, !tunnel.line, [&] {
+    codec.text("start", tunnel.start, "name of a pick");
+    codec.text("end", tunnel.end, "name of a pick");
+    codec.check([&](JsonReader& reader) {
+      for (const auto& [key, pick] : {std::pair{"start", &tunnel.start}, {"end", &tunnel.end}})
+        if (!find_named(given.picks, *pick, &Pick::name))
+          reader.refuse(Reason::bad_value, key, fmt::format("\"{}\" is not a pick of the case", *pick));
+    });
+  });
+  codec.form("model", true, tunnel.line.has_value(), [&] {
+    if constexpr (std::is_const_v<Tunnel>) {
+      describe_model_line(codec, *tunnel.line, models, given.bones);
+    } else {
+      tunnel.line.emplace().name = tunnel.name;
+      describe_model_line(codec, *tunnel.line, models, given.bones);
+    }
   });
 }
 
 template <class Codec, class CaseValue>
-void describe_lines(Codec& codec, CaseValue& given) {
-  std::set<std::string> tunnels, lines;
-  codec.list(
-      "tunnels", given.tunnels, false, most_picks, "from pick to pick", [&](auto& entry, auto& tunnel) {
-        describe_tunnel(entry, tunnel);
-        entry.check([&](JsonReader& reader) {
-          take_name(reader, tunnels, tunnel.name);
-          for (const auto& [key, pick] : {std::pair{"start", &tunnel.start}, {"end", &tunnel.end}})
-            if (!find_named(given.picks, *pick, &Pick::name))
-              reader.refuse(Reason::bad_value, key, fmt::format("\"{}\" is not a pick of the case", *pick));
-        });
-      });
+void describe_tunnels(Codec& codec, CaseValue& given) {
+  std::set<std::string> names;
+  std::vector<AnyTunnel> tunnels = all_tunnels(given);
+  std::vector<CaseModel> models = given.models;
+  codec.list("tunnels", tunnels, false, most_picks, "from pick to pick, or a line of a model's plan",
+             [&](auto& entry, auto& tunnel) {
+               describe_any_tunnel(entry, tunnel, given, models);
+               entry.check([&](JsonReader& reader) { take_name(reader, names, tunnel.name); });
+             });
+  if constexpr (!std::is_const_v<CaseValue>) {
+    set_tunnels(given, tunnels);
+    given.models = std::move(models);  // a line may say with which bone its model moves
+  }
+}
+
+template <class Codec, class CaseValue>
+void describe_tool_lines(Codec& codec, CaseValue& given) {
+  std::set<std::string> lines;
   codec.list("tool_lines", given.tool_lines, false, most_picks, "the instrument's axis as it was measured",
              [&](auto& entry, auto& line) {
                describe_tool_line(entry, line);
@@ -242,9 +285,56 @@ void describe_lines(Codec& codec, CaseValue& given) {
              });
 }
 
+/// The names of a body's markers.
+std::vector<std::string> marker_names_from(JsonReader& reader);
+
+template <class Codec, class Body>
+void describe_body(Codec& codec, Body& body, const std::filesystem::path& folder) {
+  codec.text("name", body.name, "unique; NAME.tra is written");
+  codec.check([&](JsonReader& reader) {
+    if (body.name.find_first_of("/\\") != std::string::npos || body.name.starts_with('.'))
+      reader.refuse(Reason::bad_value, "name", "is no file name: NAME.tra is written");
+  });
+  codec.custom(
+      "markers", true, {{"type", "array"}, {"items", {{"type", "string"}}}, {"maxItems", most_markers}},
+      "names of picks, each in one body",
+      [&](JsonReader& reader) {
+        if constexpr (!std::is_const_v<Body>) body.markers = marker_names_from(reader);
+      },
+      [&] { return std::optional<Json>(body.markers); });
+  codec.file(
+      "geometry", body.geometry, folder,
+      "path of a CSV, `name,x_mm,y_mm,z_mm` of its markers in a frame of their own; absent: learnt from "
+      "the sequence");
+}
+
+template <class Codec, class CaseValue>
+void describe_sequence(Codec& codec, CaseValue& given, Purpose purpose) {
+  check_track(codec, "markers", purpose);
+  codec.object("markers", given.markers, "of [`helicarm track`](motion.md#run-it)",
+               [](auto& inner, auto& markers) {
+                 inner.number("diameter_mm", markers.diameter_mm, {0.1, 30}, "of the markers");
+               });
+  std::set<std::string> names;
+  check_track(codec, "bodies", purpose);
+  if (codec.wants(!given.bodies.empty()))
+    codec.list("bodies", given.bodies, false, most_bodies, "of `helicarm track`: rigid sets of markers",
+               [&](auto& entry, auto& body) {
+                 describe_body(entry, body, given.folder);
+                 entry.check([&](JsonReader& reader) { take_name(reader, names, body.name); });
+               });
+  check_track(codec, "frame_rate_hz", purpose);
+  codec.number("frame_rate_hz", given.frame_rate_hz, {0.01, 1e5}, "of `helicarm track`");
+  check_track(codec, "calibration", purpose);
+  codec.file("calibration", given.calibration, given.folder,
+             "of `helicarm track`: as `calibration` of every view");
+}
+
 /// Sets calibrator and plate, read from their files.
-void read_calibrator(Case& read, JsonReader& reader, Purpose purpose);
+void read_calibrator(Case& read, JsonReader& reader);
 void read_plate(Case& read, JsonReader& reader);
+/// A calibrator may be missing beside cameras, and for a phantom of balls whose diameters are known.
+void check_calibrator(const Case& read, JsonReader& reader, Purpose purpose);
 
 template <class Codec, class CaseValue>
 void describe_case(Codec& codec, CaseValue& given, Purpose purpose) {
@@ -257,18 +347,13 @@ void describe_case(Codec& codec, CaseValue& given, Purpose purpose) {
         reader.choice("format", {"helicarm-case/2", "helicarm-case/1"});
       },
       [] { return std::optional<Json>("helicarm-case/2"); });
-  describe_elsewhere(codec, "markers", "object", of_track,
-                     "of [`helicarm track`](motion.md#run-it): `diameter_mm`");
-  describe_elsewhere(codec, "bodies", "array", of_track, "of `helicarm track`: rigid sets of markers");
-  describe_elsewhere(codec, "frame_rate_hz", "number", of_track, "of `helicarm track`");
-  describe_elsewhere(codec, "calibration", "string", of_track,
-                     "of `helicarm track`: as `calibration` of every view");
+  describe_sequence(codec, given, purpose);
   codec.custom(
       "calibrator", true, {{"type", {"string", "null"}}},
       "`\"udcsc\"` or path of a [calibrator.json](#calibratorjson); may be `null` for `phantom measure "
       "--from-scratch`",
       [&](JsonReader& reader) {
-        if constexpr (reads) read_calibrator(given, reader, purpose);
+        if constexpr (reads) read_calibrator(given, reader);
       },
       [&] { return std::optional(named(given.calibrator_name)); });
   codec.custom(
@@ -288,6 +373,9 @@ void describe_case(Codec& codec, CaseValue& given, Purpose purpose) {
       },
       [&] { return std::optional(Json(given.bones)); });
   describe_views(codec, given, purpose);
+  codec.check([&](JsonReader& reader) {
+    if constexpr (reads) check_calibrator(given, reader, purpose);
+  });
   describe_poses(
       codec, "poses_now", given.poses_now, given.bones, OtherMarker::tool,
       "current poses: `tracker_from_bone` (`{\"L4\": pose, ...}`, those of the case's bones that are seen), "
@@ -295,14 +383,18 @@ void describe_case(Codec& codec, CaseValue& given, Purpose purpose) {
   if (codec.wants(given.tracker.sigma_mm > 0 || given.tracker.sigma_deg > 0))
     codec.object("tracker", given.tracker, "noise of the tracker's readings",
                  [](auto& inner, auto& noise) { describe_tracker(inner, noise); });
-  describe_picks(codec, given.picks, given.views, given.bones, given.calibrator.targets);
-  describe_lines(codec, given);
+  describe_picks(codec, given.picks, given.views, given.bones, given.calibrator.targets, purpose);
+  if (codec.wants(!given.models.empty()))
+    describe_models(codec, given.models, purpose == Purpose::registration, given.folder, given.bones);
+  codec.check([&](JsonReader& reader) {
+    if (purpose == Purpose::registration && given.models.empty())
+      reader.refuse(Reason::bad_value, "models", "is empty: name a volume or a surface");
+  });
+  describe_tunnels(codec, given);
+  describe_tool_lines(codec, given);
   codec.numbers("diameters_mm", given.diameters_mm, 10, {0.5, 30},
                 "of the balls; required for `phantom measure --from-scratch`, also beside a `calibrator`");
   if (codec.wants(!given.notes.empty())) codec.text_or_default("notes", given.notes, "ignored", {0, 100000});
-  codec.custom(
-      "models", false, {{"type", "array"}}, "to be registered, at most 20, see below",
-      [](JsonReader& reader) { reader.raw("models"); }, [] { return std::optional<Json>(); });
 }
 
 }  // namespace helicarm::pipeline::description

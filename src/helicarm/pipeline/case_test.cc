@@ -287,13 +287,13 @@ TEST_F(CaseFile, ToolLineOfAnUnknownTunnelIsRefused) {
 TEST_F(CaseFile, PhantomWithoutAFileNeedsItsDiameters) {
   json_["calibrator"] = nullptr;
   EXPECT_TRUE(write_file(folder_ / "case.json", json_.dump()).has_value());
-  const auto refused = read_phantom_case(folder_);
+  const auto refused = read_case(folder_, Purpose::phantom);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().message,
             "case.json: \"diameters_mm\": is missing: required where \"calibrator\" is null");
   json_["diameters_mm"] = {4, 6};
   EXPECT_TRUE(write_file(folder_ / "case.json", json_.dump()).has_value());
-  EXPECT_TRUE(read_phantom_case(folder_));
+  EXPECT_TRUE(read_case(folder_, Purpose::phantom));
 }
 
 TEST_F(CaseFile, ToolLineNeedsTwoPlaces) {

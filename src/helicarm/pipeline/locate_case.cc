@@ -74,12 +74,6 @@ Result initial_result(const Case& given, const CaseCalibration& calibration, con
   Result result = initial_result(given, options, std::move(views));
   append_warnings(result.warnings, calibration);
   append(result.notes, calibration.notes, Stage::calibrate);
-  result.joint_covariance = calibration.joint_covariance;
-  result.history = calibration.history;
-  result.entries = calibration.entries;
-  result.chi2 = calibration.chi2;
-  result.dof = calibration.dof;
-  result.variance_scale = calibration.variance_scale;
   result.timing_ms = calibration.timing_ms;
   return result;
 }
@@ -96,11 +90,13 @@ Expected<void> check_tunnel_ends(const Case& given) {
 
 }  // namespace
 
-Expected<Result> locate_case(const Case& given, const CaseCalibration& calibration, const RunOptions& options,
-                             const Progress& progress) {
+Expected<Result> locate_case(const Case& given, std::shared_ptr<const CaseCalibration> calibrated,
+                             const RunOptions& options, const Progress& progress) {
+  const CaseCalibration& calibration = *calibrated;
   if (auto valid = check_tunnel_ends(given); !valid) return tl::unexpected<Failure>(std::move(valid).error());
   progress.begin("locate");
   Result result = initial_result(given, calibration, options);
+  result.calibration = std::move(calibrated);
   const auto located = timed(result.timing_ms.locate, [&] {
     return observe_points(given, calibration, options.threads).map([&](std::vector<PointResult> points) {
       append(result.warnings,

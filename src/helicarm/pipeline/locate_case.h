@@ -9,8 +9,8 @@ namespace helicarm::pipeline {
 /// from `given` what may differ from the calibrated case: picks, tunnels, tool lines, poses and the tracker's
 /// noise. Fails with `bad_value` for a pick outside its image and a tunnel's end without picks; a refusal is
 /// in `Result::failure`.
-Expected<Result> locate_case(const Case& given, const CaseCalibration& calibration, const RunOptions& options,
-                             const Progress& progress = {});
+Expected<Result> locate_case(const Case& given, std::shared_ptr<const CaseCalibration> calibrated,
+                             const RunOptions& options, const Progress& progress = {});
 
 /// The result of a case that was refused before calibration; unreadable input (exit code 2) stays a failure.
 Expected<Result> result_of_refusal(const Case& given, Refusal refusal, const RunOptions& options);

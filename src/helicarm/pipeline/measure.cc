@@ -11,18 +11,11 @@ namespace {
 
 /// With the wall-clock time of `work`.
 template <class Work>
-Expected<Measurement> in_total(Work work) {
+Expected<Result> in_total(Work work) {
   std::optional<double> total;
   auto done = timed(total, work);
-  if (done) done->result.timing_ms.total = total;
+  if (done) done->timing_ms.total = total;
   return done;
-}
-
-Expected<Measurement> located(const Case& given, std::shared_ptr<const CaseCalibration> calibration,
-                              const RunOptions& options, const Progress& progress) {
-  return locate_case(given, *calibration, options, progress).map([&](Result result) {
-    return Measurement{std::move(calibration), std::move(result)};
-  });
 }
 
 /// Whether a calibration by the one options serves the others.
@@ -37,23 +30,20 @@ bool ask_for_one_calibration(const RunOptions& a, const RunOptions& b) {
 
 }  // namespace
 
-Expected<Measurement> measure(const Case& given, const RunOptions& options, const Progress& progress) {
-  return in_total([&]() -> Expected<Measurement> {
+Expected<Result> measure(const Case& given, const RunOptions& options, const Progress& progress) {
+  return in_total([&]() -> Expected<Result> {
     auto calibration = calibrate_case(given, options, progress);
-    if (!calibration)
-      return result_of_refusal(given, std::move(calibration).error(), options).map([](Result result) {
-        return Measurement{nullptr, std::move(result)};
-      });
-    return located(given, std::make_shared<const CaseCalibration>(*std::move(calibration)), options,
-                   progress);
+    if (!calibration) return result_of_refusal(given, std::move(calibration).error(), options);
+    return locate_case(given, std::make_shared<const CaseCalibration>(*std::move(calibration)), options,
+                       progress);
   });
 }
 
-Expected<Measurement> measure_again(const std::optional<Measurement>& earlier, const Case& changed,
-                                    const RunOptions& options, const Progress& progress) {
-  if (!earlier || !earlier->calibration || !ask_for_one_calibration(earlier->result.options, options))
+Expected<Result> measure_again(const std::optional<Result>& earlier, const Case& changed,
+                               const RunOptions& options, const Progress& progress) {
+  if (!earlier || !earlier->calibration || !ask_for_one_calibration(earlier->options, options))
     return measure(changed, options, progress);
-  return in_total([&] { return located(changed, earlier->calibration, options, progress); });
+  return in_total([&] { return locate_case(changed, earlier->calibration, options, progress); });
 }
 
 }  // namespace helicarm::pipeline

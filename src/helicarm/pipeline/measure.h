@@ -10,20 +10,14 @@
 
 namespace helicarm::pipeline {
 
-/// A case's calibration, and what follows from it.
-struct Measurement {
-  std::shared_ptr<const CaseCalibration> calibration;  ///< null: refused before
-  Result result;
-};
-
 /// The paper's method from images to tunnels. A refusal is in `Result::failure`, with all results before it;
 /// unreadable input (exit code 2) fails.
-Expected<Measurement> measure(const Case& given, const RunOptions& options, const Progress& progress = {});
+Expected<Result> measure(const Case& given, const RunOptions& options, const Progress& progress = {});
 
 /// As `measure`, of the same images, calibrator and plate, by the earlier calibration: picks, tunnels, tool
 /// lines, present poses and the tracker's noise may differ. Calibrates where there is no calibration, or one
 /// by another method or C-arm history than `options` ask for.
-Expected<Measurement> measure_again(const std::optional<Measurement>& earlier, const Case& changed,
-                                    const RunOptions& options, const Progress& progress = {});
+Expected<Result> measure_again(const std::optional<Result>& earlier, const Case& changed,
+                               const RunOptions& options, const Progress& progress = {});
 
 }  // namespace helicarm::pipeline

@@ -1,12 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <set>
+
+#include "helicarm/core/codec.h"
 #include "helicarm/geometry/pose_codec.h"
-#include "helicarm/pipeline/case_description.h"
-#include "helicarm/pipeline/registration_case.h"
+#include "helicarm/pipeline/case_model.h"
+#include "helicarm/pipeline/poses_json.h"
 
 /// Models, and the lines of their plans as tunnels, in case.json and plan.json.
 namespace helicarm::pipeline::description {
+
+inline constexpr std::array<std::string_view, 2> side_words{"left", "right"};
+
+template <class T, class Name>
+const T* find_named(const std::vector<T>& all, const std::string& name, Name name_of) {
+  const auto found = std::ranges::find(all, name, name_of);
+  return found == all.end() ? nullptr : &*found;
+}
+
+inline void take_name(const JsonReader& reader, std::set<std::string>& names, const std::string& name) {
+  if (!names.insert(name).second)
+    reader.refuse(Reason::name_clash, "name", fmt::format("\"{}\" is given twice", name));
+}
 
 inline constexpr std::size_t most_models = 20;
 inline constexpr Range hu_range{-32768, 32767};

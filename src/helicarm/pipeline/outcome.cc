@@ -71,7 +71,7 @@ Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& given, const Re
       const auto& end = result.points[result.tunnel_ends[i].end].place;
       tunnels.push_back(start && end
                             ? value_or_throw(guidance::plan_tunnel(plans[i].name, *start, *end,
-                                                                   result.joint_covariance, given.tracker))
+                                                                   joint_covariance(result), given.tracker))
                             : guidance::Tunnel{plans[i].name, {}, {}, {}, {}});
     }
     return tunnels;

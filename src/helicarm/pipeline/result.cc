@@ -9,6 +9,7 @@
 #include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/fiducials/candidates.h"
 #include "helicarm/fiducials/status_words.h"
+#include "helicarm/pipeline/calibrate_case.h"
 #include "helicarm/pipeline/diagnosis/advice.h"
 #include "helicarm/pipeline/view_parameters.h"
 
@@ -347,7 +348,23 @@ Json json_of(const std::optional<calibration::LearnedIntrinsics>& history) {
               {"principal_sigma", variation(*history->prior.principal)}};
 }
 
+void add_calibration(Json& json, const CaseCalibration& calibration) {
+  const auto if_known = [&](auto value) { return calibration.dof > 0 ? number(value) : Json(nullptr); };
+  json["calibration"] = {
+      {"joint_covariance",
+       calibration.joint_covariance.size() > 0 ? matrix(calibration.joint_covariance) : Json(nullptr)},
+      {"chi2", if_known(calibration.chi2)},
+      {"dof", calibration.dof > 0 ? Json(calibration.dof) : Json(nullptr)},
+      {"variance_scale", if_known(calibration.variance_scale)}};
+  json["machine"] = json_of(calibration.history);
+  json["acquisitions"] = calibration::acquisitions_json(calibration.entries);
+}
+
 }  // namespace
+
+Eigen::MatrixXd joint_covariance(const Result& result) {
+  return result.calibration ? result.calibration->joint_covariance : Eigen::MatrixXd();
+}
 
 Json to_json(const Result& result) {
   Json json = {{"format", "helicarm-result/1"}, {"status", result.failure ? "refused" : "ok"}};
@@ -365,14 +382,7 @@ Json to_json(const Result& result) {
       {"measured", result.calibrator.measured},
       {"balls", list_of(result.calibrator.balls)}};
   json["views"] = list_of(result.views);
-  json["calibration"] = {
-      {"joint_covariance",
-       result.joint_covariance.size() > 0 ? matrix(result.joint_covariance) : Json(nullptr)},
-      {"chi2", result.dof > 0 ? number(result.chi2) : Json(nullptr)},
-      {"dof", result.dof > 0 ? Json(result.dof) : Json(nullptr)},
-      {"variance_scale", result.dof > 0 ? number(result.variance_scale) : Json(nullptr)}};
-  json["machine"] = json_of(result.history);
-  json["acquisitions"] = calibration::acquisitions_json(result.entries);
+  add_calibration(json, result.calibration ? *result.calibration : CaseCalibration());
   json["points"] = list_of(result.points, result.views, result.bones);
   json["accuracy"] = json_of(result.accuracy);
   json["tunnels"] = Json::array();

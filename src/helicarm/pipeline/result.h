@@ -52,10 +52,10 @@ struct RunOptions {
 struct ViewResult {
   std::string name;
   std::shared_ptr<const xray::XrayImage> xray_image;
-  std::optional<detection::ImageDots> dots;
   std::optional<rectification::Rectification> rectification;
   std::optional<fiducials::LabelledFiducials> found;  ///< with residuals and rejections after calibration
   std::optional<calibration::CalibratedView> calibrated;
+  std::optional<detection::ImageDots> dots = {};
   std::vector<fiducials::GuessedLabel> guessed = {};  ///< the best labelling where it was refused
 };
 
@@ -112,7 +112,9 @@ struct CalibratorSource {
   std::vector<phantom::CalibratorBall> balls;
 };
 
-/// Result of `helicarm run`; after a refusal, all results computed before it.
+struct CaseCalibration;
+
+/// Measurement of a case (`helicarm run`); after a refusal, all results computed before it.
 struct Result {
   RunOptions options;
   std::optional<Failure> failure;
@@ -122,12 +124,7 @@ struct Result {
   CalibratorSource calibrator;
   std::vector<guidance::Bone> bones;  ///< of the case
   std::vector<ViewResult> views;
-  Eigen::MatrixXd joint_covariance;  ///< of all views' parameters; as CalibratedView::covariance
-  double chi2 = 0;                   ///< of all views together
-  int dof = 0;                       ///< 0: not computed
-  double variance_scale = 1;         ///< as CalibrationResult::variance_scale
-  std::optional<calibration::LearnedIntrinsics> history;  ///< from the C-arm history, if given
-  std::vector<calibration::HistoryEntry> entries;         ///< of this case, for the C-arm history
+  std::shared_ptr<const CaseCalibration> calibration;  ///< null: not reached
   std::vector<PointResult> points;
   localization::Accuracy accuracy;
   std::vector<TunnelEnds> tunnel_ends;
@@ -138,6 +135,9 @@ struct Result {
   std::vector<guidance::Verification> verifications;
   Timing timing_ms;
 };
+
+/// Of all views' parameters (`Calibration::joint_covariance`); empty: not computed.
+Eigen::MatrixXd joint_covariance(const Result& result);
 
 /// result.json (docs/formats.md): all keys, null if not computed.
 Json to_json(const Result& result);

@@ -95,7 +95,7 @@ BiplaneImageTest biplane_test_of(const pipeline::Case& given, const phantom::Cal
   pipeline::RunOptions options;
   options.method = method;
   options.threads = 1;
-  const pipeline::Result result = value_or_throw(pipeline::measure(given, options)).result;
+  const pipeline::Result result = value_or_throw(pipeline::measure(given, options));
   if (result.failure) return {1, no_errors, no_errors, no_errors};
   std::vector<double> fre, centre, on_udcsc;
   for (const pipeline::ViewResult& view : result.views)

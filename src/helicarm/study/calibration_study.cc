@@ -62,7 +62,7 @@ CalibrationTest measured(const pipeline::Case& given, const phantom::Calibrator&
   pipeline::RunOptions options;
   options.method = method;
   options.threads = 1;
-  const pipeline::Result result = value_or_throw(pipeline::measure(given, options)).result;
+  const pipeline::Result result = value_or_throw(pipeline::measure(given, options));
   if (result.failure) return test;
   test.refused = 0;
   const localization::Statistics& fre = result.accuracy.fre_mm;

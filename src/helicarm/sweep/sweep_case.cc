@@ -2,14 +2,11 @@
 #include "helicarm/sweep/sweep_case.h"
 
 #include <algorithm>
-#include <regex>
-#include <set>
 
 #include <fmt/format.h>
 
 #include "helicarm/case_registration/follow_case.h"
-#include "helicarm/pipeline/case_json.h"
-#include "helicarm/pipeline/registration_case.h"
+#include "helicarm/pipeline/case_frames.h"
 
 namespace helicarm::sweep {
 namespace {
@@ -17,38 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 using case_registration::FrameRange;
 
-/// Takes "frames" out of every view: the rest is a case like any other. Empty: one image.
-std::vector<std::string> take_frames(Json& json, const std::string& origin) {
-  std::vector<std::string> frames;
-  if (!json.is_object() || !json.contains("views") || !json["views"].is_array()) return frames;
-  for (Json& view : json["views"]) {
-    std::string& of_view = frames.emplace_back();
-    if (!view.is_object()) continue;
-    const std::string where = fmt::format("{}: views[{}]", origin, frames.size() - 1);
-    if (const auto found = view.find("frames"); found != view.end() && !found->is_null()) {
-      if (!found->is_string())
-        throw BadInput(Reason::bad_value,
-                       fmt::format("{}: \"frames\" is not a text: \"all\" or \"A-B[:STEP]\"", where));
-      of_view = found->get<std::string>();
-      if (of_view.empty()) throw BadInput(Reason::bad_value, fmt::format("{}: \"frames\" is empty", where));
-      if (const auto frame = view.find("frame"); frame != view.end() && !frame->is_null())
-        throw BadInput(Reason::bad_value,
-                       fmt::format("{}: \"frame\" cannot be combined with \"frames\"", where));
-    }
-    view.erase("frames");
-  }
-  return frames;
-}
-
-bool is_numbered(const fs::path& image) {
-  return image.filename().string().find("{frame") != std::string::npos;
-}
-
-/// The view at one frame: the numbered file, or that frame of its file.
 pipeline::CaseView at_number(const pipeline::CaseView& view, int number) {
-  pipeline::RegistrationCase one;
-  one.base.views = {view};
-  return value_or_throw(pipeline::at_frame(std::move(one), number)).base.views.front();
+  return value_or_throw(pipeline::at_number(view, number));
 }
 
 /// Numbers of the files that exist.
@@ -94,7 +61,7 @@ void warn_of_gaps(const std::vector<int>& numbers, const std::string& view, std:
 
 std::vector<int> numbers_of(SweepCase& read, const pipeline::CaseView& view, const std::string& frames) {
   const bool all = frames == "all";
-  if (is_numbered(view.image))
+  if (pipeline::is_numbered(view))
     return all ? numbers_of_files(view)
                : value_or_throw(case_registration::frame_range_from(frames)).numbers();
   auto& file = read.files[view.image];
@@ -109,15 +76,17 @@ std::vector<int> numbers_of(SweepCase& read, const pipeline::CaseView& view, con
   return range.numbers();
 }
 
-void add_frames(SweepCase& read, const pipeline::CaseView& view, const std::string& frames) {
-  if (frames.empty()) {
+void add_frames(SweepCase& read, pipeline::CaseView view) {
+  const std::string frames = view.frames.value_or("");
+  if (!view.frames) {
     read.frames.push_back({view, view.name, view.frame.value_or(1)});
     return;
   }
+  view.frames.reset();  // each frame is a view like any other
   std::string first;
   int missing = 0;
   const std::vector<int> numbers = numbers_of(read, view, frames);
-  if (frames == "all" && is_numbered(view.image)) warn_of_gaps(numbers, view.name, read.base.warnings);
+  if (frames == "all" && pipeline::is_numbered(view)) warn_of_gaps(numbers, view.name, read.base.warnings);
   if (read.frames.size() + numbers.size() > pipeline::most_frames)
     throw BadInput(Reason::bad_value,
                    fmt::format("{}: more than {} images in the case", view.name, pipeline::most_frames));
@@ -132,19 +101,10 @@ void add_frames(SweepCase& read, const pipeline::CaseView& view, const std::stri
                                                      view.name, missing, numbers.size(), first));
 }
 
-}  // namespace
-
-namespace {
-
 Expected<SweepCase> read_runs(const fs::path& path, pipeline::Purpose purpose) {
   return guarded([&] {
-    const fs::path file = fs::absolute(pipeline::case_file(path));
-    const std::string origin = file.filename().string();
-    Json json = value_or_throw(read_json(file));
-    const std::vector<std::string> frames = take_frames(json, origin);
-    SweepCase read;
-    read.base = pipeline::case_of(json, origin, file.parent_path(), purpose);
-    for (std::size_t i = 0; i < read.base.views.size(); ++i) add_frames(read, read.base.views[i], frames[i]);
+    SweepCase read{value_or_throw(pipeline::read_case(path, purpose)), {}, {}};
+    for (const pipeline::CaseView& view : read.base.views) add_frames(read, view);
     return read;
   });
 }

@@ -8,7 +8,7 @@
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/exchange/run_geometry.h"
-#include "helicarm/pipeline/case_json.h"
+#include "helicarm/pipeline/case.h"
 #include "helicarm/sweep/sweep.h"
 
 namespace helicarm::sweep {

@@ -9,6 +9,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/exchange/import_matrix.h"
+#include "helicarm/pipeline/case_frames.h"
 #include "helicarm/track/body_series.h"
 #include "helicarm/track/growing_table.h"
 #include "helicarm/track/rows.h"
@@ -23,19 +24,17 @@ using case_registration::CaseFollower;
 using case_registration::RegisteredFrame;
 using registration::Registration;
 
-std::vector<SequenceView> views_of(const pipeline::RegistrationCase& given) {
+std::vector<SequenceView> views_of(const pipeline::Case& given) {
   std::vector<SequenceView> views;
-  for (std::size_t i = 0; i < given.base.views.size(); ++i) {
-    SequenceView& view = views.emplace_back(SequenceView{given.base.views[i], 0, {}});
-    if (i < given.frame_offsets.size()) view.frame_offset = given.frame_offsets[i];
-    if (!given.cameras.empty())
-      view.image_size = value_or_throw(exchange::import_matrix(given.cameras[i])).image_size;
+  for (const pipeline::CaseView& images : given.views) {
+    SequenceView& view = views.emplace_back(SequenceView{images, images.frame_offset.value_or(0), {}});
+    if (images.camera) view.image_size = value_or_throw(exchange::import_matrix(*images.camera)).image_size;
   }
   return views;
 }
 
 /// A text that two sequences share only if they are the same.
-std::string identity_of(const pipeline::RegistrationCase& given, const case_registration::FrameRange& range,
+std::string identity_of(const pipeline::Case& given, const case_registration::FrameRange& range,
                         const case_registration::RegisterOptions& options, const CaseFollower& follower) {
   std::string text =
       fmt::format("{} {} {} {} {} {} {}", range.first, range.last, range.step, options.search.shift_mm,
@@ -48,7 +47,7 @@ std::string identity_of(const pipeline::RegistrationCase& given, const case_regi
     for (const double value : projection.reshaped()) text += fmt::format(" {}", value);
   }
   for (const pipeline::CaseModel& model : given.models)
-    text += "\n" + model.name + pipeline::to_json(model, given.base.folder).dump();
+    text += "\n" + model.name + pipeline::to_json(model, given.folder).dump();
   for (const Eigen::Vector3d& centre : follower.centres())
     text += fmt::format("\n{} {} {}", centre.x(), centre.y(), centre.z());
   return xray::digest(text);
@@ -141,8 +140,7 @@ void estimate_motion(ModelSequence& sequence, const std::vector<Eigen::Vector3d>
   sequence.relative = relative_motions(sequence.bodies);
 }
 
-Expected<ModelSequence> follow_models(const pipeline::RegistrationCase& given,
-                                      const case_registration::FrameRange& range,
+Expected<ModelSequence> follow_models(const pipeline::Case& given, const case_registration::FrameRange& range,
                                       const case_registration::RegisterOptions& options,
                                       const FollowOptions& follow,
                                       const std::function<void(double share)>& on_frame,

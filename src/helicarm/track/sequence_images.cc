@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
-#include "helicarm/pipeline/registration_case.h"
+#include "helicarm/pipeline/case_frames.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/xray/run_polarity.h"
 #include "helicarm/xray/stated_size.h"
@@ -15,16 +15,6 @@ namespace helicarm::track {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool is_numbered(const fs::path& image) {
-  return image.filename().string().find("{frame") != std::string::npos;
-}
-
-pipeline::CaseView at_number(const SequenceView& view, int frame) {
-  pipeline::RegistrationCase one;
-  one.base.views = {view.images};
-  return value_or_throw(pipeline::at_frame(std::move(one), frame + view.frame_offset)).base.views.front();
-}
 
 void check_size(const std::string& view, int number, const Eigen::Vector2i& size,
                 const std::optional<Eigen::Vector2i>& expected) {
@@ -57,7 +47,7 @@ Expected<SequenceImages> SequenceImages::open(std::span<const SequenceView> view
         throw BadInput(Reason::bad_value,
                        fmt::format("{}: frame {} with \"frame_offset\" {} is image {}", view.images.name,
                                    frames.first, view.frame_offset, lowest));
-      if (!is_numbered(view.images.image)) {
+      if (!pipeline::is_numbered(view.images)) {
         file = value_or_throw(xray::ImageFile::open(view.images.image));
         if (lowest < 1 || highest > file->frames())
           throw BadInput(Reason::bad_value,
@@ -68,7 +58,8 @@ Expected<SequenceImages> SequenceImages::open(std::span<const SequenceView> view
       }
       for (int i = 0; i < frames.count(); ++i) {
         const int frame = frames.first + i * frames.step;
-        const fs::path path = at_number(view, frame).image;
+        const fs::path path =
+            value_or_throw(pipeline::at_number(view.images, frame + view.frame_offset)).image;
         if (!fs::exists(path)) {
           if (missing++ == 0) first = path.filename().string();
           continue;
@@ -90,7 +81,8 @@ Expected<SequenceImages> SequenceImages::open(std::span<const SequenceView> view
 xray::XrayImage SequenceImages::as_read(std::size_t view, int frame) const {
   const SequenceView& asked = views_[view];
   return files_[view] ? value_or_throw(files_[view]->read(asked.images.name, frame + asked.frame_offset))
-                      : value_or_throw(pipeline::image_of(at_number(asked, frame)));
+                      : value_or_throw(pipeline::image_of(
+                            value_or_throw(pipeline::at_number(asked.images, frame + asked.frame_offset))));
 }
 
 void SequenceImages::decide_polarity(const case_registration::FrameRange& frames) {

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "helicarm/pipeline/case_description.h"
+
+namespace helicarm::pipeline {
+namespace {
+
+/// A registration's case with these keys beside two cameras.
+Expected<Case> registration_case(const std::string& keys, Purpose purpose = Purpose::registration) {
+  const Json json = Json::parse(R"({"format": "helicarm-case/2", "views": [
+      {"name": "A", "image": "a.png", "camera": "a.json"}, {"name": "B", "image": "b.png", "camera": "b.json"}])" +
+                                keys + "}");
+  return case_from_json(json, "case.json", "/case", purpose);
+}
+
+TEST(CaseModel, ARegistrationNeedsOne) {
+  EXPECT_TRUE(registration_case(R"(, "models": [{"name": "femur", "surface": "f.stl"}])"));
+  for (const char* none : {R"(, "models": [])", R"(, "models": null)", ""})
+    EXPECT_EQ(registration_case(none).error().reason, Reason::bad_value) << none;
+}
+
+TEST(CaseModel, WrongOnesAreRefusedByEveryCommand) {
+  for (const char* wrong :
+       {R"(, "models": "femur")", R"(, "models": {"name": "femur"})", R"(, "models": [{"name": "femur"}])"}) {
+    EXPECT_FALSE(registration_case(wrong)) << wrong;
+    const Json json = Json::parse(
+        R"({"format": "helicarm-case/2", "calibrator": "udcsc", "views": [{"name": "A", "image": "a.png"}])" +
+        std::string(wrong) + "}");
+    EXPECT_FALSE(case_from_json(json, "case.json", "/case")) << wrong;
+  }
+}
+
+TEST(CaseModel, CamerasOfOtherProgramsAreForARegistrationAndForAllViews) {
+  const char* models = R"(, "models": [{"name": "femur", "surface": "f.stl"}])";
+  const auto read = registration_case(models);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_TRUE(brings_cameras(*read));
+  const auto measured = registration_case(models, Purpose::run);
+  ASSERT_FALSE(measured);
+  EXPECT_NE(measured.error().message.find("helicarm register"), std::string::npos);
+  const Json one = Json::parse(R"({"format": "helicarm-case/2", "calibrator": "udcsc", "views": [
+      {"name": "A", "image": "a.png", "camera": "a.json"}, {"name": "B", "image": "b.png"}],
+      "models": [{"name": "femur", "surface": "f.stl"}]})");
+  EXPECT_EQ(case_from_json(one, "case.json", "/case", Purpose::registration).error().reason,
+            Reason::bad_value);
+}
+
+TEST(CaseModel, ACaseWithModelsAndLinesIsWrittenAsItIsRead) {
+  const auto read =
+      registration_case(R"(, "models": [{"name": "femur", "volume": "ct.nrrd", "window_hu": [150, 3000],
+      "moves_with": "femur", "plan": "plan.mrk.json", "start": {"landmarks": "points.csv"}}],
+      "tunnels": [{"name": "ACL", "model": "femur", "diameter_mm": 8, "bone": "femur"}])");
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read->model_tunnels.size(), 1u);
+  EXPECT_TRUE(read->tunnels.empty());
+  const Json written = to_json(*read);
+  const auto again = case_from_json(written, "case.json", "/case", Purpose::registration);
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(to_json(*again), written);
+  EXPECT_EQ(again->models[0].landmarks, "/case/points.csv");
+  EXPECT_EQ(again->model_tunnels[0].line, "ACL");
+}
+
+/// The tunnel of a case with a model, or why it is refused.
+Expected<ModelTunnelPlan> tunnel_from(const char* tunnel, bool outlined = true) {
+  const Json json = Json::parse(tunnel);
+  CaseModel model;
+  model.name = "femur", model.volume = "ct.nrrd", model.plan = "plan.mrk.json", model.moves_with = "femur";
+  if (outlined) model.window_hu = Eigen::Vector2d(150, 3000);
+  return guarded([&] {
+    JsonReader reader(json, "tunnels[0]");
+    std::vector<CaseModel> models{model};
+    ModelTunnelPlan read;
+    read.name = reader.text("name");
+    FromJson codec(reader);
+    description::describe_model_line(codec, read, models, guidance::knee_bones());
+    reader.finish();
+    return read;
+  });
+}
+
+TEST(ModelTunnel, ALineOfAPlanBecomesATunnelWithADiameter) {
+  const auto tunnel = tunnel_from(
+      R"({"name": "ACL", "bone": "femur", "model": "femur", "line": "F", "diameter_mm": 8, "bridge_mm": 3,
+          "enter_at": "end"})");
+  ASSERT_TRUE(tunnel) << tunnel.error().message;
+  EXPECT_EQ(tunnel->line, "F");
+  EXPECT_EQ(tunnel->diameter_mm, 8);
+  EXPECT_EQ(tunnel->bridge_mm, 3);
+  EXPECT_EQ(tunnel->enter_at, TunnelEnd::end);
+}
+
+TEST(ModelTunnel, TheUsualBridgeIsAskedForAndNoDiameterIsAssumed) {
+  const auto tunnel = tunnel_from(R"({"name": "F", "model": "femur", "bridge_mm": null})");
+  ASSERT_TRUE(tunnel) << tunnel.error().message;
+  EXPECT_EQ(tunnel->line, "F");
+  EXPECT_FALSE(tunnel->diameter_mm);
+  EXPECT_EQ(tunnel->bridge_mm, 2);
+}
+
+TEST(ModelTunnel, AnotherModelAnotherBoneAndABodyWithoutAnOutlineAreRefused) {
+  EXPECT_EQ(tunnel_from(R"({"name": "F", "model": "tibia"})").error().reason, Reason::bad_value);
+  EXPECT_EQ(tunnel_from(R"({"name": "F", "model": "femur", "bone": "tibia"})").error().reason,
+            Reason::bad_value);
+  EXPECT_EQ(tunnel_from(R"({"name": "F", "model": "femur", "diameter_mm": 8})", false).error().reason,
+            Reason::bad_value);
+  EXPECT_EQ(tunnel_from(R"({"name": "F", "model": "femur", "diameter": 8})").error().reason,
+            Reason::unknown_key);
+}
+
+}  // namespace
+}  // namespace helicarm::pipeline
