@@ -18,6 +18,7 @@ PYBIND11_MODULE(_helicarm, module) {
   add_sweep(module);
   add_track(module);
   add_migration(module);
+  add_segmentation(module);
   add_phantom_calibration(module);
 }
 

@@ -31,6 +31,8 @@ void add_sweep(py::module_& module);
 void add_track(py::module_& module);
 /// migration.
 void add_migration(py::module_& module);
+/// segment.
+void add_segmentation(py::module_& module);
 /// measure_phantom, MeasuredPhantom, verify_phantom.
 void add_phantom_calibration(py::module_& module);
 

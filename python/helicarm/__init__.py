@@ -8,7 +8,7 @@ from ._helicarm import (  # noqa: F401
     CArmPrior, Calibration, Calibrator, DistortionMap, IntrinsicsPrior, LocatedPoint, MeasuredPhantom, Plate,
     Rectification, Result, ResultPoint, Sweep, Track, ViewPoints, XrayImage, __version__, c_arm_report, calibrate,
     check_c_arm, detect, label, measure, measure_phantom, migration, read_image, rectify, register, register_sequence,
-    run_case, simulate_case, sweep, track, verify_phantom)
+    run_case, segment, simulate_case, sweep, track, verify_phantom)
 from .errors import HelicarmError, InputError, RefusedError  # noqa: F401
 
 __all__ = [
@@ -16,7 +16,7 @@ __all__ = [
     "LocatedPoint", "MeasuredPhantom", "Plate", "Rectification", "RefusedError", "Result", "ResultPoint", "Sweep",
     "Track", "ViewPoints", "XrayImage", "c_arm_report", "calibrate", "check_c_arm", "detect", "figures", "label",
     "measure", "measure_phantom", "migration", "read_image", "rectify", "register", "register_sequence",
-    "run_case", "simulate_case", "sweep", "track", "verify_phantom"]
+    "run_case", "segment", "simulate_case", "sweep", "track", "verify_phantom"]
 
 
 def __getattr__(name):

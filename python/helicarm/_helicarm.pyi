@@ -369,6 +369,11 @@ def track(case: _Path, *, frames: str, out: Optional[_Path] = None, resume: bool
 def migration(first: _Path, second: _Path, *, segments: Optional[Mapping[str, Sequence[str]]] = None, reference: str = "",
               axes: Optional[_Path] = None, frame: Optional[int] = None, double: Sequence[Tuple[_Path, _Path]] = ...,
               by_name: bool = False, out: Optional[_Path] = None) -> _Dict: ...
+def segment(ct: _Path, seeds: Mapping[str, Sequence[float]] = ..., *, space: str = "LPS", threshold_hu: Optional[float] = None,
+            gap_mm: float = ..., neck: float = ..., label_map: Optional[_Path] = None,
+            labels: Mapping[str, Sequence[int]] = ..., voxel_mm: Optional[Sequence[float]] = None,
+            tiff_offset_hu: float = 0.0, out: Optional[_Path] = None,
+            progress: Optional[Callable[[str], Any]] = None) -> _Dict: ...
 def measure_phantom(folder: _Path, *, distances: Sequence[Tuple[_Ball, _Ball, float]] = ..., distance_is: str = "centres",
                     distance_sigma_mm: float = ..., from_scratch: bool = False, threads: int = 0,
                     progress: Optional[Callable[[str], Any]] = None) -> MeasuredPhantom: ...

@@ -11,6 +11,7 @@
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/rectify.h"
+#include "helicarm/volume/label_map.h"
 #include "helicarm/volume/read_volume.h"
 #include "helicarm/volume/tiff_stack.h"
 
@@ -66,14 +67,8 @@ image::Image<std::uint8_t> usable_of(const pipeline::LabelledView& view,
   return usable;
 }
 
-bool is_stack(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return extension == ".tif" || extension == ".tiff";
-}
-
 volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& given, double offset_hu) {
-  if (!is_stack(path)) return value_or_throw(volume::read_volume(path));
+  if (!volume::is_tiff_stack(path)) return value_or_throw(volume::read_volume(path));
   if (!given.voxel_mm)
     throw BadInput(Reason::bad_value,
                    fmt::format("models: \"{}\": \"voxel_mm\" is missing: a TIFF stack needs it", given.name));
@@ -206,13 +201,18 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& given, bool with_bon
       return {std::move(model), std::move(bone)};
     }
     if (!given.volume) return {};
-    if (given.voxel_mm && !is_stack(*given.volume))
+    if (given.voxel_mm && !volume::is_tiff_stack(*given.volume))
       throw BadInput(Reason::bad_value,
                      fmt::format("models: \"{}\": \"voxel_mm\" is for TIFF stacks only; {} states its own",
                                  given.name, given.volume->filename().string()));
     const volume::Volume volume = volume_at(*given.volume, given, given.tiff_offset_hu);
     std::optional<volume::Volume> mask;
-    if (given.mask) mask = volume_at(*given.mask, given, 0);
+    if (given.mask) {
+      mask = volume_at(*given.mask, given, 0);
+      value_or_throw(volume::choose_label(
+          *mask, given.mask_label,
+          fmt::format("models: \"{}\": {}", given.name, given.mask->filename().string()), "\"mask_label\""));
+    }
     // A stack has no frame of its own: a mask drawn on it in another program brings that program's.
     if (mask && given.voxel_mm && has_voxels_of(*mask, *given.voxel_mm))
       mask->patient_from_voxel = volume.patient_from_voxel;

@@ -115,6 +115,10 @@ constexpr ReasonEntry entries[] = {
     {Reason::body_ill_conditioned, "body_ill_conditioned", refused},
     {Reason::cameras_not_in_step, "cameras_not_in_step", refused},
     {Reason::frames_missing, "frames_missing", refused},
+    {Reason::seed_off_bone, "seed_off_bone", refused},
+    {Reason::seeds_in_one_bone, "seeds_in_one_bone", refused},
+    {Reason::bones_in_contact, "bones_in_contact", refused},
+    {Reason::bone_cut_off, "bone_cut_off", refused},
 };
 
 constexpr auto reasons = [] {
@@ -127,7 +131,7 @@ constexpr auto reasons = [] {
 static_assert([] {
   for (std::size_t i = 0; i < reasons.size(); ++i)
     if (reasons[i] != Reason(i)) return false;
-  return reasons.back() == Reason::frames_missing;
+  return reasons.back() == Reason::bone_cut_off;
 }());
 
 const ReasonEntry& entry(Reason reason) { return entries[std::size_t(reason)]; }

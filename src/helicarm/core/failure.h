@@ -122,6 +122,11 @@ enum class Reason {
   body_ill_conditioned,
   cameras_not_in_step,
   frames_missing,
+  // Bones of a CT that are chosen by seeds.
+  seed_off_bone,
+  seeds_in_one_bone,
+  bones_in_contact,
+  bone_cut_off,
 };
 
 /// Machine-readable code of a reason, e.g. "too_few_fiducials".

@@ -31,6 +31,7 @@ struct CaseModel {
   std::optional<geometry::RigidTransform> world_from_model;  ///< start
   std::optional<std::filesystem::path> landmarks;            ///< start: CSV of points that are also picked
   std::optional<std::filesystem::path> plan;                 ///< Slicer markups
+  std::optional<int> mask_label;                             ///< of the mask; nothing: it has only one
 };
 
 /// Bird et al. (2011): the least bridge of bone between a tunnel and the bone's surface, mm.

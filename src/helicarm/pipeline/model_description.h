@@ -27,6 +27,7 @@ inline void take_name(const JsonReader& reader, std::set<std::string>& names, co
 
 inline constexpr std::size_t most_models = 20;
 inline constexpr Range hu_range{-32768, 32767};
+inline constexpr int volume_label_limit = 65535;
 
 /// One of `bones`. An unset name is not written.
 template <class Codec, class Name>
@@ -78,6 +79,8 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
       "mask", model.mask, folder,
       "path of a volume on the same grid; what is not 0 is the body. Of a TIFF stack: another stack, or "
       "a volume with as many voxels of `voxel_mm`");
+  codec.integer("mask_label", model.mask_label, 1, volume_label_limit,
+                "label of the body where the mask is a label map; with several labels it must be given");
   codec.vector(
       "window_hu", model.window_hu, hu_range,
       "`[low, high]`: the body's voxels, within the mask if there is one. Without mask and window the "
@@ -108,6 +111,7 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
     const auto refuse = [&](const char* key, const char* how) { reader.refuse(Reason::bad_value, key, how); };
     if (model.volume && model.surface) refuse("surface", "cannot be combined with \"volume\"");
     if (model.mask && !model.volume) refuse("mask", "needs a \"volume\"");
+    if (model.mask_label && !model.mask) refuse("mask_label", "needs a \"mask\"");
     if (model.window_hu && !(model.window_hu->x() < model.window_hu->y()))
       refuse("window_hu", "must be two increasing numbers");
     if (model.window_hu && !model.volume) refuse("window_hu", "needs a \"volume\"");

@@ -2,11 +2,11 @@
 #include "helicarm/pipeline/tar_gz.h"
 
 #include <algorithm>
-#include <array>
 #include <stdexcept>
 
 #include <fmt/format.h>
-#include <zlib.h>
+
+#include "helicarm/volume/gzip.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -37,31 +37,6 @@ std::string ustar_header(const ArchivedFile& file) {
   return header;
 }
 
-std::string gzip(std::string& bytes) {
-  z_stream stream{};
-  constexpr int gzip_format = 15 + 16;
-  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, gzip_format, 8, Z_DEFAULT_STRATEGY) != Z_OK)
-    throw std::bad_alloc();
-  std::string packed;
-  std::array<char, 1 << 16> chunk;
-  std::size_t at = 0;
-  int state = Z_OK;
-  while (state != Z_STREAM_END) {
-    const std::size_t count = std::min<std::size_t>(bytes.size() - at, 1u << 30);  // zlib counts in 32 bits
-    stream.next_in = reinterpret_cast<Bytef*>(bytes.data() + at);
-    stream.avail_in = static_cast<uInt>(count);
-    at += count;
-    do {
-      stream.next_out = reinterpret_cast<Bytef*>(chunk.data());
-      stream.avail_out = chunk.size();
-      state = deflate(&stream, at == bytes.size() ? Z_FINISH : Z_NO_FLUSH);
-      packed.append(chunk.data(), chunk.size() - stream.avail_out);
-    } while (stream.avail_out == 0);
-  }
-  deflateEnd(&stream);
-  return packed;
-}
-
 }  // namespace
 
 std::string tar_gz(std::span<const ArchivedFile> files) {
@@ -71,7 +46,7 @@ std::string tar_gz(std::span<const ArchivedFile> files) {
     tar.resize((tar.size() + tar_block - 1) / tar_block * tar_block, '\0');
   }
   tar.append(2 * tar_block, '\0');
-  return gzip(tar);
+  return volume::gzip(tar);
 }
 
 }  // namespace helicarm::pipeline

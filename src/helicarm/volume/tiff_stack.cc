@@ -34,6 +34,11 @@ void check_scale(const image::TiffScale& scale, const Eigen::Vector3d& voxel_mm,
 
 }  // namespace
 
+bool is_tiff_stack(const std::filesystem::path& path) {
+  const std::string extension = small_letters(path.extension().string());
+  return extension == ".tif" || extension == ".tiff";
+}
+
 Expected<Volume> tiff_stack(const std::filesystem::path& path, const Eigen::Vector3d& voxel_mm,
                             double offset_hu) {
   return guarded([&] {

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "helicarm/segmentation/distances.h"
+
+namespace helicarm::segmentation {
+
+/// Voxels of the grid on which a segmentation works.
+inline constexpr std::uint8_t empty = 0, dense = 1, cavity = 2;
+
+/// Marks as `cavity` what dense voxels enclose, such as marrow. Gaps of the wall up to twice `gap_mm` wide
+/// count as closed for a cavity that is wider than that. On the grid's faces, where a bone may be cut off, a
+/// cavity is what the face's own edges do not reach.
+void fill_cavities(volume::ByteGrid& bone, const ChamferSteps& steps, double gap_mm,
+                   const pipeline::Progress& progress);
+
+}  // namespace helicarm::segmentation

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/segmentation/segment.h"
+
+#include <limits>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/segmentation/scene_test.h"
+#include "helicarm/simulation/knee.h"
+
+namespace helicarm::segmentation {
+namespace {
+
+using Eigen::Vector3d;
+using testing::ElementsAre, testing::HasSubstr, testing::IsEmpty;
+
+const Seed on_upper{"upper", {0, 0, 46}}, on_lower{"lower", {1, 0, -45}};
+
+Failure refusal_of(const TestCt& ct, const std::vector<Seed>& seeds, const SegmentOptions& options = {}) {
+  const auto made = segment(ct.volume, seeds, options);
+  EXPECT_FALSE(made);
+  return made ? Failure{Reason::usage, "not refused"} : made.error();
+}
+
+const TestCt& plain_ct() {
+  static const TestCt ct = ct_of({upper, lower}, {1, 1, 1});
+  return ct;
+}
+
+TEST(Segment, OneClickSeparatesABoneFromTheOneItTouches) {
+  const auto made = segment(plain_ct().volume, std::vector{on_lower}, {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made->threshold_hu, 200);
+  EXPECT_GT(dice(plain_ct(), 2, *made, 1), 0.96);
+  ASSERT_EQ(made->bones.size(), 1U);
+  const Bone& bone = made->bones[0];
+  EXPECT_NEAR(bone.volume_cm3, lower.volume_cm3(), 0.09 * lower.volume_cm3());
+  EXPECT_LT((bone.centre - lower.centre).norm(), 0.5);
+  EXPECT_NEAR(bone.box.max().z(), 4, 1.1);
+  EXPECT_THAT(bone.cut_off, IsEmpty());
+  ASSERT_EQ(bone.contacts.size(), 1U);
+  EXPECT_EQ(bone.contacts[0].with, "");
+  EXPECT_LT((bone.contacts[0].at - Vector3d(0, 0, 3.5)).norm(), 4);
+  EXPECT_THAT(made->warnings, IsEmpty());
+}
+
+TEST(Segment, EachClickIsABone) {
+  const auto made = segment(plain_ct().volume, std::vector{on_upper, on_lower}, {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_GT(dice(plain_ct(), 1, *made, 1), 0.96);
+  EXPECT_GT(dice(plain_ct(), 2, *made, 2), 0.96);
+  EXPECT_EQ(made->bones[0].contacts.at(0).with, "lower");
+  EXPECT_EQ(made->bones[1].contacts.at(0).with, "upper");
+}
+
+TEST(Segment, ThickSlicesOfATurnedVolume) {
+  const Eigen::Matrix3d turn = geometry::rotation_from_vector({0.5, -0.3, 0.8});
+  Eigen::Matrix3d left_handed = turn;
+  left_handed.col(1) *= -1;
+  const TestCt ct = ct_of({upper, lower}, {0.9, 0.8, 2}, left_handed, {40, 40, 60});
+  const auto made = segment(ct.volume, std::vector{on_upper, on_lower}, {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_GT(dice(ct, 1, *made, 1), 0.94);
+  EXPECT_GT(dice(ct, 2, *made, 2), 0.94);
+  EXPECT_LT((made->bones[0].centre - upper.centre).norm(), 0.6);
+}
+
+TEST(Segment, AHoleInTheCortexDoesNotOpenTheMarrow) {
+  const auto hole = [](const Vector3d& p) { return std::hypot(p.x(), p.z() - 25) < 0.8; };
+  const TestCt ct = ct_of({upper}, {0.8, 0.8, 0.8}, Eigen::Matrix3d::Identity(), {22, 22, 50}, hole);
+  const auto made = segment(ct.volume, std::vector{on_upper}, {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_GT(dice(ct, 1, *made, 1), 0.95);
+  const auto open = segment(ct.volume, std::vector{on_upper}, {.gap_mm = 0});
+  ASSERT_TRUE(open);
+  EXPECT_LT(open->bones[0].volume_cm3, 0.6 * made->bones[0].volume_cm3);
+}
+
+TEST(Segment, MarrowOfAShaftThatTheVolumeCutsOffIsFilled) {
+  const TestBone shaft{{0, 0, -40}, {13, 12, 90}};
+  const TestCt ct = ct_of({shaft}, {1, 1, 1}, Eigen::Matrix3d::Identity(), {20, 20, 30});
+  const auto made = segment(ct.volume, std::vector<Seed>{{"shaft", {0, 0, 10}}}, {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_GT(dice(ct, 1, *made, 1), 0.95);
+  EXPECT_THAT(made->bones[0].cut_off, ElementsAre("inferior", "superior"));
+  ASSERT_EQ(made->notes.size(), 1U);
+  EXPECT_EQ(made->notes[0].reason, Reason::bone_cut_off);
+}
+
+TEST(Segment, ABoneThatIsNearlyAsWideWhereItMeetsAnotherIsReported) {
+  const TestBone a{{0, 0, 15}, {14, 14, 20}}, b{{0, 0, -15}, {14, 14, 20}};
+  const TestCt ct = ct_of({a, b}, {1, 1, 1}, Eigen::Matrix3d::Identity(), {18, 18, 38});
+  const std::vector<Seed> both{{"a", {0, 0, 20}}, {"b", {0, 0, -20}}};
+  const auto apart = segment(ct.volume, both, {});
+  ASSERT_TRUE(apart) << apart.error().message;
+  EXPECT_GT(dice(ct, 1, *apart, 1), 0.93);
+  ASSERT_EQ(apart->warnings.size(), 1U);
+  EXPECT_EQ(apart->warnings[0].reason, Reason::bones_in_contact);
+  EXPECT_THAT(apart->warnings[0].message, HasSubstr("meets"));
+  const auto one = segment(ct.volume, std::vector{both[0]}, {.neck = 0.6});
+  ASSERT_TRUE(one);
+  EXPECT_NEAR(one->bones[0].volume_cm3, 2 * apart->bones[0].volume_cm3, 1);
+  ASSERT_EQ(one->warnings.size(), 1U);
+  EXPECT_THAT(one->warnings[0].message, HasSubstr("is narrow at"));
+}
+
+TEST(Segment, TwoClicksOnOneBoneAreRefused) {
+  const Failure refused = refusal_of(plain_ct(), {on_upper, {"again", {0, 0, 25}}});
+  EXPECT_EQ(refused.reason, Reason::seeds_in_one_bone);
+  EXPECT_THAT(refused.message, HasSubstr("upper (0.0, 0.0, 46.0) mm and again (0.0, 0.0, 25.0) mm"));
+}
+
+TEST(Segment, AClickBesideTheBoneNamesTheNearestOne) {
+  const Failure refused = refusal_of(plain_ct(), {{"upper", {22, 0, 25}}});
+  EXPECT_EQ(refused.reason, Reason::seed_off_bone);
+  EXPECT_THAT(refused.message,
+              HasSubstr("upper: the seed (22.0, 0.0, 25.0) mm has 40 HU, bone begins at 200"));
+  EXPECT_NEAR(refused.figures.at("nearest_mm"), 6, 1.1);
+}
+
+TEST(Segment, AClickInRasIsRecognised) {
+  const TestCt ct = ct_of({{{12, 0, 0}, {6, 6, 6}}}, {1, 1, 1}, Eigen::Matrix3d::Identity(), {24, 10, 10});
+  EXPECT_THAT(refusal_of(ct, {{"bone", {-12, 0, 0}}}).message, HasSubstr("as R, A, S the seed lies on bone"));
+}
+
+TEST(Segment, AClickOutsideTheVolumeIsRefusedWithItsExtent) {
+  const Failure refused = refusal_of(plain_ct(), {{"upper", {0, 0, 80}}});
+  EXPECT_EQ(refused.reason, Reason::bad_value);
+  EXPECT_THAT(refused.message, HasSubstr("lies outside the CT, which extends from (-26.0, -26.0, -56.0) mm"));
+}
+
+TEST(Segment, UnusableClicksAreRefused) {
+  EXPECT_EQ(refusal_of(plain_ct(), {}).reason, Reason::bad_value);
+  EXPECT_EQ(refusal_of(plain_ct(), {{"a/b", on_upper.point}}).reason, Reason::bad_value);
+  EXPECT_EQ(refusal_of(plain_ct(), {on_upper, on_upper}).reason, Reason::name_clash);
+  const double nothing = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(refusal_of(plain_ct(), {{"a", {0, nothing, 0}}}).reason, Reason::not_finite);
+  EXPECT_EQ(refusal_of(plain_ct(), {on_upper}, {.neck = 2}).reason, Reason::bad_value);
+}
+
+TEST(Segment, ValuesThatAreNoHounsfieldUnitsAreRefused) {
+  EXPECT_THAT(refusal_of(plain_ct(), {on_upper}, {.threshold_hu = 3000}).message,
+              HasSubstr("no voxel reaches the threshold 3000 HU: the CT's values are 40 to 1200"));
+  EXPECT_THAT(refusal_of(plain_ct(), {on_upper}, {.threshold_hu = 0}).message,
+              HasSubstr("100 % of the voxels reach the threshold 0 HU"));
+}
+
+TEST(Segment, AnExceptionOfTheProgressEndsIt) {
+  std::vector<std::string> stages;
+  const pipeline::Progress progress{[&](std::string_view stage) {
+                                      stages.emplace_back(stage);
+                                      if (stage == "distance") throw std::runtime_error("cancelled");
+                                    },
+                                    {}};
+  EXPECT_THROW((void)segment(plain_ct().volume, std::vector{on_upper}, {}, progress), std::runtime_error);
+  EXPECT_THAT(stages, ElementsAre("threshold", "fill", "distance"));
+}
+
+TEST(UsualThreshold, RisesWithTheNoise) {
+  volume::Volume ct = plain_ct().volume;
+  EXPECT_EQ(usual_threshold(ct), 200);
+  RandomStream random(1, 2, 3);
+  for (float& voxel : ct.voxels) voxel += static_cast<float>(60 * random.normal());
+  EXPECT_GT(usual_threshold(ct), 230);
+  EXPECT_LT(usual_threshold(ct), 340);
+}
+
+TEST(SeedFrom, IsANameAndAPoint) {
+  const auto seed = seed_from("femur=1.5,-2,+3e1");
+  ASSERT_TRUE(seed);
+  EXPECT_EQ(seed->name, "femur");
+  EXPECT_EQ(seed->point, Vector3d(1.5, -2, 30));
+  for (const char* wrong :
+       {"femur", "=1,2,3", "a=1,2", "a=1,2,3,4", "a=1,2,x", "a=1,,3", "a=1,2,3 ", "a=", "a=1,2,nan"})
+    EXPECT_EQ(seed_from(wrong).error().reason, Reason::usage) << wrong;
+}
+
+/// The knee of the simulated X-ray images, 1.2 mm voxels, turned; truth: the outer solids.
+struct KneeCt : TestCt {
+  Eigen::Matrix3d turn = geometry::rotation_from_vector({0.2, 1.4, -0.3});
+
+  KneeCt() {
+    const simulation::Scene knee = simulation::knee_body();
+    volume.size = {150, 92, 92};
+    volume.patient_from_voxel = Eigen::Affine3d(turn) * Eigen::Scaling(1.2);
+    const Vector3d middle(-10, 0, -8);
+    volume.patient_from_voxel.translation() = turn * (middle - 1.2 * Vector3d(74.5, 45.5, 45.5));
+    const std::vector<std::string> names{"femur", "tibia", "patella", "fibula"};
+    const auto inside = [](const simulation::Body& body, const Vector3d& p) {
+      return std::ranges::any_of(body.solids, [&](const auto& s) { return signed_distance(s, p) < 0; });
+    };
+    for (int z = 0; z < volume.size.z(); ++z)
+      for (int y = 0; y < volume.size.y(); ++y)
+        for (int x = 0; x < volume.size.x(); ++x) {
+          const Vector3d p = middle + 1.2 * (Vector3d(x, y, z) - Vector3d(74.5, 45.5, 45.5));
+          float hu = inside(knee[0], p) ? 50.0F : -1000.0F;
+          int owner = 0;
+          for (std::size_t bone = 0; bone < 4; ++bone)
+            if (inside(knee[1 + 2 * bone], p)) {
+              if (owner == 0) owner = int(bone) + 1;
+              hu = inside(knee[2 + 2 * bone], p) ? 450.0F : 1300.0F;
+            }
+          truth.push_back(owner);
+          volume.voxels.push_back(hu);
+        }
+  }
+  Vector3d patient(const Vector3d& in_knee) const { return turn * in_knee; }
+};
+
+TEST(SegmentKnee, OneClickForEachBone) {
+  const KneeCt ct;
+  const std::vector<Seed> seeds{{"femur", ct.patient({-30, 10, -5})},
+                                {"tibia", ct.patient({30, 0, -12})},
+                                {"patella", ct.patient({-26, 0, 34})},
+                                {"fibula", ct.patient({24, 37, -22})}};
+  const auto all = segment(ct.volume, seeds, {});
+  ASSERT_TRUE(all) << all.error().message;
+  for (int bone = 1; bone <= 4; ++bone) EXPECT_GT(dice(ct, bone, *all, bone), 0.97) << bone;
+  for (int bone = 1; bone <= 4; ++bone) {
+    const auto alone = segment(ct.volume, std::vector{seeds[std::size_t(bone - 1)]}, {});
+    ASSERT_TRUE(alone) << alone.error().message;
+    EXPECT_GT(dice(ct, bone, *alone, 1), 0.97) << bone;
+  }
+}
+
+}  // namespace
+}  // namespace helicarm::segmentation

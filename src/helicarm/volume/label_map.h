@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "helicarm/volume/volume.h"
+
+namespace helicarm::volume {
+
+/// Labels of a label map (whole numbers from 1 to 65535) with their numbers of voxels; nothing for a volume
+/// that is none: other values, or over 150 of them (an interpolated mask).
+std::optional<std::map<int, std::size_t>> labels_in(const Volume& volume);
+
+/// Refuses (bad_value) labels that a map lacks, with those that there are, and a volume that is no label map;
+/// `origin` begins the message.
+Expected<void> check_labels(const Volume& map, std::span<const int> labels, const std::string& origin);
+
+/// Refuses (bad_value) several labels, which are listed; `key` makes the choice.
+Expected<void> one_label(const std::map<int, std::size_t>& labels, const std::string& origin,
+                         const std::string& key);
+
+/// The mask that is meant by a volume: of the stated label, or all that is not 0 where there is one label or
+/// the volume is no label map. Fails as `check_labels` and `one_label`.
+Expected<void> choose_label(Volume& mask, std::optional<int> label, const std::string& origin,
+                            const std::string& key);
+
+}  // namespace helicarm::volume
