@@ -56,7 +56,7 @@ class Segment(unittest.TestCase):
     def segment(self, *arguments):
         return run("segment", self.ct, *arguments, "--out", self.out)
 
-    def test_one_click_gives_mask_surface_picture_and_figures(self):
+    def test_one_click_gives_mask_surface_image_and_figures(self):
         done = self.segment("--seed", "upper=0,0,144", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
         answer = json.loads(done.stdout)

@@ -62,6 +62,19 @@ TEST(CaseModel, ACaseWithModelsAndLinesIsWrittenAsItIsRead) {
   EXPECT_EQ(again->model_tunnels[0].line, "ACL");
 }
 
+TEST(CaseModel, TheLabelOfAMaskIsReadAndWritten) {
+  const auto with = [&](const std::string& keys) {
+    return registration_case(R"(, "models": [{"name": "femur", "volume": "ct.nrrd", )" + keys + "}]");
+  };
+  const auto read = with(R"("mask": "map.nrrd", "mask_label": 75)");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->models[0].mask_label, 75);
+  EXPECT_EQ(to_json(read->models[0], "/case")["mask_label"], 75);
+  for (const char* wrong : {R"("mask_label": 75)", R"("mask": "map.nrrd", "mask_label": 0)",
+                            R"("mask": "map.nrrd", "mask_label": 1.5)"})
+    EXPECT_EQ(with(wrong).error().reason, Reason::bad_value) << wrong;
+}
+
 /// The tunnel of a case with a model, or why it is refused.
 Expected<ModelTunnelPlan> tunnel_from(const char* tunnel, bool outlined = true) {
   const Json json = Json::parse(tunnel);

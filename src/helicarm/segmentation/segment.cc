@@ -26,6 +26,7 @@ constexpr double noise_sigmas = 4;
 // Of the voxels of a CT of a limb 1 to 10 % are bone; more than half are another kind of image.
 constexpr double most_bone = 0.5;
 constexpr double fragment_mm = 1.5;
+constexpr std::size_t least_voxels = 50;  // of a bone; noise makes some in cancellous bone near the threshold
 // A contact is worth a look from here up to where it joins, and a bone's own neck from there so far on.
 constexpr double doubtful_contact = 0.35, doubtful_join = 0.1;
 
@@ -300,6 +301,15 @@ Expected<Segmentation> segment(const volume::Volume& ct, std::span<const Seed> s
         made.labels[index_in(ct, at + work.first)] = label_of[regions.root(region - 1)];
     });
     measure_bones(made);
+    for (const Bone& bone : made.bones)
+      if (bone.voxels < least_voxels)
+        throw BadInput(
+            {Reason::seed_off_bone,
+             fmt::format("{}: the seed {} lies on a speck of {} voxels, a bone has {} or more: click on "
+                         "the bone, or lower the threshold ({:g} HU)",
+                         bone.name, text_of(*bone.seed), bone.voxels, least_voxels, threshold),
+             {},
+             {{"voxels", double(bone.voxels)}, {"threshold_hu", threshold}}});
     const auto point_of = [&](const Neck& neck) -> Vector3d {
       return ct.patient_from_voxel * (voxel_of(neck.at, work.bone.size) + work.first).cast<double>();
     };

@@ -50,7 +50,7 @@ class SegmentFiles : public testing::Test {
   fs::path out_;
 };
 
-TEST_F(SegmentFiles, AreAMaskASurfaceAPictureAndFigures) {
+TEST_F(SegmentFiles, AreAMaskASurfaceAnImageAndFigures) {
   const Json json = written();
   EXPECT_EQ(*read_json(out_ / "segment.json"), json);
   EXPECT_EQ(json["format"], "helicarm-segmentation/1");

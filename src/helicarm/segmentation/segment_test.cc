@@ -120,6 +120,18 @@ TEST(Segment, AClickBesideTheBoneNamesTheNearestOne) {
   EXPECT_NEAR(refused.figures.at("nearest_mm"), 6, 1.1);
 }
 
+TEST(Segment, AClickOnASpeckIsRefused) {
+  TestCt ct = ct_of({upper}, {1, 1, 1});
+  ct.volume.voxels[ct.volume.voxels.size() / 4] = 500;
+  const Eigen::Vector3i size = ct.volume.size;
+  const auto i = int(ct.volume.voxels.size() / 4);
+  const Vector3d at =
+      ct.volume.patient_from_voxel * Vector3d(i % size.x(), i / size.x() % size.y(), i / size.x() / size.y());
+  const Failure refused = refusal_of(ct, {{"upper", at}});
+  EXPECT_EQ(refused.reason, Reason::seed_off_bone);
+  EXPECT_THAT(refused.message, HasSubstr("lies on a speck of 1 voxels"));
+}
+
 TEST(Segment, AClickInRasIsRecognised) {
   const TestCt ct = ct_of({{{12, 0, 0}, {6, 6, 6}}}, {1, 1, 1}, Eigen::Matrix3d::Identity(), {24, 10, 10});
   EXPECT_THAT(refusal_of(ct, {{"bone", {-12, 0, 0}}}).message, HasSubstr("as R, A, S the seed lies on bone"));

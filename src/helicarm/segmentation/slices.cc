@@ -17,6 +17,7 @@ using Eigen::Vector3d;
 using Eigen::Vector3i;
 
 constexpr int tile_px = 420, caption_px = 26;
+constexpr double margin_mm = 15;  // about the bone
 constexpr double lowest_hu = -250, highest_hu = 1250;
 
 /// Okabe and Ito (2008), without black and grey.
@@ -67,14 +68,17 @@ cv::Mat tile(const volume::Volume& ct, const Segmentation& made, const Bone& bon
              int across) {
   const SliceAxes axes = slice_axes(made.patient_from_voxel.linear(), across);
   const Vector3d spacing = made.patient_from_voxel.linear().colwise().norm();
-  const int columns = made.size[axes.right], rows = made.size[axes.down];
+  const Vector3i margin = (margin_mm / spacing.array()).ceil().cast<int>();
+  const Vector3i low = (bone.low - margin).cwiseMax(0);
+  const Vector3i high = (bone.high + margin).cwiseMin(made.size - Vector3i::Ones());
+  const int columns = high[axes.right] - low[axes.right] + 1, rows = high[axes.down] - low[axes.down] + 1;
   cv::Mat grey(rows, columns, CV_8UC1), labels(rows, columns, CV_8UC1);
   cv::Point seed;
   for (int v = 0; v < rows; ++v)
     for (int u = 0; u < columns; ++u) {
       Vector3i at = through;
-      at[axes.right] = axes.right_reversed ? columns - 1 - u : u;
-      at[axes.down] = axes.down_reversed ? rows - 1 - v : v;
+      at[axes.right] = axes.right_reversed ? high[axes.right] - u : low[axes.right] + u;
+      at[axes.down] = axes.down_reversed ? high[axes.down] - v : low[axes.down] + v;
       if (at == through) seed = {u, v};
       const std::size_t i =
           std::size_t(at.x()) + std::size_t(made.size.x()) *
