@@ -216,6 +216,7 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& given, bool with_bon
     // A stack has no frame of its own: a mask drawn on it in another program brings that program's.
     if (mask && given.voxel_mm && has_voxels_of(*mask, *given.voxel_mm))
       mask->patient_from_voxel = volume.patient_from_voxel;
+    if (mask) volume::onto_grid(*mask, volume);  // another one is refused with the model
     std::optional<registration::HuWindow> window;
     if (given.window_hu) window = {given.window_hu->x(), given.window_hu->y()};
     registration::Model model = value_or_throw(registration::model_from(given.name, volume, mask, window));

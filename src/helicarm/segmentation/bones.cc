@@ -123,11 +123,11 @@ Expected<std::pair<std::string, std::vector<int>>> choice_from(const std::string
   });
 }
 
-Expected<Segmentation> segmentation_from(const volume::Volume& ct, const volume::Volume& map,
+Expected<Segmentation> segmentation_from(const volume::Volume& ct, volume::Volume map,
                                          const std::map<std::string, std::vector<int>>& chosen,
                                          const std::string& origin) {
   return guarded([&] {
-    if (map.size != ct.size || !map.patient_from_voxel.isApprox(ct.patient_from_voxel, 1e-3))
+    if (!volume::onto_grid(map, ct))
       throw BadInput(
           Reason::bad_value,
           fmt::format("{}: the label map has {} x {} x {} voxels, the CT {} x {} x {}, or they lie "

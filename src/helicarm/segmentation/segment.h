@@ -93,9 +93,10 @@ double usual_threshold(const volume::Volume& ct);
 Expected<Segmentation> segment(const volume::Volume& ct, std::span<const Seed> seeds,
                                const SegmentOptions& options, const pipeline::Progress& progress = {});
 
-/// Bones of a label map of another program, which must have the grid of the CT. `chosen`: the labels of each
-/// bone; empty: a map with one label is taken as "bone". Fails with bad_value, name_clash.
-Expected<Segmentation> segmentation_from(const volume::Volume& ct, const volume::Volume& map,
+/// Bones of a label map of another program, which must have the grid of the CT (`volume::onto_grid`).
+/// `chosen`: the labels of each bone; empty: a map with one label is taken as "bone". Fails with bad_value,
+/// name_clash.
+Expected<Segmentation> segmentation_from(const volume::Volume& ct, volume::Volume map,
                                          const std::map<std::string, std::vector<int>>& chosen,
                                          const std::string& origin);
 

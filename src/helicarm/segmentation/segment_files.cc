@@ -100,7 +100,7 @@ Expected<SegmentAnswer> answer(const SegmentRequest& request, const pipeline::Pr
       volume::Volume map = volume_of(*request.label_map, request, 0);
       if (request.voxel_mm) map.patient_from_voxel = made.ct.patient_from_voxel;
       made.segmentation = value_or_throw(
-          segmentation_from(made.ct, map, request.labels, request.label_map->filename().string()));
+          segmentation_from(made.ct, std::move(map), request.labels, request.label_map->filename().string()));
     } else {
       made.segmentation = value_or_throw(segment(made.ct, request.seeds, request.options, progress));
     }

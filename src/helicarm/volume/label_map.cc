@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/LU>
 #include <fmt/format.h>
 
 namespace helicarm::volume {
@@ -38,6 +39,44 @@ std::optional<std::map<int, std::size_t>> labels_in(const Volume& volume) {
     if (labels.size() > most_labels) return std::nullopt;
   }
   return labels;
+}
+
+bool onto_grid(Volume& map, const Volume& ct) {
+  constexpr double same_place = 0.1;  // of a voxel
+  const Eigen::Affine3d ct_from_map = ct.patient_from_voxel.inverse() * map.patient_from_voxel;
+  const Eigen::Matrix3d turn = ct_from_map.linear().array().round().matrix();
+  const Eigen::Vector3d first = ct_from_map.translation().array().round().matrix();
+  if (!(turn.cwiseAbs() * Eigen::Vector3d::Ones()).isOnes() ||
+      !(turn.cwiseAbs().transpose() * Eigen::Vector3d::Ones()).isOnes())
+    return false;
+  const Eigen::Vector3d last = (map.size.cast<double>().array() - 1).matrix();
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d at = last.cwiseProduct(Eigen::Vector3d(corner & 1, corner >> 1 & 1, corner >> 2));
+    if (!((ct_from_map * at - (turn * at + first)).cwiseAbs().maxCoeff() < same_place)) return false;
+  }
+  // Of the first and the last voxel, which must be corners of the CT.
+  const Eigen::Vector3d a = first, b = turn * last + first;
+  if (a.cwiseMin(b) != Eigen::Vector3d::Zero() ||
+      a.cwiseMax(b) != (ct.size.cast<double>().array() - 1).matrix())
+    return false;
+  map.patient_from_voxel = ct.patient_from_voxel;
+  if (turn.isIdentity()) return true;
+  const std::ptrdiff_t row = ct.size.x(), slice = row * ct.size.y();
+  const auto step = [&](int axis) {
+    return std::ptrdiff_t(turn(0, axis)) + row * std::ptrdiff_t(turn(1, axis)) +
+           slice * std::ptrdiff_t(turn(2, axis));
+  };
+  const std::ptrdiff_t origin =
+      std::ptrdiff_t(first.x()) + row * std::ptrdiff_t(first.y()) + slice * std::ptrdiff_t(first.z());
+  std::vector<float> ordered(map.voxels.size());
+  std::size_t i = 0;
+  for (int z = 0; z < map.size.z(); ++z)
+    for (int y = 0; y < map.size.y(); ++y)
+      for (int x = 0; x < map.size.x(); ++x)
+        ordered[std::size_t(origin + x * step(0) + y * step(1) + z * step(2))] = map.voxels[i++];
+  map.voxels = std::move(ordered);
+  map.size = ct.size;
+  return true;
 }
 
 Expected<void> check_labels(const Volume& map, std::span<const int> chosen, const std::string& origin) {

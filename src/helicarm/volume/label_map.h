@@ -14,6 +14,10 @@ namespace helicarm::volume {
 /// that is none: other values, or over 150 of them (an interpolated mask).
 std::optional<std::map<int, std::size_t>> labels_in(const Volume& volume);
 
+/// Puts the voxels of a map in the order of the CT's where its axes are only exchanged or reversed (a NIfTI
+/// of a DICOM series): then its grid is the CT's. False, and the map as it was, if it lies on another grid.
+bool onto_grid(Volume& map, const Volume& ct);
+
 /// Refuses (bad_value) labels that a map lacks, with those that there are, and a volume that is no label map;
 /// `origin` begins the message.
 Expected<void> check_labels(const Volume& map, std::span<const int> labels, const std::string& origin);

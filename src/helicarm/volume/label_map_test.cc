@@ -13,6 +13,38 @@ Volume row_of(std::vector<float> voxels) {
   return {{int(voxels.size()), 1, 1}, std::move(voxels), Eigen::Affine3d::Identity(), {}};
 }
 
+TEST(OntoGrid, ReversedAndExchangedAxesAreReordered) {
+  Volume ct{{3, 2, 4}, std::vector<float>(24), Eigen::Affine3d::Identity(), {}};
+  ct.patient_from_voxel = Eigen::Translation3d(5, -7, 90) * Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()) *
+                          Eigen::Scaling(0.5, 0.6, 2.0);
+  for (std::size_t i = 0; i < 24; ++i) ct.voxels[i] = float(i);
+  // Columns of the map run along the CT's slices, its rows against the CT's columns.
+  Volume map{{4, 3, 2}, {}, {}, {}};
+  Eigen::Affine3d ct_from_map = Eigen::Affine3d::Identity();
+  ct_from_map.linear() << 0, -1, 0, 0, 0, 1, 1, 0, 0;
+  ct_from_map.translation() << 2, 0, 0;
+  map.patient_from_voxel = ct.patient_from_voxel * ct_from_map;
+  for (int z = 0; z < 2; ++z)
+    for (int y = 0; y < 3; ++y)
+      for (int x = 0; x < 4; ++x) map.voxels.push_back(float((2 - y) + 3 * (z + 2 * x)));
+  ASSERT_TRUE(onto_grid(map, ct));
+  EXPECT_EQ(map.size, ct.size);
+  EXPECT_EQ(map.voxels, ct.voxels);
+  EXPECT_EQ(map.patient_from_voxel.matrix(), ct.patient_from_voxel.matrix());
+}
+
+TEST(OntoGrid, AnotherGridIsLeftAsItIs) {
+  const Volume ct{{3, 2, 4}, std::vector<float>(24), Eigen::Affine3d::Identity(), {}};
+  Volume shifted = ct, finer = ct, shorter = ct;
+  shifted.patient_from_voxel.translation().x() = 1;
+  finer.patient_from_voxel.linear() *= 0.9;
+  shorter.size = {3, 2, 3};
+  EXPECT_FALSE(onto_grid(shifted, ct));
+  EXPECT_FALSE(onto_grid(finer, ct));
+  EXPECT_FALSE(onto_grid(shorter, ct));
+  EXPECT_EQ(shifted.patient_from_voxel.translation().x(), 1);
+}
+
 TEST(LabelMap, LabelsAreCounted) {
   const auto labels = labels_in(row_of({0, 2, 2, 0, 7, 2}));
   ASSERT_TRUE(labels);
