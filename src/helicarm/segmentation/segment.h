@@ -23,7 +23,7 @@ struct Seed {
 struct SegmentOptions {
   std::optional<double> threshold_hu = {};  ///< nothing: `usual_threshold`
   double gap_mm = 1;                        ///< half the width of gaps in the cortex that are closed
-  double neck = 0.5;  ///< parts are one bone where their neck is this share of the smaller one's radius
+  double neck = 0.6;  ///< parts are one bone where their neck is this share of the smaller one's radius
 };
 
 inline constexpr std::array<Field<SegmentOptions>, 3> segment_fields{
