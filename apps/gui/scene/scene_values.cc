@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gui/scene/scene_values.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -139,6 +140,31 @@ std::optional<ModelShape> shape_of(const case_registration::RegisteredModel& mod
                              {shape.points[model.tunnel_ends[i].start].error.centre,
                               shape.points[model.tunnel_ends[i].end].error.centre}});
   return shape;
+}
+
+ResultScene only(SceneParts parts, ResultScene scene) {
+  if (!(parts & ScenePart::calibrator)) {
+    scene.balls.clear();
+    scene.body.reset();
+  }
+  if (!(parts & ScenePart::rays)) {
+    scene.views.clear();
+    for (PointShape& point : scene.points) point.rays.clear();
+  }
+  if (!(parts & ScenePart::points)) {
+    scene.points.clear();
+    scene.tunnels.clear();
+  }
+  return scene;
+}
+
+double error_scale_of(const ResultScene& scene, double largest) {
+  constexpr double most_mm = 20;
+  double radius = 0;
+  for (const PointShape& point : scene.points) radius = std::max(radius, point.error.radii.maxCoeff());
+  for (const double scale : {10.0, 5.0, 2.0})
+    if (scale <= largest && scale * radius <= most_mm) return scale;
+  return largest * radius <= most_mm ? largest : 1;
 }
 
 ResultScene with_plans(ResultScene scene, const std::vector<ModelShape>& models) {

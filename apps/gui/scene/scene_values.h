@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <QFlags>
 #include <array>
 #include <map>
 #include <memory>
@@ -72,7 +73,7 @@ ResultScene scene_of(const pipeline::Result& result, const phantom::Calibrator& 
 
 /// A model of the case at its registered pose, or at one tried by hand.
 struct ModelShape {
-  enum class State { registered, refused, by_hand };
+  enum class State { registered, refused, by_hand, out_of_date };
 
   std::string name;
   State state = State::registered;
@@ -89,6 +90,19 @@ struct ModelShape {
 std::optional<ModelShape> shape_of(const case_registration::RegisteredModel& model,
                                    const std::optional<geometry::RigidTransform>& by_hand,
                                    const Colour& colour);
+
+/// What is shown or hidden together.
+enum class ScenePart { calibrator = 1, rays = 2, points = 4, models = 8, bones = 16, robot = 32 };
+Q_DECLARE_FLAGS(SceneParts, ScenePart)
+Q_DECLARE_OPERATORS_FOR_FLAGS(SceneParts)
+inline constexpr SceneParts all_parts{ScenePart::calibrator | ScenePart::rays | ScenePart::points |
+                                      ScenePart::models | ScenePart::bones | ScenePart::robot};
+
+/// The scene of these parts; the camera still looks at all of it.
+ResultScene only(SceneParts parts, ResultScene scene);
+
+/// How many times ellipsoids are drawn enlarged, at most `largest`: no radius above 20 mm is enlarged to.
+double error_scale_of(const ResultScene& scene, double largest);
 
 /// With the points and tunnels of the models' plans.
 ResultScene with_plans(ResultScene scene, const std::vector<ModelShape>& models);

@@ -187,5 +187,34 @@ TEST(SceneValues, RobotLinksEndAtTheFlange) {
   EXPECT_TRUE(robot_links(live).empty());
 }
 
+PointShape point_within(double radius_mm) {
+  PointShape point{"P", localization::PointSource::pick, {}, {}, {}};
+  point.error.radii.setConstant(radius_mm);
+  return point;
+}
+
+TEST(ErrorScale, SmallEllipsoidsAreEnlargedTenTimesAndLargeOnesNot) {
+  const auto scale = [](double radius_mm) {
+    ResultScene scene;
+    scene.points = {point_within(0.1), point_within(radius_mm)};
+    return error_scale_of(scene, 10);
+  };
+  EXPECT_EQ(scale(1), 10);
+  EXPECT_EQ(scale(3), 5);
+  EXPECT_EQ(scale(9.8), 2);
+  EXPECT_EQ(scale(30), 1);
+}
+
+TEST(SceneParts, HiddenOnesAreLeftOut) {
+  ResultScene scene;
+  scene.balls.resize(2);
+  scene.points = {point_within(1)};
+  scene.points[0].rays.resize(2);
+  EXPECT_TRUE(only(all_parts & ~SceneParts(ScenePart::calibrator), scene).balls.empty());
+  EXPECT_TRUE(only(all_parts & ~SceneParts(ScenePart::rays), scene).points[0].rays.empty());
+  EXPECT_TRUE(only(all_parts & ~SceneParts(ScenePart::points), scene).points.empty());
+  EXPECT_EQ(only(all_parts, scene).points.size(), 1u);
+}
+
 }  // namespace
 }  // namespace helicarm::gui

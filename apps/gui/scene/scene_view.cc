@@ -3,6 +3,8 @@
 
 #include <QElapsedTimer>
 #include <QPainter>
+#include <algorithm>
+#include <utility>
 
 #include "gui/scene/offscreen_stage.h"
 #include "gui/scene/palette.h"
@@ -11,9 +13,20 @@ namespace helicarm::gui {
 
 namespace {
 
-/// A refused model is grey.
+constexpr Colour amber{255, 196, 0};
+
+/// A model that is refused or out of date is grey.
 Colour colour_of(const ModelShape& shape) {
-  return shape.state == ModelShape::State::refused ? palette::refused : shape.colour;
+  const bool is_grey =
+      shape.state == ModelShape::State::refused || shape.state == ModelShape::State::out_of_date;
+  return is_grey ? palette::refused : shape.colour;
+}
+
+LiveScene without_robot(LiveScene live) {
+  live.calibrator_from_tip.reset();
+  live.calibrator_from_base.reset();
+  live.path.clear();
+  return live;
 }
 
 QString words_of(const ModelShape& shape) {
@@ -23,6 +36,8 @@ QString words_of(const ModelShape& shape) {
       return SceneView::tr("%1: refused").arg(name);
     case ModelShape::State::by_hand:
       return SceneView::tr("%1: moved by hand").arg(name);
+    case ModelShape::State::out_of_date:
+      return SceneView::tr("%1: out of date").arg(name);
     case ModelShape::State::registered:
       break;
   }
@@ -53,10 +68,11 @@ void SceneView::redraw() {
 }
 
 void SceneView::show_result(const std::shared_ptr<const pipeline::Result>& result,
-                            const phantom::Calibrator& calibrator) {
+                            const phantom::Calibrator& calibrator, bool keeps_camera) {
   scene_ = result ? scene_of(*result, calibrator) : ResultScene{};
   middle_ = phantom::middle_of(calibrator);
   result_changed_ = live_changed_ = true;
+  if (keeps_camera) return redraw();
   set_preset(preset_);
 }
 
@@ -105,13 +121,13 @@ void SceneView::draw() {
   QElapsedTimer timer;
   timer.start();
   drawn_ = stage_->draw(size() * devicePixelRatioF(), camera_, [this](Stage& stage) {
-    if (result_changed_) stage.set_result(with_plans(scene_, models_), error_scale_);
-    if (bones_changed_) stage.set_bones(bones_);
+    if (result_changed_) stage.set_result(drawn_scene(), drawn_scale());
+    if (bones_changed_) stage.set_bones(parts_ & ScenePart::bones ? bones_ : std::nullopt);
     if (models_changed_) stage.set_models(drawn_models());
     if (slice_changed_)
       stage.set_slice(tre_ ? std::optional(slice_of(*tre_, slice_axis_, slice_mm_)) : std::nullopt,
                       tre_scale_);
-    if (live_changed_) stage.set_live(live_);
+    if (live_changed_) stage.set_live(parts_ & ScenePart::robot ? live_ : without_robot(live_));
     stage.clear_sight(camera_);
     result_changed_ = bones_changed_ = models_changed_ = slice_changed_ = live_changed_ = false;
   });
@@ -132,11 +148,44 @@ void SceneView::paintEvent(QPaintEvent*) {
   paint_overlay(painter);
 }
 
+void SceneView::set_notice(const QString& notice) {
+  if (std::exchange(notice_, notice) != notice) update();
+}
+
+void SceneView::show_parts(SceneParts parts) {
+  parts_ = parts;
+  result_changed_ = bones_changed_ = models_changed_ = live_changed_ = true;
+  redraw();
+}
+
+void SceneView::hide_models(std::set<std::string> names) {
+  hidden_ = std::move(names);
+  result_changed_ = models_changed_ = live_changed_ = true;
+  redraw();
+}
+
+std::vector<std::string> SceneView::model_names() const {
+  std::vector<std::string> names;
+  for (const ModelShape& shape : models_) names.push_back(shape.name);
+  return names;
+}
+
+bool SceneView::is_drawn(const ModelShape& shape) const {
+  return (parts_ & ScenePart::models) && !hidden_.contains(shape.name);
+}
+
+ResultScene SceneView::drawn_scene() const {
+  std::vector<ModelShape> drawn;
+  std::ranges::copy_if(models_, std::back_inserter(drawn),
+                       [&](const auto& shape) { return is_drawn(shape); });
+  return only(parts_, with_plans(scene_, drawn));
+}
+
 std::vector<DrawnModel> SceneView::drawn_models() const {
   std::vector<DrawnModel> drawn;
   for (const ModelShape& shape : models_)
-    drawn.push_back(
-        {surfaces_.of(shape.model), colour_of(shape), shape.calibrator_from_model, shape.moves_with});
+    drawn.push_back({is_drawn(shape) ? surfaces_.of(shape.model) : nullptr, colour_of(shape),
+                     shape.calibrator_from_model, shape.moves_with});
   return drawn;
 }
 
@@ -146,22 +195,24 @@ std::vector<SceneLabel> SceneView::labels() const {
     const auto motion = bone ? live_.bones_moved.find(*bone) : live_.bones_moved.end();
     return motion == live_.bones_moved.end() ? place : motion->second * place;
   };
-  for (const PointShape& point : with_plans(scene_, models_).points)
+  const ResultScene drawn = drawn_scene();
+  for (const PointShape& point : drawn.points)
     labels.push_back(
         {carried(point.moves_with, point.error.centre), QString::fromStdString(point.name), palette::point});
   for (const ModelShape& shape : models_)
-    if (shape.model)
+    if (shape.model && is_drawn(shape))
       labels.push_back({carried(shape.moves_with, shape.calibrator_from_model * shape.model->centre),
                         words_of(shape), colour_of(shape)});
-  for (std::size_t i = 0; i < scene_.views.size(); ++i) {
-    const ViewShape& view = scene_.views[i];
+  for (std::size_t i = 0; i < drawn.views.size(); ++i) {
+    const ViewShape& view = drawn.views[i];
     const QString name = QString::fromStdString(view.name);
     labels.push_back({view.central_ray.from, tr("%1 source").arg(name), palette::of_view(i)});
     labels.push_back({view.detector[2], name, palette::of_view(i)});
   }
-  if (live_.calibrator_from_tip)
+  const bool has_robot = parts_ & ScenePart::robot;
+  if (has_robot && live_.calibrator_from_tip)
     labels.push_back({live_.calibrator_from_tip->translation, tr("tip"), palette::tool});
-  if (live_.calibrator_from_base && live_.joints)
+  if (has_robot && live_.calibrator_from_base && live_.joints)
     labels.push_back(
         {live_.calibrator_from_base->translation, QString::fromStdString(live_.robot_model), palette::joint});
   for (const auto& [bone, motion] : live_.bones_moved)
@@ -184,9 +235,13 @@ void SceneView::paint_overlay(QPainter& painter) {
   if (const ViewShape* view = moved_ ? nullptr : view_of(preset_))
     taken.push_back(paint_note(
         painter, 0, tr("From the source of %1").arg(QString::fromStdString(view->name)), palette::text));
-  if (!scene_.points.empty() && error_scale_ != 1)
+  if (!notice_.isEmpty()) taken.push_back(paint_note(painter, int(taken.size()), notice_, amber));
+  if (!drawn_scene().points.empty())
     taken.push_back(paint_note(painter, int(taken.size()),
-                               tr("95 % ellipsoids, enlarged %1 times").arg(error_scale_), palette::point));
+                               drawn_scale() == 1
+                                   ? tr("95 % ellipsoids, true size")
+                                   : tr("95 % ellipsoids, enlarged %1 times").arg(drawn_scale()),
+                               palette::point));
   if (tre_) taken.push_back(paint_colour_bar(painter, size(), tr("TRE, mm rms"), tre_scale_));
   paint_triad(painter, size(), camera_);
   paint_labels(painter, size(), camera_, labels(), taken);

@@ -4,6 +4,8 @@
 #include <QWidget>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
 
 #include "gui/scene/model_surface.h"
 #include "gui/scene/overlay.h"
@@ -36,7 +38,15 @@ class SceneView : public QWidget {
 
   /// Null clears the scene. The live part stays.
   void show_result(const std::shared_ptr<const pipeline::Result>& result,
-                   const phantom::Calibrator& calibrator);
+                   const phantom::Calibrator& calibrator, bool keeps_camera = false);
+  /// In amber in the upper left corner; empty: none.
+  void set_notice(const QString& notice);
+  void show_parts(SceneParts parts);
+  SceneParts parts() const { return parts_; }
+  /// Models that are not drawn, by name.
+  void hide_models(std::set<std::string> names);
+  const std::set<std::string>& hidden_models() const { return hidden_; }
+  std::vector<std::string> model_names() const;
   /// In the calibrator's frame, at the acquisition.
   void show_bones(std::optional<BoneMeshes> bones);
   /// The case's models; a surface appears as soon as it is computed.
@@ -51,7 +61,7 @@ class SceneView : public QWidget {
   Preset preset() const { return preset_; }
   /// Close to the knee, from outside.
   void look_near();
-  /// Scale of the drawn 95 % ellipsoids; initially 10.
+  /// Largest scale of the drawn 95 % ellipsoids; initially 10. Large ones are enlarged less, or not.
   void set_error_scale(double scale);
 
   /// Duration of the last rendering up to its image, ms.
@@ -78,7 +88,11 @@ class SceneView : public QWidget {
   void redraw();
   void draw();
   void paint_overlay(QPainter& painter);
+  bool is_drawn(const ModelShape& shape) const;
   std::vector<DrawnModel> drawn_models() const;
+  /// The result and the models' plans, of the displayed parts.
+  ResultScene drawn_scene() const;
+  double drawn_scale() const { return error_scale_of(drawn_scene(), error_scale_); }
   std::vector<SceneLabel> labels() const;
 
   ResultScene scene_;
@@ -92,6 +106,9 @@ class SceneView : public QWidget {
   SliceAxis slice_axis_ = SliceAxis::z;
   double slice_mm_ = 0;
   double error_scale_ = 10;
+  QString notice_;
+  SceneParts parts_ = all_parts;
+  std::set<std::string> hidden_;
 
   Preset preset_ = Preset::free;
   bool moved_ = false;  ///< by the user, away from the preset

@@ -20,6 +20,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+/// A larger ellipsoid does not hide what it contains.
+constexpr double opaque_mm = 15, large_ellipsoid_opacity = 0.3;
 constexpr double bone_opacity = 0.38, model_opacity = 0.45, cone_opacity = 0.16;
 
 void give(vtkActor* actor, const ShapeBuilder& shapes) {
@@ -128,6 +130,7 @@ void Stage::set_result(const ResultScene& scene, double error_scale) {
     lines.add_line(ray, palette::dim(palette::of_view(i)));
   }
   ShapeBuilder points;
+  double largest_mm = 0;  // of the ellipsoids as drawn
   std::map<guidance::Bone, ShapeBuilder> bone_points;
   for (const auto& [bone, actor] : bone_points_) bone_points[bone];  // emptied if it has none now
   const auto group = [&](const std::optional<guidance::Bone>& bone) -> ShapeBuilder& {
@@ -140,6 +143,7 @@ void Stage::set_result(const ResultScene& scene, double error_scale) {
     }
     Ellipsoid drawn = point.error;
     drawn.radii *= error_scale;
+    largest_mm = std::max(largest_mm, drawn.radii.maxCoeff());
     group(point.moves_with).add_ellipsoid(drawn, palette::point);
   }
   for (const TunnelShape& tunnel : scene.tunnels)
@@ -156,6 +160,9 @@ void Stage::set_result(const ResultScene& scene, double error_scale) {
   give(cone_, cone);
   give(points_, points);
   for (const auto& [bone, shapes] : bone_points) give(of_bone(bone_points_, bone), shapes);
+  const double opacity = largest_mm > opaque_mm ? large_ellipsoid_opacity : 1;
+  make_glass(points_, opacity);
+  for (const auto& [bone, actor] : bone_points_) make_glass(actor, opacity);
 }
 
 void Stage::set_bones(const std::optional<BoneMeshes>& bones) {
