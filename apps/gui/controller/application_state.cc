@@ -71,6 +71,12 @@ std::optional<WantedPick> next_landmark(const ApplicationState& state) {
   return std::nullopt;
 }
 
+bool is_unpicked(const ApplicationState& state, const operation::PlannedTunnel& tunnel) {
+  return std::ranges::none_of(state.picks, [&](const pipeline::Pick& pick) {
+    return pick.name == tunnel.start || pick.name == tunnel.end;
+  });
+}
+
 std::optional<pipeline::BoneLabel> bone_of(const ApplicationState& state, const std::string& point) {
   for (const pipeline::Pick& pick : state.picks)
     if (pick.name == point && pick.bone) return pick.bone;

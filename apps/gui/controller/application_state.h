@@ -143,6 +143,8 @@ WantedPick wanted_end(const operation::PlannedTunnel& tunnel, const std::string&
 std::optional<WantedPick> next_pick(const ApplicationState& state);
 /// The next landmark and view to pick.
 std::optional<WantedPick> next_landmark(const ApplicationState& state);
+/// Whether no end of the tunnel is picked.
+bool is_unpicked(const ApplicationState& state, const operation::PlannedTunnel& tunnel);
 /// What a point lies on; nothing if it is not stated.
 std::optional<pipeline::BoneLabel> bone_of(const ApplicationState& state, const std::string& point);
 /// Adds the points that are picked and are no tunnel's end to the landmarks.

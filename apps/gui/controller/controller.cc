@@ -39,11 +39,13 @@ void forget_measurement(ApplicationState& state) {
 Controller::Controller(QObject* parent) : QObject(parent) {
   connect(&images_, &QTimer::timeout, this, &Controller::take_waiting_image);
   images_.start(look_for_images_ms);
-  connect(&files_, &QFileSystemWatcher::fileChanged, this, [this](const QString& file) {
-    if (state_.source != Source::files) return;
-    state_.changed_file = file.toStdString();
+  const auto note_change = [this](const QString& path) {
+    if (!watched_.contains(path)) return;  // of an earlier case
+    state_.changed_file = path.toStdString();
     emit changed();
-  });
+  };
+  connect(&files_, &QFileSystemWatcher::fileChanged, this, note_change);
+  connect(&files_, &QFileSystemWatcher::directoryChanged, this, note_change);
 }
 
 Controller::~Controller() {
@@ -226,7 +228,7 @@ void Controller::export_to(const fs::path& folder) {
                       state_.registration,
                       state_.picks};
   std::optional<case_registration::CaseRegistration> registration;
-  if (state_.registration) registration = with_moves(state_);
+  if (state_.registration) registration = present_registration(state_);
   begin(Phase::verify, "writing the report",
         [this, result = std::move(result), registration = std::move(registration), folder,
          record = std::move(record)]() -> Change {

@@ -74,6 +74,8 @@ class Controller : public QObject {
   void set_snap(const std::string& point, pipeline::Snap snap, const std::string& view = {});
   /// Another point to pick, in a case of files. Refused if the name is empty or taken.
   void add_landmark(const std::string& name, std::optional<pipeline::BoneLabel> bone = {});
+  /// Asks no more for tunnels of which no end is picked; of files only.
+  void leave_out_tunnels();
   /// Into case.json.
   void save_picks();
   /// Removes a point's picks in all views, and the point if it is a landmark.
@@ -145,6 +147,7 @@ class Controller : public QObject {
   Change with_case(pipeline::Case given, Equipment& equipment, std::optional<Picks> unsaved = {});
   void keep_unsaved_picks();
   void watch_files_of(const std::filesystem::path& case_folder);
+  void watch_no_files();
   void outline_nudged();
   Change came(std::vector<pipeline::ViewResult> images);
 
@@ -161,6 +164,7 @@ class Controller : public QObject {
   std::optional<operation::FreshnessLimits> freshness_;
   QTimer images_;
   QFileSystemWatcher files_;  ///< of the case
+  QStringList watched_;       ///< by `files_`, which forgets a file that is replaced
   QThreadPool faults_;        ///< of the virtual devices
   QThreadPool stops_;         ///< of the robot; they wait for no other task
   Worker worker_;             ///< last: its jobs use all other members

@@ -38,7 +38,7 @@ void Controller::save_picks() {
   std::vector<pipeline::TunnelPlan> tunnels;
   for (const operation::PlannedTunnel& tunnel : state_.tunnels)
     tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
-  if (!files_.files().isEmpty()) files_.removePaths(files_.files());  // this change is its own
+  watch_no_files();  // this change is its own
   const auto saved = gui::save_picks(*state_.case_folder, state_.picks, tunnels);
   watch_files_of(*state_.case_folder);
   state_.has_unsaved_picks = !saved;
@@ -65,6 +65,12 @@ void Controller::add_landmark(const std::string& name, std::optional<pipeline::B
   state_.landmarks.push_back(name);
   state_.bones_of.erase(name);
   if (bone) state_.bones_of.emplace(name, *std::move(bone));
+  emit changed();
+}
+
+void Controller::leave_out_tunnels() {
+  if (state_.source != Source::files || !takes_picks()) return;
+  std::erase_if(state_.tunnels, [&](const auto& tunnel) { return is_unpicked(state_, tunnel); });
   emit changed();
 }
 

@@ -5,6 +5,7 @@
 
 #include "gui/controller/controller.h"
 #include "gui/controller/equipment.h"
+#include "gui/controller/stale.h"
 
 namespace helicarm::gui {
 namespace {
@@ -189,7 +190,9 @@ LiveState Controller::live() const {
   now.tool = live_tool_->overlay(board, now.bone);
   if (tunnel == state_.tunnels.end()) return now;
   now.tunnel = QString::fromStdString(followed_);
-  now.aim = live_tool_->aim(board, followed_);
+  now.aim = is_stale(state_, tunnel->start) || is_stale(state_, tunnel->end)
+                ? fail(Reason::plan_stale, followed_ + ": its picks have changed since the measurement")
+                : live_tool_->aim(board, followed_);
   return now;
 }
 

@@ -17,8 +17,9 @@ namespace {
 constexpr double bone_step_mm = 5;
 
 /// Names and bones of a case's tunnels; the two of an ACL reconstruction if it has the knee's calibrator and
-/// neither tunnels nor models.
-std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given) {
+/// neither tunnels nor models, nor picks of other points only.
+std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given,
+                                                 const std::vector<pipeline::Pick>& unsaved) {
   std::vector<operation::PlannedTunnel> tunnels;
   for (const pipeline::TunnelPlan& tunnel : given.tunnels) {
     const auto pick = std::ranges::find(given.picks, tunnel.start, &pipeline::Pick::name);
@@ -27,9 +28,13 @@ std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given) {
   }
   const bool is_of_the_knee =
       given.bones == guidance::knee_bones() && given.calibrator.name == phantom::udcsc().name;
-  if (given.picks.empty() && tunnels.empty() && given.models.empty() && is_of_the_knee)
-    tunnels = {{"femur", "femur", "FS", "FE", operation::TunnelEnd::end}, {"tibia", "tibia", "TS", "TE"}};
-  return tunnels;
+  if (!given.picks.empty() || !tunnels.empty() || !given.models.empty() || !is_of_the_knee) return tunnels;
+  tunnels = {{"femur", "femur", "FS", "FE", operation::TunnelEnd::end}, {"tibia", "tibia", "TS", "TE"}};
+  ApplicationState picked;
+  picked.picks = unsaved;
+  const bool has_none =
+      std::ranges::all_of(tunnels, [&](const auto& tunnel) { return is_unpicked(picked, tunnel); });
+  return unsaved.empty() || !has_none ? tunnels : std::vector<operation::PlannedTunnel>{};
 }
 
 /// Every file of the folder that a JSON value names.
@@ -40,6 +45,20 @@ void add_files(const Json& json, const fs::path& folder, QStringList& files) {
     if (fs::is_regular_file(file, unreadable)) files << QString::fromStdString(file.string());
   } else if (json.is_structured()) {
     for (const Json& part : json) add_files(part, folder, files);
+  }
+}
+
+/// Every folder of images that a JSON value names, and the files in it.
+void add_series(const Json& json, const fs::path& folder, QStringList& paths) {
+  std::error_code unreadable;
+  if (json.is_string() && !json.get<std::string>().empty()) {
+    const fs::path series = folder / json.get<std::string>();
+    if (!fs::is_directory(series, unreadable) || fs::equivalent(series, folder, unreadable)) return;
+    paths << QString::fromStdString(series.string());
+    for (const fs::directory_entry& entry : fs::directory_iterator(series, unreadable))
+      if (entry.is_regular_file(unreadable)) paths << QString::fromStdString(entry.path().string());
+  } else if (json.is_structured()) {
+    for (const Json& part : json) add_series(part, folder, paths);
   }
 }
 
@@ -77,9 +96,10 @@ void Controller::open(Source source, const fs::path& folder, std::string doing,
   live_tool_.reset();
   earlier_picks_.clear();
   later_picks_.clear();
-  if (!files_.files().isEmpty()) files_.removePaths(files_.files());
+  watch_no_files();
   state_ = ApplicationState{};
   state_.asked_for = folder;
+  if (source == Source::files) watch_files_of(folder);  // also what changes while it is read
   begin(Phase::acquire, std::move(doing),
         [this, source, folder, work = std::move(work), old = std::move(old),
          options = options_]() mutable -> Change {
@@ -173,7 +193,6 @@ void Controller::open_case(const fs::path& folder, bool keeps_picks) {
          return [this, change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)),
                  folder, unsaved](ApplicationState& state) {
            change(state);
-           watch_files_of(folder);
            if (unsaved)
              state.case_folder = folder;
            else
@@ -188,10 +207,18 @@ void Controller::open_case(const fs::path& folder, bool keeps_picks) {
 
 void Controller::watch_files_of(const fs::path& case_folder) {
   const fs::path file = case_folder / "case.json";
-  QStringList files{QString::fromStdString(file.string())};
-  if (const auto json = read_json(file)) add_files(*json, case_folder, files);
-  files.removeDuplicates();
-  files_.addPaths(files);
+  watched_ = {QString::fromStdString(file.string())};
+  if (const auto json = read_json(file)) {
+    add_files(*json, case_folder, watched_);
+    if (json->is_object() && json->contains("models")) add_series(json->at("models"), case_folder, watched_);
+  }
+  watched_.removeDuplicates();
+  files_.addPaths(watched_);
+}
+
+void Controller::watch_no_files() {
+  if (!watched_.isEmpty()) files_.removePaths(watched_);
+  watched_.clear();
 }
 
 void Controller::open_images(const std::vector<fs::path>& files) {
@@ -229,7 +256,7 @@ Controller::Change Controller::with_case(pipeline::Case given, Equipment& equipm
     for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
     state.files = files;
     state.calibrator = given.calibrator;
-    state.tunnels = tunnels_of(given);
+    state.tunnels = tunnels_of(given, unsaved.value_or(given.picks));
     state.picks = unsaved.value_or(given.picks);
     state.has_unsaved_picks = unsaved.has_value();
     if (unsaved) earlier_picks_.push_back(given.picks);

@@ -28,24 +28,20 @@ std::vector<pipeline::Pick> picks_named(const std::vector<pipeline::Pick>& picks
   return of_it;
 }
 
-/// The first landmark of a model's start that is picked elsewhere since the registration.
-std::optional<std::string> moved_landmark(const ApplicationState& state) {
-  for (const RegisteredModel& model : state.registration->models)
-    for (const registration::Landmark& landmark : model.used_landmarks)
-      if (!are_same(picks_named(state.picks, landmark.name),
-                    picks_named(state.registered_picks, landmark.name)))
-        return landmark.name;
+/// The first landmark of the model's start that is picked elsewhere since the registration.
+std::optional<std::string> moved_landmark(const ApplicationState& state, const RegisteredModel& model) {
+  for (const registration::Landmark& landmark : model.used_landmarks)
+    if (!are_same(picks_named(state.picks, landmark.name),
+                  picks_named(state.registered_picks, landmark.name)))
+      return landmark.name;
   return std::nullopt;
 }
 
 /// Why the models' poses are not those registered from the present inputs.
 QString stale_models(const ApplicationState& state) {
   if (!state.registration) return {};
-  if (state.nudged && state.nudged->model < state.registration->models.size())
-    return stale_tr("%1 is moved by hand and not registered there")
-        .arg(as_text(state.registration->models[state.nudged->model].registration.name));
-  if (const auto landmark = moved_landmark(state))
-    return stale_tr("landmark %1 has changed: register the models again").arg(as_text(*landmark));
+  for (std::size_t i = 0; i < state.registration->models.size(); ++i)
+    if (const QString why = stale_model(state, i); !why.isEmpty()) return why;
   return {};
 }
 
@@ -72,9 +68,11 @@ bool is_moved(const ApplicationState& state, std::size_t model) {
 
 QString stale(const ApplicationState& state, Phase phase) {
   if (!state.changed_file.empty())
-    return stale_tr("%1 has changed since it was read: F5 measures again").arg(as_text(state.changed_file));
-  if (phase == Phase::acquire || !state.measured) return {};
+    return stale_tr("%1 has changed since it was read: F5 measures again")
+        .arg(as_text(std::filesystem::path(state.changed_file).filename().string()));
+  if (phase == Phase::acquire) return {};
   if (state.has_other_options) return stale_tr("the settings have changed since the measurement");
+  if (!state.measured) return {};
   if (phase == Phase::rectify || phase == Phase::calibrate) return {};
   const QString models = stale_models(state);
   if (phase == Phase::registration) return models;
@@ -87,22 +85,65 @@ QString stale(const ApplicationState& state, Phase phase) {
   return phase == Phase::plan && has_plan ? models : QString();
 }
 
-CaseRegistration with_moves(const ApplicationState& state) {
+QString stale_model(const ApplicationState& state, std::size_t model) {
+  if (const QString all = stale(state, Phase::calibrate); !all.isEmpty()) return all;
+  const RegisteredModel& registered = state.registration->models[model];
+  if (is_moved(state, model))
+    return stale_tr("%1 is moved by hand and not registered there")
+        .arg(as_text(registered.registration.name));
+  if (const auto landmark = moved_landmark(state, registered))
+    return stale_tr("landmark %1 has changed: register the models again").arg(as_text(*landmark));
+  return {};
+}
+
+CaseRegistration present_registration(const ApplicationState& state) {
   CaseRegistration registration = *state.registration;
-  if (!state.nudged || state.nudged->model >= registration.models.size()) return registration;
-  RegisteredModel& model = registration.models[state.nudged->model];
-  model.registration.failure =
-      Failure{Reason::plan_stale,
-              fmt::format("{}: moved by hand since its registration; register it from there, or set its "
-                          "shifts and turns to 0",
-                          model.registration.name),
-              {},
-              {}};
-  model.registration.decision = registration::Decision::refuse;
-  model.points.clear();
-  model.tunnels.clear();
-  model.tunnel_ends.clear();
+  for (std::size_t i = 0; i < registration.models.size(); ++i) {
+    const QString why = stale_model(state, i);
+    if (why.isEmpty()) continue;
+    RegisteredModel& model = registration.models[i];
+    std::string words = fmt::format("{}: {}", model.registration.name, why.toStdString());
+    if (is_moved(state, i))
+      words = fmt::format(
+          "{}: moved by hand since its registration; register it from there, or set its shifts and turns to "
+          "0",
+          model.registration.name);
+    model.registration.failure = Failure{Reason::plan_stale, std::move(words), {}, {}};
+    model.registration.decision = registration::Decision::refuse;
+    model.points.clear();
+    model.tunnels.clear();
+    model.tunnel_ends.clear();
+    model.bone_checks.clear();
+  }
   return registration;
+}
+
+std::shared_ptr<const pipeline::Result> present_result(const ApplicationState& state) {
+  if (!state.result) return nullptr;
+  if (!stale(state, Phase::calibrate).isEmpty()) {
+    auto images = std::make_shared<pipeline::Result>();
+    for (const pipeline::ViewResult& view : state.result->views) {
+      images->views.emplace_back().name = view.name;
+      images->views.back().xray_image = view.xray_image;
+    }
+    return images;
+  }
+  if (!has_other_picks(state)) return state.result;
+  auto present = std::make_shared<pipeline::Result>(*state.result);
+  const auto is_old = [&](std::size_t point) { return is_stale(state, present->points[point].name); };
+  for (std::size_t i = present->tunnel_ends.size(); i-- > 0;) {
+    const auto [start, end] = present->tunnel_ends[i];
+    if (!is_old(start) && !is_old(end)) continue;
+    present->tunnel_ends.erase(present->tunnel_ends.begin() + std::ptrdiff_t(i));
+    if (i >= present->tunnels.size()) continue;
+    std::erase_if(present->verifications,
+                  [&](const guidance::Verification& line) { return line.name == present->tunnels[i].name; });
+    present->tunnels.erase(present->tunnels.begin() + std::ptrdiff_t(i));
+  }
+  for (pipeline::PointResult& point : present->points)
+    if (point.source == localization::PointSource::pick && is_stale(state, point.name))
+      point = {point.name, point.source, point.moves_with, {}, {}, 0, {}};
+  return present;
 }
 
 namespace {
@@ -129,6 +170,8 @@ QString lack_of(const ApplicationState& state, const std::string& point) {
 QStringList lacks_of_export(const ApplicationState& state) {
   QStringList lacks;
   if (!state.measured) return lacks;
+  if (const QString all = stale(state, Phase::calibrate); !all.isEmpty())
+    return {stale_tr("%1; nothing is exported until it is measured again (F5)").arg(all)};
   std::vector<std::string> points;
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end}) points.push_back(end);
@@ -137,7 +180,7 @@ QStringList lacks_of_export(const ApplicationState& state) {
     if (const QString lack = lack_of(state, point); !lack.isEmpty()) lacks << lack;
   if (state.has_models && !state.registration) lacks << stale_tr("the models are not registered");
   if (state.registration)
-    for (const RegisteredModel& model : with_moves(state).models)
+    for (const RegisteredModel& model : present_registration(state).models)
       if (model.registration.failure) lacks << sentence_of(*model.registration.failure);
   if (state.result->failure)
     lacks << stale_tr("the measurement is refused, so that the report and result.json are written alone: %1")

@@ -16,9 +16,15 @@ bool is_stale(const ApplicationState& state, const std::string& point);
 /// Whether this model of the registration is at a pose tried by hand.
 bool is_moved(const ApplicationState& state, std::size_t model);
 
-/// The registration with the model moved by hand refused (plan_stale) and without its plan, as the measured
-/// pose is not the displayed one.
-case_registration::CaseRegistration with_moves(const ApplicationState& state);
+/// Why a model of the registration is not at a pose registered from the present inputs; empty if it is.
+QString stale_model(const ApplicationState& state, std::size_t model);
+
+/// The registration with each model that is out of date refused (plan_stale) and without its plan.
+case_registration::CaseRegistration present_registration(const ApplicationState& state);
+
+/// What the present inputs give of the result: its images alone where settings or files have changed since;
+/// else all but the places of points whose picks have changed, and their tunnels. Null without a result.
+std::shared_ptr<const pipeline::Result> present_result(const ApplicationState& state);
 
 /// What an export of the state would lack, a sentence each.
 QStringList lacks_of_export(const ApplicationState& state);

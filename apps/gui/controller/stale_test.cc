@@ -113,7 +113,7 @@ TEST(Stale, AMovedModelIsExportedAsRefusedWithoutItsPlan) {
   ApplicationState state = measured_case();
   EXPECT_TRUE(lacks_of_export(state).isEmpty()) << lacks_of_export(state).join("; ").toStdString();
   state.nudged.emplace();
-  const auto model = with_moves(state).models.at(0);
+  const auto model = present_registration(state).models.at(0);
   EXPECT_EQ(model.registration.decision, registration::Decision::refuse);
   EXPECT_EQ(model.registration.failure->reason, Reason::plan_stale);
   EXPECT_TRUE(model.points.empty() && model.tunnels.empty() && model.tunnel_ends.empty());

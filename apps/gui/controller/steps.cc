@@ -30,10 +30,14 @@ std::vector<Warning> warnings_of(const ApplicationState& state, Phase phase) {
   return of_it;
 }
 
-void settle(StepCard& card, const QString& warning) {
+void settle(StepCard& card, const QString& warning, const std::vector<Warning>& all = {}) {
+  if (all.size() > 1)
+    for (const Warning& each : all) card.all << sentence_of(each);
   card.status = warning.isEmpty() ? StepStatus::good : StepStatus::warning;
   card.why = warning;
 }
+
+void doubt(StepCard& card, const std::vector<Warning>& warnings) { settle(card, doubts(warnings), warnings); }
 
 void acquire(StepCard& card, const ApplicationState& state) {
   const auto& views = state.result->views;
@@ -44,7 +48,7 @@ void acquire(StepCard& card, const ApplicationState& state) {
     return settle(card, {});
   }
   card.figure = tr("%1 of %2 X-ray images").arg(come).arg(state.views.size());
-  if (come == std::ssize(state.views)) return settle(card, doubts(warnings_of(state, Phase::acquire)));
+  if (come == std::ssize(state.views)) return doubt(card, warnings_of(state, Phase::acquire));
   card.why = tr("%1 is next").arg(text(state.next_view));
 }
 
@@ -58,7 +62,7 @@ void rectify(StepCard& card, const ApplicationState& state) {
     worst = std::max(worst, done.map.residual_rms_px);
   }
   card.figure = bent ? tr("residual %1 px rms").arg(worst, 0, 'f', 3) : tr("flat panel");
-  settle(card, doubts(warnings_of(state, Phase::rectify)));
+  doubt(card, warnings_of(state, Phase::rectify));
 }
 
 void calibrate(StepCard& card, const ApplicationState& state) {
@@ -72,7 +76,7 @@ void calibrate(StepCard& card, const ApplicationState& state) {
   }
   card.figure =
       tr("FRE %1 mm, %2/%3").arg(state.result->accuracy.fre_mm.mean, 0, 'f', 3).arg(used).arg(balls);
-  settle(card, doubts(warnings_of(state, Phase::calibrate)));
+  doubt(card, warnings_of(state, Phase::calibrate));
 }
 
 void plan(StepCard& card, const ApplicationState& state) {
@@ -115,7 +119,7 @@ void plan(StepCard& card, const ApplicationState& state) {
     return;
   }
   card.figure = tr("within %1 mm (95 %)").arg(worst, 0, 'f', 2);
-  settle(card, doubts(warnings_of(state, Phase::plan)));
+  doubt(card, warnings_of(state, Phase::plan));
   if (state.failed_picks.empty()) return;
   card.status = StepStatus::warning;
   card.why = tr("%1: %2").arg(text(state.failed_picks.front().pick.name),
@@ -210,7 +214,7 @@ void registered(StepCard& card, const ApplicationState& state) {
     warnings.insert(warnings.end(), found.warnings.begin(), found.warnings.end());
   }
   card.figure = tr("within %1 mm (95 %)").arg(worst, 0, 'f', 2);
-  settle(card, doubts(warnings));
+  doubt(card, warnings);
 }
 
 }  // namespace
@@ -261,7 +265,8 @@ StepCards steps_of(const ApplicationState& state) {
     if (state.result && possible) judges[i](card, state);
     if (state.source == Source::images && i > 0) card.why = tr("needs a case");
     const QString changed = state.result && possible ? stale(state, card.phase) : QString();
-    if (!changed.isEmpty() && card.status != StepStatus::waiting) {
+    card.out_of_date = changed;
+    if (!changed.isEmpty() && (card.status != StepStatus::waiting || state.refusals.contains(card.phase))) {
       card.status = StepStatus::stale;
       card.figure.clear();
       card.why = changed;

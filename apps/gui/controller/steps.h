@@ -2,6 +2,7 @@
 #pragma once
 
 #include <QString>
+#include <QStringList>
 
 #include "gui/controller/application_state.h"
 
@@ -17,7 +18,9 @@ struct StepCard {
   StepStatus status = StepStatus::waiting;
   QString figure;
   QString why;
-  bool is_offered = true;  ///< the source has this step
+  bool is_offered = true;    ///< the source has this step
+  QStringList all = {};      ///< all warnings, where there are more than `why` names
+  QString out_of_date = {};  ///< why the figures are not of the present inputs
 };
 
 using StepCards = std::array<StepCard, phases.size()>;

@@ -21,6 +21,7 @@ class FramedXray : public QWidget {
   explicit FramedXray(QWidget* parent = nullptr);
 
   XrayView& xray() { return *xray_; }
+  const XrayView& xray() const { return *xray_; }
   /// As `XrayView::show_view`, with this frame of the view's file.
   void show_view(std::shared_ptr<const pipeline::Result> result, std::size_t view, const ViewFile& file,
                  int frame);

@@ -14,6 +14,7 @@
 #include <QVBoxLayout>
 #include <algorithm>
 
+#include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/register_page.h"
 #include "gui/window/style.h"
@@ -60,6 +61,7 @@ MainWindow::MainWindow(std::filesystem::path sessions, QWidget* parent)
   connect(&controller_, &Controller::refused, this, [this](Phase phase, const QString& why) {
     moved_on_ = false;
     show_phase(phase);
+    log(why);
     statusBar()->showMessage(why);
   });
   connect(&controller_, &Controller::exported, this, &MainWindow::tell_of_the_export);
@@ -95,6 +97,7 @@ void MainWindow::build() {
   });
   sides->addWidget(build_right());
   sides->setStretchFactor(1, 3);
+  sides->setSizes({2000, 1000});  // a third for the scene and the page
   column->addWidget(sides, 1);
   live_bar_ = new LiveBar;
   column->addWidget(live_bar_);
@@ -102,6 +105,7 @@ void MainWindow::build() {
   build_status();
   build_replay();
   build_measures();
+  build_log();
 }
 
 QLayout* MainWindow::build_top() {
@@ -131,6 +135,8 @@ QWidget* MainWindow::build_right() {
   build_pages();
   right->addWidget(pages_);
   right->setSizes({280, 380});
+  right->setStretchFactor(0, 1);
+  right->setStretchFactor(1, 2);
   right_ = right;
   fit_text();
   return right;
@@ -138,6 +144,7 @@ QWidget* MainWindow::build_right() {
 
 void MainWindow::build_pages() {
   pages_ = new QStackedWidget;
+  pages_->setObjectName("pages");
   auto* acquire = new AcquirePage(controller_, this);
   auto* rectify = new RectifyPage(controller_, this);
   plan_ = new PlanPage(controller_, this);
@@ -212,14 +219,19 @@ ApplicationState MainWindow::displayed_state() const {
 }
 
 void MainWindow::show_state() {
-  const ApplicationState state = displayed_state();
-  cards_ = steps_of(state);
+  ApplicationState state = displayed_state();
+  log_steps(std::exchange(cards_, steps_of(state)));
   show_steps();
+  refresh_present();
   if (!state.busy && !moved_on_) show_phase(open_phase(cards_, state));
   if (state.busy)  // its page stays; so does the plan's, where a registration's landmarks are picked
     moved_on_ = state.busy == Phase::registration ||
                 (state.has_models && state.busy == Phase::calibrate && phase_ == Phase::plan);
-  for (Page* page : all_pages_) page->show_state(state);
+  state.result = present_;
+  for (std::size_t i = 0; i < all_pages_.size(); ++i) {
+    all_pages_[i]->show_state(state);
+    all_pages_[i]->show_card(cards_[i], state);
+  }
   setWindowTitle(state.folder.empty() ? tr("helicarm") : tr("helicarm: %1").arg(text(state.folder.string())));
   rehearsal_menu_->setEnabled(state.source == Source::virtual_or);
   busy_->setVisible(state.busy.has_value());
@@ -244,18 +256,41 @@ void MainWindow::show_state() {
   focus_->restore(pages_->currentWidget());
 }
 
-void MainWindow::show_images() {
+void MainWindow::refresh_present() {
   const ApplicationState& state = controller_.state();
-  if (shown_ == state.result && shown_source_ == state.source) return;
-  shown_ = state.result;
-  shown_source_ = state.source;
-  show_recorded();  // only over the images of its own case
-  panels_->show_state(state);
-  if (std::exchange(shown_bones_, state.bones) != state.bones)
-    scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);
-  scene_->show_result(state.measured ? shown_ : nullptr, state.calibrator);
+  const QString why = state.result ? stale(state, Phase::calibrate) : QString();
+  std::set<std::string> points;
+  if (state.result)
+    for (const pipeline::PointResult& point : state.result->points)
+      if (point.source == localization::PointSource::pick && is_stale(state, point.name))
+        points.insert(point.name);
+  if (present_of_ == state.result && why == out_of_date_ && points == stale_points_) return;
+  present_of_ = state.result;
+  out_of_date_ = why;
+  stale_points_ = std::move(points);
+  present_ = present_result(state);
+}
+
+void MainWindow::show_images() {
+  ApplicationState state = controller_.state();
+  state.result = out_of_date_.isEmpty() ? state.result : present_;
+  const bool are_new = shown_ != state.result || shown_source_ != state.source;
+  if (are_new) {
+    shown_ = state.result;
+    shown_source_ = state.source;
+    show_recorded();  // only over the images of its own case
+    panels_->show_state(state);
+    if (std::exchange(shown_bones_, state.bones) != state.bones)
+      scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);
+  }
+  panels_->set_out_of_date(out_of_date_, stale_points_);
+  if (!are_new && in_scene_ == present_) return;
+  in_scene_ = present_;
+  scene_->set_notice(out_of_date_.isEmpty() ? QString() : tr("out of date"));
+  scene_->show_result(state.measured && out_of_date_.isEmpty() ? present_ : nullptr, state.calibrator,
+                      !are_new);
   show_measures();
-  if (state.measured && scene_->preset() == SceneView::Preset::free) scene_->look_near();
+  if (are_new && state.measured && scene_->preset() == SceneView::Preset::free) scene_->look_near();
   show_tre();
 }
 
@@ -282,7 +317,13 @@ void MainWindow::show_models() {
   const ApplicationState& state = controller_.state();
   decltype(shown_nudge_) nudge;
   if (state.nudged) nudge = {state.nudged->model, state.nudged->world_from_model.matrix()};
-  if (shown_registration_ == state.registration && shown_nudge_ == nudge) return;
+  QString out_of_date;  // of each model
+  for (std::size_t i = 0; state.registration && i < state.registration->models.size(); ++i)
+    out_of_date += stale_model(state, i) + '\n';
+  if (shown_registration_ == state.registration && shown_nudge_ == nudge &&
+      shown_stale_models_ == out_of_date)
+    return;
+  shown_stale_models_ = out_of_date;
   shown_registration_ = state.registration;
   shown_nudge_ = nudge;
   scene_->show_models(models_of(state));
@@ -310,8 +351,10 @@ void MainWindow::show_picks_in(std::size_t panel, std::size_t number,
   xray.set_movable_picks(phase_ == Phase::plan && takes ? picks : std::vector<FreshPick>{});
   xray.set_picking(wanted.has_value() && takes);
   if (!panels_->panel(panel).shows_own_frame()) return;
-  if (!next_pick(state))  // the result shows the others
-    std::erase_if(picks, [](const FreshPick& pick) { return pick.why_failed.isEmpty(); });
+  if (!next_pick(state) && out_of_date_.isEmpty())  // the result shows the others
+    std::erase_if(picks, [&](const FreshPick& pick) {
+      return pick.why_failed.isEmpty() && !stale_points_.contains(pick.name.toStdString());
+    });
   xray.set_picks(std::move(picks));
   const auto path = state.path.by_view.find(view.name);
   xray.set_path(path == state.path.by_view.end() ? std::vector<Eigen::Vector2d>{} : path->second);
@@ -386,6 +429,7 @@ void MainWindow::ask_of_pick(std::size_t view, const QString& name, const QPoint
 void MainWindow::show_steps() { strip_->show_steps(with_devices(cards_, displayed_state(), live_)); }
 
 void MainWindow::tell(const QString& words) {
+  log(words);
   statusBar()->clearMessage();
   told_->setText(words);
   told_->setToolTip(words);

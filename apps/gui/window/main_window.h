@@ -3,11 +3,13 @@
 
 #include <QLabel>
 #include <QMainWindow>
+#include <QPlainTextEdit>
 #include <QPointer>
 #include <QSettings>
 #include <QSplitter>
 #include <QStackedWidget>
 #include <filesystem>
+#include <set>
 
 #include "gui/controller/controller.h"
 #include "gui/replay/kept_settings.h"
@@ -78,6 +80,7 @@ class MainWindow : public QMainWindow {
   /// Room for the widest button at the present text size.
   void fit_text();
   void build_layers_menu(QMenu* view);
+  void build_scene_menu(QMenu* view);
   void build_appearance_menu(QMenu* view);
   /// The table, X-ray image or scene that has the focus to the clipboard, else the window.
   void copy();
@@ -88,6 +91,7 @@ class MainWindow : public QMainWindow {
 
   /// The controller's, with the recorded steps at a replayed moment.
   ApplicationState displayed_state() const;
+  void refresh_present();
   void show_state();
   void show_images();
   void show_picks();
@@ -106,6 +110,10 @@ class MainWindow : public QMainWindow {
   void move_pick(std::size_t view, const QString& name, const QPointF& raw);
   void ask_of_pick(std::size_t view, const QString& name, const QPoint& at);
   void show_steps();
+  void build_log();
+  /// A line of the log, with the time.
+  void log(const QString& words);
+  void log_steps(const StepCards& before);
   /// Stands in the status line until something else is to be told.
   void tell(const QString& words);
   void tell_of_the_export();
@@ -157,6 +165,8 @@ class MainWindow : public QMainWindow {
   std::shared_ptr<const pipeline::Result> measures_of_;
   std::vector<std::shared_ptr<const pipeline::Result>> measures_of_frames_;
   QMenu* recent_menu_ = nullptr;
+  QPlainTextEdit* log_ = nullptr;
+  QDockWidget* log_dock_ = nullptr;
   QMenu* rehearsal_menu_ = nullptr;
 
   QPointer<NewCaseDialog> new_case_;
@@ -174,11 +184,15 @@ class MainWindow : public QMainWindow {
   std::optional<operation::LiveTool> recorded_tool_;  ///< of the replayed session's case
   std::optional<std::size_t> recorded_at_;            ///< its registration
   std::shared_ptr<const pipeline::Result> recorded_of_;
-  std::optional<operation::ToolOverlay> recorded_;  ///< at the replayed moment
-  std::shared_ptr<const pipeline::Result> shown_;
+  std::optional<operation::ToolOverlay> recorded_;                           ///< at the replayed moment
+  std::shared_ptr<const pipeline::Result> shown_;                            ///< of the images
+  std::shared_ptr<const pipeline::Result> present_, present_of_, in_scene_;  ///< `present_result`
+  QString out_of_date_;                                                      ///< why the whole measurement is
+  std::set<std::string> stale_points_;
   std::shared_ptr<const simulation::BoneMeshes> shown_bones_;
   std::shared_ptr<const case_registration::CaseRegistration> shown_registration_;
   std::optional<std::pair<std::size_t, Eigen::Matrix4d>> shown_nudge_;  ///< model and pose
+  QString shown_stale_models_;
   Source shown_source_ = Source::none;
   Phase phase_ = Phase::acquire;
   unsigned looks_ = 0;

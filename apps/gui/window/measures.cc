@@ -54,10 +54,10 @@ void MainWindow::build_measure_menu() {
 void MainWindow::show_measures() {
   if (leave_tool_ == nullptr) return;  // the menus are not built yet
   auto frames = panels_->other_frames();
-  if (measures_of_ != shown_ || measures_of_frames_ != frames) {
-    measures_of_ = shown_;
+  if (measures_of_ != present_ || measures_of_frames_ != frames) {
+    measures_of_ = present_;
     measures_of_frames_ = std::move(frames);
-    return measures_->show_result(with_frames(shown_, measures_of_frames_));  // comes back
+    return measures_->show_result(with_frames(present_, measures_of_frames_));  // comes back
   }
   const bool measures = measure_tool_.kind().has_value();
   if (measures) measures_dock_->show();

@@ -4,10 +4,10 @@
 
 #include <QButtonGroup>
 #include <QHBoxLayout>
-#include <QHeaderView>
 #include <QRadioButton>
 #include <QVBoxLayout>
 
+#include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "helicarm/report/tables.h"
@@ -22,6 +22,12 @@ Page::Page(const QString& lead, Controller& controller, QWidget* parent)
   words->setWordWrap(true);
   words->setObjectName("lead");
   column->addWidget(words);
+  why_ = new QLabel;
+  why_->setObjectName("why");
+  why_->setWordWrap(true);
+  why_->setProperty("class", "attention");
+  why_->hide();
+  column->addWidget(why_);
 }
 
 QPushButton* Page::add_button(const QString& words, const char* name, std::function<void()> act) {
@@ -40,24 +46,39 @@ HoldButton* Page::add_hold(const QString& words, const char* name, std::function
   return button;
 }
 
-QTableWidget* Page::add_table(const report::Table& content, const char* name) {
-  auto* table = new QTableWidget(0, int(content.columns.size()));
-  table->setObjectName(name);
-  for (int i = 0; i < table->columnCount(); ++i) {
-    auto* header = new QTableWidgetItem(text(content.columns[std::size_t(i)].title));
-    header->setToolTip(text(content.columns[std::size_t(i)].definition));
-    table->setHorizontalHeaderItem(i, header);
-  }
-  table->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
-  table->horizontalHeader()->setStretchLastSection(true);
-  table->verticalHeader()->hide();
-  table->verticalHeader()->setDefaultSectionSize(24);
-  table->setMinimumHeight(132);  // four rows and the header
-  table->setEditTriggers(QAbstractItemView::NoEditTriggers);
-  table->setSelectionBehavior(QAbstractItemView::SelectRows);
-  table->setTabKeyNavigation(false);
+PageTable* Page::add_table(const report::Table& content, const char* name) {
+  auto* table = new PageTable(content, name);
   layout()->addWidget(table);
+  layout()->addWidget(table->others());
   return table;
+}
+
+bool Page::event(QEvent* event) {
+  const bool done = QWidget::event(event);
+  if (event->type() == QEvent::LayoutRequest || event->type() == QEvent::Resize)
+    setMinimumHeight(layout()->totalMinimumHeightForWidth(width()));
+  return done;
+}
+
+void Page::tell_why_last() {
+  layout()->removeWidget(why_);
+  layout()->addWidget(why_);
+}
+
+void Page::show_card(const StepCard& card, const ApplicationState& state) {
+  const bool by_picks = card.phase == Phase::plan || card.phase == Phase::verify;
+  const bool is_told = card.status == StepStatus::refused || card.status == StepStatus::warning;
+  QString why = card.out_of_date;
+  if (why.isEmpty() && is_told) why = card.all.isEmpty() ? card.why : card.all.join('\n');
+  if (by_picks && state.busy == Phase::calibrate && stale(state, Phase::calibrate).isEmpty()) why.clear();
+  QString message = why.section(" (", 0, -2);  // without its view and code
+  if (message.contains(": ")) message = message.section(": ", 1);
+  for (const QLabel* label : findChildren<QLabel*>())
+    if (label != why_ && label->isVisibleTo(this) &&
+        (label->text().contains(why) || (!message.isEmpty() && label->text().contains(message))))
+      why.clear();
+  why_->setText(why);
+  why_->setVisible(!why.isEmpty());
 }
 
 AcquirePage::AcquirePage(Controller& controller, QWidget* parent)
@@ -167,22 +188,23 @@ RectifyPage::RectifyPage(Controller& controller, QWidget* parent)
   }
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
   table_ = add_table(report::rectification_table({}), "rectifyTable");
+  static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
 void RectifyPage::show_state(const ApplicationState& state) {
-  fill(table_, report::rectification_table(views_of(state)));
+  table_->fill(report::rectification_table(views_of(state)));
 }
 
 CalibratePage::CalibratePage(Controller& controller, QWidget* parent)
     : Page(tr("Labels the calibrator's fiducials and calibrates each view from them."), controller, parent) {
   views_ = add_table(report::calibration_table({}), "viewTable");
-  views_->setFixedHeight(104);
   balls_ = add_table(report::fiducials_table({}), "ballTable");
+  static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
 void CalibratePage::show_state(const ApplicationState& state) {
-  fill(views_, report::calibration_table(views_of(state)));
-  fill(balls_, report::fiducials_table(views_of(state)));
+  views_->fill(report::calibration_table(views_of(state)));
+  balls_->fill(report::fiducials_table(views_of(state)));
 }
 
 }  // namespace helicarm::gui

@@ -5,11 +5,12 @@
 #include <QComboBox>
 #include <QLabel>
 #include <QPushButton>
-#include <QTableWidget>
 
 #include "gui/controller/controller.h"
+#include "gui/controller/steps.h"
 #include "gui/scene/tre_slice.h"
 #include "gui/window/hold_button.h"
+#include "gui/window/page_table.h"
 #include "gui/xray/layers.h"
 #include "helicarm/report/table.h"
 
@@ -22,13 +23,23 @@ class Page : public QWidget {
  public:
   Page(const QString& lead, Controller& controller, QWidget* parent);
   virtual void show_state(const ApplicationState& state) = 0;
+  /// What the step's card has no room for: why it is out of date or refused, and all its warnings. Not what
+  /// the page says itself, nor while new picks are measured: the controls stay where they are.
+  void show_card(const StepCard& card, const ApplicationState& state);
 
  protected:
+  /// As high as its texts need at its width: a scroll area does not ask for that.
+  bool event(QEvent* event) override;
   QPushButton* add_button(const QString& text, const char* name, std::function<void()> act);
   HoldButton* add_hold(const QString& text, const char* name, std::function<void()> act);
-  QTableWidget* add_table(const report::Table& content, const char* name);
+  /// Below the controls, which stay where they are when it is told.
+  void tell_why_last();
+  PageTable* add_table(const report::Table& content, const char* name);
 
   Controller& controller_;
+
+ private:
+  QLabel* why_;
 };
 
 class AcquirePage : public Page {
@@ -63,7 +74,7 @@ class RectifyPage : public Page {
   void layer_wanted(helicarm::gui::Layer layer);
 
  private:
-  QTableWidget* table_;
+  PageTable* table_;
 };
 
 class CalibratePage : public Page {
@@ -74,8 +85,7 @@ class CalibratePage : public Page {
   void show_state(const ApplicationState& state) override;
 
  private:
-  QTableWidget* views_;
-  QTableWidget* balls_;
+  PageTable *views_, *balls_;
 };
 
 /// Position of the slice through the map of the predicted error.
@@ -117,13 +127,13 @@ class PlanPage : public Page {
   void take_as_clicked();
 
   QLabel *next_, *of_models_;
-  QTableWidget *ends_, *tunnels_;
+  PageTable *ends_, *tunnels_;
   std::size_t clickable_ = 0;  ///< rows of `ends_`, the first ones
   QCheckBox* snap_;
   bool snaps_new_ = true;
   QPushButton* take_;
   QPushButton* offered_;
-  QPushButton *delete_, *clear_;
+  QPushButton *delete_, *clear_, *no_tunnels_;
   QWidget* landmark_row_;
   QLabel* unsaved_;
   std::optional<std::string> chosen_;
@@ -165,7 +175,7 @@ class VerifyPage : public Page {
   void report_wanted();
 
  private:
-  QTableWidget* table_;
+  PageTable* table_;
   QLabel *lacks_, *exported_;
 };
 

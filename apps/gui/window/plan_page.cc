@@ -26,7 +26,7 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
   next_->setAlignment(Qt::AlignLeft | Qt::AlignTop);
   layout()->addWidget(next_);
   ends_ = add_table(ends_table({}, {}), "endTable");
-  for (const auto& [error, shown_at] : {std::pair(3, 1), {11, 2}})  // number and reason, in a narrow window
+  for (const auto& [error, shown_at] : {std::pair(3, 1), {11, 2}})  // number and reason first
     ends_->horizontalHeader()->moveSection(error, shown_at);
   connect(ends_, &QTableWidget::itemSelectionChanged, this, [this] {
     const int row = ends_->currentRow();
@@ -39,7 +39,6 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
     emit target_changed();
   });
   tunnels_ = add_table(plan_tunnels_table({}), "tunnelTable");
-  tunnels_->setMinimumHeight(80);  // two rows and the header
   of_models_ =
       new QLabel(tr("Tunnels of a model's plan are for looking and for the export: the robot moves to picked "
                     "tunnels only."));
@@ -76,6 +75,9 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
     controller_.clear_picks();
   });
   for (QWidget* button : {delete_, clear_}) row->addWidget(button);
+  no_tunnels_ = add_button(tr("&Without tunnels: other points only"), "noTunnels",
+                           [this] { controller_.leave_out_tunnels(); });
+  no_tunnels_->setToolTip(tr("Asks no more for the ends of tunnels of which none is picked"));
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
   add_landmark_row();
   unsaved_ = new QLabel;
@@ -83,6 +85,8 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
   unsaved_->setWordWrap(true);
   layout()->addWidget(unsaved_);
   add_map();
+  tell_why_last();
+  static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
 namespace {
@@ -163,6 +167,7 @@ void PlanPage::add_map() {
   map->setObjectName("treMap");
   auto* axis = new QComboBox;
   axis->setObjectName("treAxis");
+  axis->setAccessibleName(tr("Axis of the slice"));
   axis->addItems({"x", "y", "z"});
   axis->setCurrentIndex(2);
   axis->setToolTip(tr("The slice is perpendicular to this axis of the calibrator"));
@@ -207,19 +212,23 @@ void PlanPage::show_state(const ApplicationState& state) {
     }
   for (const std::string& landmark : state.landmarks) points.push_back({landmark, tr("landmark")});
   clickable_ = points.size();
-  for (const auto& [model, is_moved] : usable_models(state))
+  for (const auto& [model, out_of_date] : usable_models(state))
     for (const case_registration::RegisteredPoint& point : model->points)
-      points.push_back({point.name, tr("plan of %1").arg(text(model->registration.name)), &point, is_moved});
+      points.push_back(
+          {point.name, tr("plan of %1").arg(text(model->registration.name)), &point, out_of_date});
   if (state.result)
     for (const localization::TargetError& target : state.result->accuracy.targets)
       points.push_back({target.name, tr("target, error %1 mm").arg(number(target.error_mm, 3))});
-  fill(ends_, ends_table(state, points));
+  ends_->fill(ends_table(state, points));
   const auto tunnels = plan_tunnels(state);
-  fill(tunnels_, plan_tunnels_table(tunnels));
+  tunnels_->fill(plan_tunnels_table(tunnels));
   tunnels_->setVisible(std::ranges::any_of(tunnels, &PlanTunnelRow::is_of_model));
   of_models_->setVisible(tunnels_->isVisibleTo(this));
   offered_->setVisible(!state.offered_picks.empty());
   landmark_row_->setVisible(state.source == Source::files);
+  no_tunnels_->setVisible(
+      state.source == Source::files &&
+      std::ranges::any_of(state.tunnels, [&](const auto& tunnel) { return is_unpicked(state, tunnel); }));
   unsaved_->setVisible(state.has_unsaved_picks || state.picks_not_kept);
   unsaved_->setText(
       state.picks_not_kept
@@ -263,9 +272,9 @@ namespace {
 
 /// What is wrong with the first point whose picks do not agree; empty if there is none.
 QString contradicting_pick(const ApplicationState& state) {
-  if (state.result)
+  if (state.result && stale(state, Phase::calibrate).isEmpty())
     for (const pipeline::PointResult& point : state.result->points) {
-      if (point.source != localization::PointSource::pick) continue;
+      if (point.source != localization::PointSource::pick || is_stale(state, point.name)) continue;
       if (point.reason)
         return QObject::tr("%1 is not located: %2.").arg(text(point.name), sentence_of(*point.reason));
       if (point.rays_miss)
@@ -318,8 +327,8 @@ QString PlanPage::next_words() const {
   }
   if (!state.picks.empty())
     return tr(
-        "All points are placed. To move one, drag it, or select it in the table and click its new position "
-        "in each X-ray image; further views make it more accurate.");
+        "All points are placed. To move one, drag it, or select it in the table and click it again in each "
+        "image; further views make it more accurate.");
   if (state.registration)
     return tr(
         "The points below come from the plans of the models and move with these (Alt+7). To locate another "

@@ -37,7 +37,7 @@ std::string views_with(const ApplicationState& state, const std::string& point) 
 }
 
 pipeline::PointResult located(const ApplicationState& state, const PlannedPoint& planned) {
-  if (!planned.of_model && state.result && !state.has_other_options && !is_stale(state, planned.name)) {
+  if (!planned.of_model && state.result && !is_stale(state, planned.name)) {
     const auto& points = state.result->points;
     const auto found = std::ranges::find(points, planned.name, &pipeline::PointResult::name);
     if (found != points.end()) return *found;
@@ -45,7 +45,7 @@ pipeline::PointResult located(const ApplicationState& state, const PlannedPoint&
   pipeline::PointResult point;
   point.name = planned.name;
   point.source = localization::PointSource::pick;
-  if (planned.of_model && !planned.is_moved) {
+  if (planned.of_model && planned.out_of_date.isEmpty()) {
     point.place = planned.of_model->place;
     point.ray_gap_mm = std::numeric_limits<double>::quiet_NaN();  // no rays
   }
@@ -64,8 +64,7 @@ PlanTunnelRow row_of(const std::string& name, const std::string& planned_by, boo
 
 /// Why a row has no numbers that is not a reason of the result; empty where it has, or needs none.
 QString remark_of(const ApplicationState& state, const PlannedPoint& planned) {
-  if (planned.of_model)
-    return planned.is_moved ? PlanPage::tr("model moved by hand: register it there") : QString();
+  if (planned.of_model) return planned.out_of_date;
   for (const std::string& view : state.views)
     if (const Failure* failed = failure_of(state, planned.name, view)) return sentence_of(*failed);
   if (is_picked(state.picks, state.views, planned.name) && is_stale(state, planned.name))
@@ -114,7 +113,7 @@ std::vector<UsableModel> usable_models(const ApplicationState& state) {
   if (!state.registration) return models;
   for (std::size_t i = 0; i < state.registration->models.size(); ++i)
     if (const RegisteredModel& model = state.registration->models[i]; !model.registration.failure)
-      models.push_back({&model, is_moved(state, i)});
+      models.push_back({&model, stale_model(state, i)});
   return models;
 }
 
@@ -132,15 +131,16 @@ std::vector<PlanTunnelRow> plan_tunnels(const ApplicationState& state) {
     }
   }
   constexpr double none = std::numeric_limits<double>::quiet_NaN();
-  for (const auto& [model, is_moved] : usable_models(state))
+  for (const auto& [model, out_of_date] : usable_models(state))
     for (std::size_t i = 0; i < model->tunnels.size(); ++i) {
       const QString plan = PlanPage::tr("plan of %1").arg(text(model->registration.name));
       PlanTunnelRow row = row_of(model->tunnels[i].name, plan.toStdString(), true,
                                  model->points[model->tunnel_ends[i].start].place,
                                  model->points[model->tunnel_ends[i].end].place);
-      if (is_moved) {
-        row.planned_by = PlanPage::tr("%1, moved by hand").arg(plan).toStdString();
+      if (!out_of_date.isEmpty()) {
+        row.planned_by = PlanPage::tr("%1, out of date").arg(plan).toStdString();
         row.start_95_mm = row.end_95_mm = none;
+        if (!stale(state, Phase::calibrate).isEmpty()) row.length_mm = none;  // its file may have changed
       }
       rows.push_back(std::move(row));
     }

@@ -15,7 +15,7 @@ struct PlannedPoint {
   std::string name;
   QString kind;
   const case_registration::RegisteredPoint* of_model = nullptr;
-  bool is_moved = false;  ///< its model, by hand since the registration
+  QString out_of_date = {};  ///< why its model's pose is not of the present inputs
 };
 
 /// The points as the report shows them, and where each is marked. One without a result has a name only.
@@ -24,7 +24,7 @@ report::Table ends_table(const ApplicationState& state, const std::vector<Planne
 /// A registered model that is not refused.
 struct UsableModel {
   const case_registration::RegisteredModel* model;
-  bool is_moved;  ///< by hand since the registration: no number of it holds
+  QString out_of_date;  ///< `stale_model`: no number of it holds
 };
 std::vector<UsableModel> usable_models(const ApplicationState& state);
 

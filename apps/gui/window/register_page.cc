@@ -55,9 +55,9 @@ QString reasons_of(const CaseRegistration& done) {
 std::vector<RegisteredModel> listed_models(const ApplicationState& state) {
   std::vector<RegisteredModel> models;
   if (state.registration) {
-    models = with_moves(state).models;
+    models = present_registration(state).models;
     for (std::size_t i = 0; i < models.size(); ++i)
-      if (is_moved(state, i)) {
+      if (!stale_model(state, i).isEmpty()) {
         models[i].registration.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
         models[i].registration.views.clear();
       }
@@ -69,18 +69,16 @@ std::vector<RegisteredModel> listed_models(const ApplicationState& state) {
 
 report::Table table_of_models(const ApplicationState& state, const std::vector<RegisteredModel>& models) {
   report::Table table = case_registration::models_table(models);
-  const bool is_out_of_date = !stale(state, Phase::registration).isEmpty();
   const auto say = [&](std::size_t model, const QString& words, bool is_bad) {
     table.rows[model][1] = {words.toStdString(), is_bad};
-    if (!is_bad)
-      for (std::size_t i = 2; i < table.rows[model].size(); ++i) table.rows[model][i] = report::Cell{};
+    for (std::size_t i = 2; i < table.rows[model].size(); ++i) table.rows[model][i] = report::Cell{};
   };
   for (std::size_t i = 0; i < models.size(); ++i) {
     if (!state.registration)
       say(i, RegisterPage::tr("not registered"), false);
     else if (is_moved(state, i))
       say(i, RegisterPage::tr("moved by hand"), true);
-    else if (is_out_of_date && !state.nudged)
+    else if (!stale_model(state, i).isEmpty())
       say(i, RegisterPage::tr("out of date"), true);
   }
   return table;
@@ -102,9 +100,9 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
   says_->setWordWrap(true);
   layout()->addWidget(says_);
   models_ = add_table(case_registration::models_table({}), "modelTable");
-  models_->setFixedHeight(104);
   add_hand();
   points_ = add_table(case_registration::points_table({}), "modelPointTable");
+  static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
 void RegisterPage::add_hand() {
@@ -161,14 +159,14 @@ void RegisterPage::nudge() {
 }
 
 void RegisterPage::show_state(const ApplicationState& state) {
-  const bool can = can_register(state) && !state.busy;
+  const bool can = can_register(state) && !state.busy && stale(state, Phase::calibrate).isEmpty();
   register_->setEnabled(can);
   hand_->setEnabled(can && state.registration);
   from_here_->setEnabled(can && state.nudged);
   says_->setText(words_of(state));
   const std::vector<RegisteredModel> models = listed_models(state);
-  fill(models_, table_of_models(state, models));
-  fill(points_, case_registration::points_table(models));
+  models_->fill(table_of_models(state, models));
+  points_->fill(case_registration::points_table(models));
   if (shown_ == state.registration) return;
   shown_ = state.registration;
   const QSignalBlocker quiet(model_);
@@ -182,6 +180,7 @@ void RegisterPage::show_state(const ApplicationState& state) {
 
 QString RegisterPage::words_of(const ApplicationState& state) const {
   if (state.busy == Phase::registration) return text(state.doing);
+  if (const QString all = stale(state, Phase::calibrate); !all.isEmpty()) return all + ".";
   const auto refusal = state.refusals.find(Phase::registration);
   const bool is_ended = refusal != state.refusals.end() && is_cancelled(refusal->first, refusal->second);
   if (refusal != state.refusals.end() && !is_ended) return sentence_of(refusal->second);
@@ -208,9 +207,16 @@ std::vector<ModelShape> models_of(const ApplicationState& state) {
     std::optional<geometry::RigidTransform> by_hand;
     if (state.nudged && state.nudged->model == i) by_hand = state.nudged->world_from_model;
     const QColor& ink = ink::of_model(i);
-    if (auto shape = shape_of(state.registration->models[i], by_hand,
-                              {std::uint8_t(ink.red()), std::uint8_t(ink.green()), std::uint8_t(ink.blue())}))
+    if (auto shape =
+            shape_of(state.registration->models[i], by_hand,
+                     {std::uint8_t(ink.red()), std::uint8_t(ink.green()), std::uint8_t(ink.blue())})) {
+      if (shape->state == ModelShape::State::registered && !stale_model(state, i).isEmpty()) {
+        shape->state = ModelShape::State::out_of_date;
+        shape->points.clear();
+        shape->tunnels.clear();
+      }
       shapes.push_back(*std::move(shape));
+    }
   }
   return shapes;
 }
@@ -224,7 +230,8 @@ std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t
     const auto& dots = is_nudged ? state.nudged->outlines : model.outlines;
     ModelOutline& outline = outlines.emplace_back();
     if (view < dots.size()) outline.dots = dots[view];
-    if (is_nudged || model.registration.failure || view >= model.views.size()) continue;
+    if (!stale_model(state, i).isEmpty() || model.registration.failure || view >= model.views.size())
+      continue;
     const geometry::View& camera = model.views[view];
     for (const auto& [start, end] : model.tunnel_ends) {
       const Eigen::Vector3d &from = model.points[start].place.in_calibrator,

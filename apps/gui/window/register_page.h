@@ -27,7 +27,7 @@ class RegisterPage : public Page {
 
   QPushButton *register_, *from_here_;
   QLabel* says_;
-  QTableWidget *models_, *points_;
+  PageTable *models_, *points_;
   QWidget* hand_;
   QComboBox* model_;
   std::array<PoseBox*, 6> by_{};  ///< mm, then degrees

@@ -69,7 +69,7 @@ TEST_F(Window, AModelIsRegisteredAndMovedByHand) {
   EXPECT_TRUE(tunnels->isVisible());
   ASSERT_EQ(tunnels->rowCount(), 1);
   EXPECT_EQ(tunnels->item(0, 0)->text(), "tunnel");
-  EXPECT_EQ(tunnels->item(0, 1)->text(), "plan of bone, moved by hand");
+  EXPECT_EQ(tunnels->item(0, 1)->text(), "plan of bone, out of date");
   EXPECT_EQ(tunnels->item(0, 3)->text(), "–");
   EXPECT_EQ(card(Phase::plan).status, StepStatus::stale);
   for (const char* axis : {"shiftX", "shiftY"}) find<QDoubleSpinBox>(axis)->setValue(0);

@@ -160,20 +160,24 @@ VerifyPage::VerifyPage(Controller& controller, QWidget* parent)
   connect(exported_, &QLabel::linkActivated, this,
           [](const QString& folder) { QDesktopServices::openUrl(QUrl::fromLocalFile(folder)); });
   table_ = add_table(report::verification_table({}), "outcomeTable");
+  static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
 void VerifyPage::show_state(const ApplicationState& state) {
   std::vector<report::ToolAtEnd> tools;
-  for (const auto& [name, outcome] : state.outcomes)
+  const auto outcomes = stale(state, Phase::verify).isEmpty() ? state.outcomes : decltype(state.outcomes)();
+  for (const auto& [name, outcome] : outcomes)
     for (const auto& [end, miss, in_images] :
          {std::tuple("start", &outcome.start, &guidance::Verification::start),
           std::tuple("end", &outcome.end, &guidance::Verification::end)})
       tools.push_back({name, end, miss->distance_mm(), miss->predicted_mm(),
                        outcome.verification ? (*outcome.verification).*in_images : std::nullopt});
   if (tools.empty() && state.result) tools = report::tools_at_ends(state.result->verifications);
-  fill(table_, report::verification_table(tools));
+  table_->fill(report::verification_table(tools));
   const QStringList lacks = lacks_of_export(state);
   lacks_->setText(lacks.isEmpty() ? QString() : tr("An export lacks:\n%1").arg(lacks.join("\n")));
+  lacks_->setVisible(!lacks.isEmpty());
+  exported_->setVisible(state.exported.has_value());
   if (!state.exported) return exported_->clear();
   const QString folder = text(state.exported->folder.string()).toHtmlEscaped();
   QString words =

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "gui/window/style.h"
@@ -34,6 +35,8 @@ struct ViewStatus {
 
 ViewStatus status_of(const ApplicationState& state, const pipeline::ViewResult& view) {
   if (state.source == Source::images) return {QObject::tr("image")};
+  if (const QString why = stale(state, Phase::calibrate); !why.isEmpty())
+    return {QObject::tr("out of date"), style::colours().amber, why};
   for (const auto& [phase, refusal] : state.refusals)
     if (refusal.view == view.name)
       return {QObject::tr("refused"), style::colours().red, sentence_of(refusal)};
@@ -74,6 +77,7 @@ void XrayPanels::build() {
             [this, panel](const QString& name, const QPoint& global) {
               if (const auto view = panel->view()) emit pick_menu_wanted(*view, name, global);
             });
+    connect(&panel->xray(), &XrayView::zoomed, this, &XrayPanels::scale_residuals);
     connect(panel, &FramedXray::frame_read, this, &XrayPanels::displayed);
     connect(panel, &FramedXray::frame_changed, this, [this](std::size_t view, int frame) {
       frames_.at(view) = frame;
@@ -175,6 +179,21 @@ void XrayPanels::set_large(std::size_t number) {
 
 void XrayPanels::set_layer(Layer layer) {
   for (FramedXray* panel : panels_) panel->xray().set_layer(layer);
+}
+
+void XrayPanels::scale_residuals() {
+  double zoom = 0;
+  for (const FramedXray* panel : panels_)
+    if (panel->isVisibleTo(this)) zoom = std::max(zoom, panel->xray().zoom_factor());
+  for (FramedXray* panel : panels_)
+    panel->xray().set_residual_scale(result_ ? residual_scale(*result_, zoom) : ResidualScale{});
+}
+
+void XrayPanels::set_out_of_date(const QString& why, const std::set<std::string>& points) {
+  for (FramedXray* panel : panels_) {
+    panel->xray().set_notice(why.isEmpty() ? QString() : tr("out of date"));
+    panel->xray().set_stale_points(points);
+  }
 }
 
 void XrayPanels::fill_thumbnails(const ApplicationState& state) {

@@ -36,6 +36,8 @@ class XrayPanels : public QWidget {
   /// Two or four.
   void set_large(std::size_t number);
   void set_layer(Layer layer);
+  /// Over each image: why nothing measured is drawn, and points whose picks have changed.
+  void set_out_of_date(const QString& why, const std::set<std::string>& points);
 
  signals:
   void picked(std::size_t view, const QPointF& raw);
@@ -51,6 +53,7 @@ class XrayPanels : public QWidget {
   void fill(std::size_t panel);
   void fill_thumbnails(const ApplicationState& state);
   void mark_displayed();
+  void scale_residuals();
 
   std::array<FramedXray*, most_large> panels_{};
   std::array<QSplitter*, 2> rows_{};

@@ -90,26 +90,22 @@ void paint_balls(QPainter& painter, const report::ViewMarks& marks, const ImageF
 
 /// Residual arrows of the fiducials and their scale bar.
 void paint_residuals(QPainter& painter, const report::ViewMarks& marks, const ImageFrame& frame,
-                     const QRectF& bounds, LabelPlacer& labels) {
-  constexpr double longest_arrow = 45;
-  const double largest = report::largest_residual(marks);
-  if (!(largest > 0)) return;
-  const double magnification = report::round_below(std::max(1.0, longest_arrow / (largest * frame.scale)));
-  const double enlarged = magnification * frame.scale;
+                     const ResidualScale& scale, const QRectF& bounds, LabelPlacer& labels) {
+  if (!(report::largest_residual(marks) > 0 && scale.magnification > 0)) return;
+  const double enlarged = scale.magnification * frame.scale, length = scale.bar_px;
   for (const report::BallMark& ball : marks.balls)
     if (ball.used && ball.residual) {
       const QPointF at = frame.to_widget(ball.place), way = enlarged * as_point(*ball.residual);
       arrow(painter, at, way);
       labels.keep_free(QRectF(at, at + way).normalized().adjusted(-2, -2, 2, 2));
     }
-  const double length = report::round_below(longest_arrow / enlarged);
   const QPointF left = bounds.bottomLeft() + QPointF(14, -14), right = left + QPointF(length * enlarged, 0);
   edged(painter, QPen(ink::residual, 2), [&] {
     painter.drawLine(left, right);
     for (const QPointF& end : {left, right}) painter.drawLine(end + QPointF(0, -4), end + QPointF(0, 4));
   });
   outlined_text(painter, left + QPointF(-2, -9),
-                QObject::tr("residuals × %1, %2 px").arg(magnification).arg(length), ink::residual);
+                QObject::tr("residuals × %1, %2 px").arg(scale.magnification).arg(length), ink::residual);
 }
 
 void paint_point(QPainter& painter, const report::PointMark& point, const QPointF& at) {
@@ -139,7 +135,7 @@ void paint_path(QPainter& painter, const rectification::PixelPath& path, const I
 }
 
 void paint_marks(QPainter& painter, const report::ViewMarks& marks, const ImageFrame& frame, int image_width,
-                 const QRectF& bounds) {
+                 const QRectF& bounds, const ResidualScale& residuals) {
   const double radius = ball_radius(frame, image_width);
   painter.setBrush(Qt::NoBrush);
   painter.setPen(QPen(ink::plate, 1));
@@ -165,7 +161,7 @@ void paint_marks(QPainter& painter, const report::ViewMarks& marks, const ImageF
     labels.keep_free(square(frame.to_widget(ball.place), 0.8 * radius));
   for (const report::PointMark& point : marks.points)
     labels.keep_free(square(frame.to_widget(point.place), 6));
-  paint_residuals(painter, marks, frame, bounds, labels);
+  paint_residuals(painter, marks, frame, residuals, bounds, labels);
   for (const report::BallMark& ball : marks.balls)
     labels.place(painter, frame.to_widget(ball.place), radius, QString::fromStdString(ball.label),
                  ball.used ? ink::ball : ink::rejected);

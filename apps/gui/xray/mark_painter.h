@@ -5,6 +5,7 @@
 #include <QPainter>
 
 #include "gui/xray/image_frame.h"
+#include "gui/xray/residual_scale.h"
 #include "helicarm/report/marks.h"
 
 namespace helicarm::gui {
@@ -22,7 +23,7 @@ inline const QColor& of_model(std::size_t number) { return models[number % std::
 /// Draws the detections. Line widths do not depend on zoom; `image_width` sets the radius of the fiducials'
 /// circles.
 void paint_marks(QPainter& painter, const report::ViewMarks& marks, const ImageFrame& frame, int image_width,
-                 const QRectF& bounds);
+                 const QRectF& bounds, const ResidualScale& residuals);
 
 /// A line with a dark edge, visible on a bright background.
 void paint_path(QPainter& painter, const rectification::PixelPath& path, const ImageFrame& frame,

@@ -99,7 +99,10 @@ void XrayView::take(const std::shared_ptr<const LoadedLayer>& layer) {
   window_image();
   marks_ = marks_of(*result_, view_, shown_->layer);
   setAccessibleDescription(refusal_ ? refusal_->reason + " " + described(marks_) : described(marks_));
-  if (fits_) fit();
+  if (fits_)
+    fit();
+  else
+    Q_EMIT zoomed();
   live_.forget_layer();
   hide_repeated_picks();
   hover_over({});
@@ -184,13 +187,14 @@ void XrayView::hide_repeated_picks() {
   for (const FreshPick& pick : picks_) {
     const std::string name = pick.name.toStdString();
     const auto mark = std::ranges::find(marks_.points, name, &report::PointMark::name);
-    const bool is_marked = mark != marks_.points.end() && shown_;
+    const bool is_old = stale_.contains(name), is_marked = mark != marks_.points.end() && shown_;
     const auto raw = is_marked ? raw_from_layer(view(), shown_->layer, mark->place) : std::nullopt;
-    if (raw && (*raw - pick.raw).norm() < reach_px && pick.why_failed.isEmpty()) continue;
+    if (raw && !is_old && (*raw - pick.raw).norm() < reach_px && pick.why_failed.isEmpty()) continue;
     if (is_marked) moved.insert(name);
     fresh.push_back(pick);
   }
   live_.set_picks(std::move(fresh));
+  moved.insert(stale_.begin(), stale_.end());
   if (moved != superseded_) {
     superseded_ = std::move(moved);
     redraw_still();
@@ -201,6 +205,18 @@ void XrayView::hide_repeated_picks() {
 void XrayView::set_mark_groups(MarkGroups groups) {
   groups_ = groups;
   redraw_still();
+}
+
+void XrayView::set_notice(const QString& notice) {
+  if (std::exchange(notice_, notice) != notice) update();
+}
+
+void XrayView::set_stale_points(const std::set<std::string>& points) {
+  if (std::exchange(stale_, points) != points) hide_repeated_picks();
+}
+
+void XrayView::set_residual_scale(const ResidualScale& scale) {
+  if (std::exchange(residual_scale_, scale) != std::optional(scale)) redraw_still();
 }
 
 QString XrayView::refusal() const {
@@ -245,6 +261,7 @@ void XrayView::fit() {
   fits_ = true;
   frame_ = ImageFrame::fitted(image_size(), size());
   redraw_still();
+  Q_EMIT zoomed();
 }
 
 void XrayView::resizeEvent(QResizeEvent* event) {

@@ -14,6 +14,7 @@
 #include "gui/xray/mark_groups.h"
 #include "gui/xray/measure_marks.h"
 #include "gui/xray/refusal_text.h"
+#include "gui/xray/residual_scale.h"
 
 namespace helicarm::gui {
 
@@ -46,6 +47,14 @@ class XrayView : public QWidget {
   /// Whether the detections are drawn; live marks are always drawn.
   void set_marks_visible(bool visible);
   void set_mark_groups(MarkGroups groups);
+  /// Beside the caption, in amber; empty: none.
+  void set_notice(const QString& notice);
+  /// Points whose marks are not of their present picks: not drawn.
+  void set_stale_points(const std::set<std::string>& points);
+  /// Of the residuals' arrows, where it is that of several views.
+  void set_residual_scale(const ResidualScale& scale);
+  /// Screen px of an image's px; 0 without an image.
+  double zoom_factor() const { return shown_ ? frame_.scale : 0; }
   /// The displayed part of the image with its marks, without cursor and magnifier.
   QImage image_with_marks();
   /// The reason of a refused result and, once opened, its details; empty without one.
@@ -93,6 +102,8 @@ class XrayView : public QWidget {
   void window_changed(helicarm::image::GreyWindow window);
   /// The requested layer is displayed.
   void shown();
+  /// The zoom factor has changed.
+  void zoomed();
 
  protected:
   void paintEvent(QPaintEvent* event) override;
@@ -133,6 +144,8 @@ class XrayView : public QWidget {
   void show_moved(const std::optional<QPointF>& raw);
   void hover_at(const QPointF& place);
   void hover_over(const std::optional<MarkUnderCursor>& mark);
+  /// Those of the displayed groups, without superseded points.
+  report::ViewMarks drawn_marks() const;
   void paint_still();
   void paint_magnifier(QPainter& painter) const;
   void paint_words(QPainter& painter) const;
@@ -159,6 +172,9 @@ class XrayView : public QWidget {
   MarkGroups groups_ = all_marks;
   std::vector<FreshPick> picks_;      ///< as given
   std::set<std::string> superseded_;  ///< points whose pick has moved since the result
+  std::set<std::string> stale_;       ///< as given
+  QString notice_;
+  std::optional<ResidualScale> residual_scale_;  ///< nothing: by this view alone
   std::optional<RefusalText> refusal_;
   bool details_visible_ = false;
   LiveMarks live_;

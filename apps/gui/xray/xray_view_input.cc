@@ -36,6 +36,7 @@ void XrayView::zoom(double factor, const QPointF& about) {
   fits_ = false;
   frame_ = frame_.zoomed(factor, about, smallest).within(image_size(), size());
   redraw_still();
+  Q_EMIT zoomed();
 }
 
 void XrayView::pan(const QPointF& by) {
@@ -208,7 +209,10 @@ void XrayView::pick_at(const QPointF& place) {
 
 void XrayView::hover_at(const QPointF& place) {
   constexpr double reach = 14;  // screen px
-  if (shown_) hover_over(mark_near(marks_, frame_.to_image(place), reach / frame_.scale));
+  if (!shown_) return;
+  report::ViewMarks marks = marks_;
+  std::erase_if(marks.points, [&](const report::PointMark& mark) { return superseded_.contains(mark.name); });
+  hover_over(mark_near(marks, frame_.to_image(place), reach / frame_.scale));
 }
 
 void XrayView::hover_over(const std::optional<MarkUnderCursor>& mark) {

@@ -58,13 +58,18 @@ void XrayView::paint_still() {
   if (!marks_visible_) return;
   painter.setRenderHint(QPainter::Antialiasing);
   painter.setFont(label_font(font()));
+  paint_marks(painter, drawn_marks(), frame_, grey_.width(), rect(),
+              residual_scale_.value_or(residual_scale(*result_, frame_.scale)));
+}
+
+report::ViewMarks XrayView::drawn_marks() const {
   report::ViewMarks marks = only(groups_, marks_);
   std::erase_if(marks.points, [&](const report::PointMark& mark) { return superseded_.contains(mark.name); });
   if (!superseded_.empty()) {  // they join the earlier places
     marks.tunnels.clear();
     marks.tool_lines.clear();
   }
-  paint_marks(painter, marks, frame_, grey_.width(), rect());
+  return marks;
 }
 
 QImage XrayView::image_with_marks() {
@@ -101,7 +106,8 @@ void XrayView::paint_refusal(QPainter& painter) const {
   painter.setPen(QColor(240, 243, 247));
   painter.drawText(box.adjusted(rim, rim, -rim, -rim), Qt::TextWordWrap, refusal());
   painter.setPen(ink::quiet);
-  painter.drawText(box.adjusted(rim, rim, -rim, -rim), Qt::AlignBottom | Qt::AlignLeft, refusal_hint());
+  painter.drawText(box.adjusted(rim, rim, -rim, -rim), Qt::AlignBottom | Qt::AlignLeft | Qt::TextWordWrap,
+                   refusal_hint());
 }
 
 void XrayView::paint_magnifier(QPainter& painter) const {
@@ -138,6 +144,8 @@ void XrayView::paint_words(QPainter& painter) const {
   if (!marks_visible_) caption += tr("  ·  marks hidden");
   if (computing_) caption += tr("  ·  computing …");
   outlined_text(painter, {12, 22}, caption, ink::quiet);
+  if (!notice_.isEmpty())
+    outlined_text(painter, {12, 22.0 + painter.fontMetrics().height()}, notice_, ink::tunnel);
   paint_readout(painter);
   if (shows_refusal()) paint_refusal(painter);
   if (under_)
