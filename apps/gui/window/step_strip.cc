@@ -35,20 +35,23 @@ Appearance appearance_of(StepStatus status) {
   return {};
 }
 
-/// As much of a text as two lines hold, elided at the end.
-QString two_lines(const QString& text, const QFontMetrics& metrics, int width) {
-  QString first;
-  for (const QString& word : text.split(' ')) {
-    const QString longer = first.isEmpty() ? word : first + ' ' + word;
-    if (metrics.horizontalAdvance(longer) > width) break;
-    first = longer;
+/// A text in at most so many lines, elided at the end.
+QStringList in_lines(const QString& text, int most, const QFontMetrics& metrics, int width) {
+  QStringList lines;
+  QString rest = text;
+  while (!rest.isEmpty() && lines.size() < most - 1 && metrics.horizontalAdvance(rest) > width) {
+    qsizetype fits = 1;  // characters; to the end of a word where a word fits
+    while (fits < rest.size() && metrics.horizontalAdvance(rest.left(fits + 1)) <= width) ++fits;
+    const qsizetype space = rest.lastIndexOf(' ', fits);
+    lines << rest.left(space > 0 ? space : fits);
+    rest = rest.mid(lines.back().size()).trimmed();
   }
-  if (first.isEmpty())  // a word of more than a line
-    while (first.size() < text.size() && metrics.horizontalAdvance(text.left(first.size() + 1)) <= width)
-      first = text.left(first.size() + 1);
-  const QString rest = text.mid(first.size()).trimmed();
-  return rest.isEmpty() ? first : first + '\n' + metrics.elidedText(rest, Qt::ElideRight, width);
+  if (!rest.isEmpty()) lines << metrics.elidedText(rest, Qt::ElideRight, width);
+  return lines;
 }
+
+constexpr int card_px = 92, head_px = 22, lines_of_card = 4;
+constexpr int line_px = 15, text_px = 12;
 
 }  // namespace
 
@@ -102,9 +105,9 @@ void StepButton::show_card(const StepCard& card) {
   update();
 }
 
-QSize StepButton::sizeHint() const { return {style::scaled(180), style::scaled(76)}; }
+QSize StepButton::sizeHint() const { return {style::scaled(180), style::scaled(card_px)}; }
 
-QSize StepButton::minimumSizeHint() const { return {100, style::scaled(76)}; }
+QSize StepButton::minimumSizeHint() const { return {100, style::scaled(card_px)}; }
 
 void StepButton::paintEvent(QPaintEvent*) {
   const Appearance appearance = appearance_of(card_.status);
@@ -130,25 +133,33 @@ void StepButton::paintEvent(QPaintEvent*) {
   painter.drawText(inner, Qt::AlignRight | Qt::AlignTop, appearance.sign);
   painter.setPen(style::colours().text);
   painter.drawText(inner, Qt::AlignLeft | Qt::AlignTop, card_.name);
+  const auto [figure, why] = words();
   font.setBold(false);
-  const auto line = [&](const QString& text, int top, const QColor& colour) {
-    for (int px = 13; px >= 10; --px) {  // a number is not cut
-      font.setPixelSize(style::scaled(px));
-      painter.setFont(font);
-      if (painter.fontMetrics().horizontalAdvance(text) <= inner.width()) break;
-    }
-    painter.setPen(colour);
-    painter.drawText(QRectF(inner.left(), inner.top() + style::scaled(top), inner.width(), style::scaled(18)),
-                     Qt::AlignLeft | Qt::AlignVCenter,
-                     painter.fontMetrics().elidedText(text, Qt::ElideRight, int(inner.width())));
-  };
-  line(card_.figure.isEmpty() ? appearance.word : card_.figure, 20, style::colours().text);
-  painter.setPen(card_.status == StepStatus::good ? style::colours().quiet : appearance.colour);
-  font.setPixelSize(style::scaled(12));
+  font.setPixelSize(style::scaled(text_px));
   painter.setFont(font);
-  const QRectF reason = inner.adjusted(0, style::scaled(37), 0, 0);
-  painter.drawText(reason, Qt::AlignLeft | Qt::AlignTop | Qt::TextWordWrap,
-                   two_lines(card_.why, painter.fontMetrics(), int(reason.width())));
+  double top = inner.top() + style::scaled(head_px);
+  const auto paint = [&](const QStringList& lines, const QColor& colour) {
+    painter.setPen(colour);
+    for (const QString& line : lines) {
+      painter.drawText(QRectF(inner.left(), top, inner.width(), style::scaled(line_px)),
+                       Qt::AlignLeft | Qt::AlignVCenter, line);
+      top += style::scaled(line_px);
+    }
+  };
+  paint(figure, style::colours().text);
+  paint(why, card_.status == StepStatus::good ? style::colours().quiet : appearance.colour);
+}
+
+StepButton::Words StepButton::words() const {
+  QFont font = this->font();
+  font.setPixelSize(style::scaled(text_px));
+  const QFontMetrics metrics(font);
+  const int width = this->width() - 24;
+  Words words;
+  words.figure = in_lines(card_.figure.isEmpty() ? appearance_of(card_.status).word : card_.figure,
+                          lines_of_card - 1, metrics, width);
+  words.why = in_lines(card_.why, lines_of_card - int(words.figure.size()), metrics, width);
+  return words;
 }
 
 StepStrip::StepStrip(QWidget* parent) : QWidget(parent) {

@@ -19,6 +19,11 @@ class StepButton : public QToolButton {
   StepButton(Phase phase, QWidget* parent);
   void show_card(const StepCard& card);
   const StepCard& card() const { return card_; }
+  /// The card's figure and reason as drawn, in lines. The reason may be elided: the step's page states it.
+  struct Words {
+    QStringList figure, why;
+  };
+  Words words() const;
 
  protected:
   void paintEvent(QPaintEvent* event) override;

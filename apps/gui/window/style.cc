@@ -19,7 +19,8 @@ const Colours dark{.ground{20, 24, 29},
                    .blue{86, 180, 233},
                    .green{64, 200, 130},
                    .amber{255, 196, 0},
-                   .red{255, 92, 92}};
+                   .red{255, 115, 115},
+                   .selected{28, 55, 82}};
 
 const Colours light{.ground{240, 243, 246},
                     .panel{255, 255, 255},
@@ -33,7 +34,8 @@ const Colours light{.ground{240, 243, 246},
                     .blue{0, 96, 160},
                     .green{0, 110, 60},
                     .amber{140, 84, 0},
-                    .red{190, 24, 24}};
+                    .red{190, 24, 24},
+                    .selected{208, 226, 246}};
 
 Appearance& current() {
   static Appearance appearance;
@@ -47,6 +49,7 @@ constexpr const char* rules = R"(
     QGroupBox { border: 1px solid @line; border-radius: 6px; margin-top: 10px; padding: 8px 6px 6px 6px; }
     QGroupBox::title { subcontrol-origin: margin; left: 10px; color: @quiet; }
     QLabel[class="attention"] { color: @amber; font-weight: bold; }
+    QLabel[class="quiet"] { color: @quiet; }
     QLabel[class="recording"] { color: @red; }
     QPushButton { background: @raised; border: 1px solid @line; border-radius: 5px; padding: 7px 12px; }
     QPushButton:hover { background: @pressed; }
@@ -57,10 +60,12 @@ constexpr const char* rules = R"(
     QPushButton[class="hold"]:disabled { border: 1px solid @line; }
     QPushButton[class="stop"] { background: #c81e1e; border: 2px solid #ff8080; color: white; font-size: @stoppx;
                                 font-weight: bold; padding: 10px 22px; }
-    QPushButton[class="stop"]:pressed { background: #ff4040; }
-    QTableWidget, QListWidget, QPlainTextEdit, QLineEdit, QSpinBox, QDoubleSpinBox, QComboBox {
-      background: @panel; border: 1px solid @line; border-radius: 4px; padding: 3px;
-      selection-background-color: @chosen; selection-color: @text; }
+    QPushButton[class="stop"]:pressed { background: #a01010; }
+    QTableWidget, QListWidget, QPlainTextEdit, QLineEdit, QComboBox {
+      background: @panel; border: 1px solid @line; border-radius: 4px; padding: 3px; }
+    QTableWidget, QListWidget { selection-background-color: @selected; }
+    QPlainTextEdit, QLineEdit, QComboBox { selection-background-color: @chosen; selection-color: @text; }
+    QSpinBox, QDoubleSpinBox { background: @panel; selection-background-color: @chosen; selection-color: @text; }
     QHeaderView::section { background: @panel; color: @quiet; border: none; padding: 4px; }
     QMenuBar, QMenu { background: @panel; } QMenu::item:selected, QMenuBar::item:selected { background: @chosen; }
     QMenu::item:disabled { color: @disabled; }
@@ -122,7 +127,8 @@ QString sheet(const Appearance& appearance) {
                                      {"@quiet", in.quiet},
                                      {"@blue", in.blue},
                                      {"@amber", in.amber},
-                                     {"@red", in.red}})
+                                     {"@red", in.red},
+                                     {"@selected", in.selected}})
     text.replace(name, colour.name());
   return text;
 }

@@ -20,6 +20,7 @@ struct Appearance {
 
 struct Colours {
   QColor ground, panel, raised, pressed, chosen, line, disabled, text, quiet, blue, green, amber, red;
+  QColor selected;  ///< of a table's row: figures in any of these colours are legible on it
 };
 
 const Colours& colours_of(Theme theme);

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every page in every state: legible, reachable, and as pictures (tools/pictures.sh).
+#include <QDoubleSpinBox>
+
+#include "gui/controller/case_with_model_test.h"
+#include "gui/window/legibility_test.h"
+#include "gui/window/style.h"
+#include "gui/window/window_test.h"
+
+namespace helicarm::gui {
+namespace {
+
+constexpr int large_text_px = 20;
+
+class WindowPictures : public Window {
+ protected:
+  ~WindowPictures() override { style::apply({}); }
+  void write_tunnels(const std::vector<std::string>& views = {}) {
+    simulation::SimulationOptions options;
+    options.kind = simulation::CaseKind::tunnels;
+    options.size = 512;
+    for (const std::string& view : views) options.views.push_back(*simulation::view_angles(view));
+    simulated_ = simulation::simulate_case(options).value();
+    ASSERT_TRUE(simulation::write_case(folder_ / "tunnels", simulated_));
+  }
+  void open(const char* name) {
+    window_->open_paths({folder_ / name});
+    ASSERT_TRUE(wait("the case is read", [&] { return state().source == Source::files && !state().busy; }));
+  }
+  void open_tunnels() {
+    ASSERT_NO_FATAL_FAILURE(write_tunnels());
+    ASSERT_NO_FATAL_FAILURE(open("tunnels"));
+  }
+  void open_model() {
+    write_case_with_model(folder_ / "model");
+    ASSERT_NO_FATAL_FAILURE(open("model"));
+  }
+  void register_model() {
+    click("registerModels");
+    ASSERT_TRUE(wait("the model is registered", [&] { return state().registration && !state().busy; }));
+  }
+  /// Every page at both sizes, in both themes, with usual and large text; saved if the variable
+  /// HELICARM_PICTURES names a folder.
+  void inspect(const char* name) {
+    const QString folder = qEnvironmentVariable("HELICARM_PICTURES");
+    const bool all = !folder.isEmpty();
+    ASSERT_TRUE(wait("the images are shown", [&] { return !window_->xray(0).is_computing(); }));
+    for (const QSize& size : {QSize(1280, 800), QSize(1920, 1080)})
+      for (const style::Theme theme : {style::Theme::dark, style::Theme::light})
+        for (const int text_px : {style::usual_text_px, large_text_px}) {
+          const bool is_small = size.width() == 1280, is_dark = theme == style::Theme::dark;
+          if (!all && (is_dark != is_small || (!is_small && text_px != style::usual_text_px))) continue;
+          style::apply({theme, text_px});
+          window_->resize(size);
+          for (const Phase phase : phases) {
+            if (!window_->strip().button(phase)->isVisible()) continue;
+            window_->strip().chosen(phase);
+            QTest::qWait(50);
+            const QString what = QString("%1-%2-%3x%4-%5-%6")
+                                     .arg(name)
+                                     .arg(card(phase).name.toLower())
+                                     .arg(size.width())
+                                     .arg(size.height())
+                                     .arg(theme == style::Theme::dark ? "dark" : "light")
+                                     .arg(text_px);
+            EXPECT_LE(window_->width(), size.width()) << what.toStdString();
+            EXPECT_LE(window_->height(), size.height()) << what.toStdString();
+            const QStringList wrong = illegible(*window_);
+            EXPECT_TRUE(wrong.isEmpty()) << what.toStdString() << ":\n" << wrong.join('\n').toStdString();
+            if (all) window_->grab().save(folder + '/' + what + ".png");
+          }
+        }
+    window_->resize(1280, 800);
+    style::apply({});
+  }
+
+  simulation::SimulatedCase simulated_;
+};
+
+TEST_F(WindowPictures, Empty) { inspect("empty"); }
+
+TEST_F(WindowPictures, NotOpened) {
+  window_->open_paths({folder_ / "a folder of a rather long name that does not exist" / "case"});
+  ASSERT_TRUE(wait_idle());
+  inspect("not-opened");
+}
+
+TEST_F(WindowPictures, Measured) {
+  ASSERT_NO_FATAL_FAILURE(open_tunnels());
+  inspect("measured");
+}
+
+TEST_F(WindowPictures, PickFailed) {
+  ASSERT_NO_FATAL_FAILURE(open_tunnels());
+  pipeline::Pick pick = *pick_of(state(), "FS", "AP");
+  pick.uv_raw += Eigen::Vector2d(30, -30);
+  window_->controller().pick(pick);
+  ASSERT_TRUE(wait_idle());
+  inspect("pick-failed");
+}
+
+TEST_F(WindowPictures, PicksContradict) {
+  ASSERT_NO_FATAL_FAILURE(open_tunnels());
+  pipeline::Pick pick = *pick_of(state(), "FS", "AP");
+  pick.name = "FE";
+  window_->controller().pick(pick);
+  ASSERT_TRUE(wait_idle());
+  inspect("picks-contradict");
+}
+
+TEST_F(WindowPictures, OutOfDate) {
+  ASSERT_NO_FATAL_FAILURE(open_tunnels());
+  const fs::path plate = folder_ / "tunnels" / "plate.json";
+  ASSERT_TRUE(write_file(plate, *read_file(plate, 1 << 20) + "\n"));
+  ASSERT_TRUE(wait("the change is noticed", [&] { return !state().changed_file.empty(); }));
+  inspect("out-of-date");
+}
+
+TEST_F(WindowPictures, Refused) {
+  ASSERT_NO_FATAL_FAILURE(write_tunnels());
+  fs::copy_file(folder_ / "tunnels" / "AP.dcm", folder_ / "tunnels" / "LAT.dcm",
+                fs::copy_options::overwrite_existing);
+  ASSERT_NO_FATAL_FAILURE(open("tunnels"));
+  inspect("refused");
+}
+
+TEST_F(WindowPictures, ThreeViewsAndALandmark) {
+  ASSERT_NO_FATAL_FAILURE(write_tunnels({"AP:2,1", "LAT:88,-2", "OBL:45,3"}));
+  ASSERT_NO_FATAL_FAILURE(open("tunnels"));
+  window_->controller().add_landmark("medial epicondyle", pipeline::BoneLabel{"femur", pipeline::Side::left});
+  inspect("three-views");
+}
+
+TEST_F(WindowPictures, ModelBeforeRegistration) {
+  ASSERT_NO_FATAL_FAILURE(open_model());
+  inspect("model-before");
+}
+
+TEST_F(WindowPictures, ModelRegistered) {
+  ASSERT_NO_FATAL_FAILURE(open_model());
+  ASSERT_NO_FATAL_FAILURE(register_model());
+  inspect("model-registered");
+}
+
+TEST_F(WindowPictures, ModelMovedByHand) {
+  ASSERT_NO_FATAL_FAILURE(open_model());
+  ASSERT_NO_FATAL_FAILURE(register_model());
+  find<QDoubleSpinBox>("shiftX")->setValue(4);
+  inspect("model-moved");
+}
+
+TEST_F(WindowPictures, Exported) {
+  ASSERT_NO_FATAL_FAILURE(open_tunnels());
+  window_->controller().erase_picks("FS");
+  ASSERT_TRUE(wait_idle());
+  window_->controller().export_to(folder_ / "export of the tunnels");
+  ASSERT_TRUE(wait_idle());
+  inspect("exported");
+}
+
+TEST_F(WindowPictures, Rehearsal) {
+  open_rehearsal();
+  inspect("rehearsal");
+  ASSERT_NO_FATAL_FAILURE(register_in_rehearsal());
+  ASSERT_TRUE(with_robot(
+      "a path is planned", [&] { click("planWay"); }, [&] { return state().order.has_value(); }));
+  inspect("rehearsal-planned");
+}
+
+TEST_F(WindowPictures, TextHasContrastInBothThemesAlsoInSelectedRows) {
+  ASSERT_NO_FATAL_FAILURE(open_tunnels());
+  pipeline::Pick pick = *pick_of(state(), "FS", "AP");
+  pick.uv_raw += Eigen::Vector2d(30, -30);
+  window_->controller().pick(pick);
+  ASSERT_TRUE(wait_idle());
+  for (const style::Theme theme : {style::Theme::dark, style::Theme::light}) {
+    style::apply({theme, style::usual_text_px});
+    for (const Phase phase : phases) {
+      window_->strip().chosen(phase);
+      QTest::qWait(20);
+      const QStringList wrong = faint(*window_);
+      EXPECT_TRUE(wrong.isEmpty()) << (theme == style::Theme::dark ? "dark" : "light") << ", page "
+                                   << int(phase) << ":\n"
+                                   << wrong.join('\n').toStdString();
+    }
+  }
+}
+
+TEST(Style, EveryColourOfTextHasContrastOnEveryGround) {
+  for (const style::Theme theme : {style::Theme::dark, style::Theme::light}) {
+    const style::Colours& in = style::colours_of(theme);
+    for (const QColor& ink : {in.text, in.quiet, in.blue, in.green, in.amber, in.red})
+      for (const QColor& ground : {in.ground, in.panel, in.raised, in.selected})
+        EXPECT_GE(contrast(ink, ground), 4.5)
+            << ink.name().toStdString() << " on " << ground.name().toStdString();
+  }
+}
+
+TEST_F(WindowPictures, TabReachesEverythingOnEveryPage) {
+  ASSERT_NO_FATAL_FAILURE(open_model());
+  ASSERT_NO_FATAL_FAILURE(register_model());
+  for (const Phase phase : phases) {
+    window_->strip().chosen(phase);
+    QTest::qWait(20);
+    window_->strip().button(phase)->setFocus();
+    const auto reached = reached_by_tab();
+    for (QWidget* widget : window_->findChildren<QWidget*>()) {
+      const bool is_to_reach = widget->isVisible() && widget->isEnabled() &&
+                               widget->window() == window_.get() && is_interactive(*widget) &&
+                               (widget->focusPolicy() & Qt::TabFocus);
+      EXPECT_TRUE(!is_to_reach || reached.contains(widget))
+          << "page " << int(phase) << ": " << described(*widget).toStdString();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace helicarm::gui
