@@ -66,7 +66,9 @@ void MainWindow::build_menus() {
   view->addAction(tr("Scene &near at the knee"), QKeySequence("Ctrl+4"), scene_, &SceneView::look_near);
   view->addAction(replay_dock_->toggleViewAction());
   view->addAction(measures_dock_->toggleViewAction());
+  view->addAction(log_dock_->toggleViewAction());
   build_layers_menu(view);
+  build_scene_menu(view);
   build_appearance_menu(view);
   build_measure_menu();
   QAction* four = view->addAction(tr("&Four large X-ray images"));
@@ -151,8 +153,8 @@ void MainWindow::show_recorded() {
   recorded_.reset();
   if (!replay_->timeline() || replay_->moment() < 0) return;
   const auto then = state_at(*replay_->timeline(), std::size_t(replay_->moment()));
-  const bool is_shown = then && then->case_folder && controller_.state().folder == *then->case_folder &&
-                        controller_.state().measured;
+  const bool is_shown = out_of_date_.isEmpty() && then && then->case_folder &&
+                        controller_.state().folder == *then->case_folder && controller_.state().measured;
   if (!is_shown || !(then->registered_at || then->guidance)) return;
   if (!recorded_tool_ || recorded_at_ != then->registered_at || recorded_of_ != shown_) {
     const auto tool = tool_of(*replay_->timeline(), *then, *shown_);
@@ -203,7 +205,8 @@ void MainWindow::ask_settings() {
 
 void MainWindow::show_tre() {
   const Eigen::Vector3d middle = phantom::middle_of(controller_.state().calibrator);
-  if (!cut_ || !shown_ || !controller_.state().measured) return scene_->show_tre({}, SliceAxis::z, 0);
+  if (!cut_ || !shown_ || !controller_.state().measured || !out_of_date_.isEmpty())
+    return scene_->show_tre({}, SliceAxis::z, 0);
   if (tre_of_ == shown_)
     return scene_->show_tre(tre_, cut_->axis, middle[int(cut_->axis)] + cut_->from_middle_mm);
   scene_->show_tre({}, SliceAxis::z, 0);
@@ -226,6 +229,9 @@ void MainWindow::show_tre() {
   });
 }
 
-void MainWindow::say(const Failure& failure) { statusBar()->showMessage(sentence_of(failure)); }
+void MainWindow::say(const Failure& failure) {
+  log(sentence_of(failure));
+  statusBar()->showMessage(sentence_of(failure));
+}
 
 }  // namespace helicarm::gui

@@ -117,6 +117,11 @@ void MainWindow::open_plan(const fs::path& plan) {
 
 void MainWindow::open_paths(const std::vector<fs::path>& paths) {
   const fs::path& first = paths.front();
+  if (paths.size() == 1 && fs::is_regular_file(first)) {  // a file that stands for its folder, or a plan
+    if (first.filename() == "case.json" || first.filename() == "session.log")
+      return open_paths({fs::absolute(first).parent_path()});
+    if (first.extension() == ".json") return open_plan(first);
+  }
   const bool is_folder = paths.size() == 1 && fs::is_directory(first);
   if (is_folder && fs::exists(first / "session.log")) return open_session(first);
   if (!is_folder) return open_images(paths);

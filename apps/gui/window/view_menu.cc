@@ -64,6 +64,40 @@ void MainWindow::build_layers_menu(QMenu* view) {
   }
 }
 
+void MainWindow::build_scene_menu(QMenu* view) {
+  QMenu* menu = view->addMenu(tr("In the &scene"));
+  menu->setObjectName("sceneParts");
+  for (const auto& [words, part] : {std::pair(tr("&Calibrator"), ScenePart::calibrator),
+                                    {tr("&Rays and detectors"), ScenePart::rays},
+                                    {tr("&Points and tunnels"), ScenePart::points},
+                                    {tr("&Models"), ScenePart::models},
+                                    {tr("&Bones of the rehearsal"), ScenePart::bones},
+                                    {tr("R&obot and tool"), ScenePart::robot}}) {
+    QAction* action = menu->addAction(words);
+    action->setCheckable(true);
+    action->setChecked(true);
+    connect(action, &QAction::toggled, this, [this, own = part](bool on) {
+      SceneParts parts = scene_->parts();
+      scene_->show_parts(parts.setFlag(own, on));
+    });
+  }
+  QMenu* models = menu->addMenu(tr("&Each model"));
+  connect(menu, &QMenu::aboutToShow, models, [this, models] {
+    models->clear();
+    for (const std::string& name : scene_->model_names()) {
+      QAction* action = models->addAction(QString::fromStdString(name));
+      action->setCheckable(true);
+      action->setChecked(!scene_->hidden_models().contains(name));
+      connect(action, &QAction::toggled, this, [this, name](bool on) {
+        std::set<std::string> hidden = scene_->hidden_models();
+        on ? static_cast<void>(hidden.erase(name)) : static_cast<void>(hidden.insert(name));
+        scene_->hide_models(std::move(hidden));
+      });
+    }
+    models->setEnabled(!models->isEmpty());
+  });
+}
+
 void MainWindow::build_appearance_menu(QMenu* view) {
   QMenu* menu = view->addMenu(tr("A&ppearance"));
   const auto change = [this](style::Appearance appearance) {
@@ -123,7 +157,7 @@ void MainWindow::keep_layout() {
 void MainWindow::restore_layout() {
   restoreGeometry(recent_.value("window/geometry").toByteArray());
   restoreState(recent_.value("window/state").toByteArray());
-  for (QDockWidget* dock : {replay_dock_, measures_dock_}) dock->hide();  // until they are used
+  for (QDockWidget* dock : {replay_dock_, measures_dock_, log_dock_}) dock->hide();  // until they are used
   for (QSplitter* splitter : findChildren<QSplitter*>())
     if (!splitter->objectName().isEmpty())
       splitter->restoreState(recent_.value("window/" + splitter->objectName()).toByteArray());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <QClipboard>
 #include <QFileDialog>
+#include <QMenu>
 #include <QScrollArea>
 #include <QTableWidget>
 
@@ -105,6 +106,35 @@ TEST_F(WindowDisplay, CopiesTheTableOrImageThatHasTheFocus) {
   window_->xray(0).setFocus();
   press(QKeySequence::Copy);
   EXPECT_EQ(QApplication::clipboard()->image().size(), window_->xray(0).size());
+}
+
+TEST_F(WindowDisplay, ACasesFileDroppedOpensItsFolder) {
+  open_tunnels();
+  window_->controller().open_images({folder_ / "tunnels" / "AP.dcm"});
+  ASSERT_TRUE(wait("the image is shown", [&] { return state().source == Source::images && !state().busy; }));
+  drop(*window_, {folder_ / "tunnels" / "case.json"});
+  ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
+  EXPECT_EQ(state().folder, folder_ / "tunnels");
+}
+
+TEST_F(WindowDisplay, TheLogHoldsTheFiguresOfEachStepAndIsCopied) {
+  open_tunnels();
+  find("copyLog")->click();
+  const std::string log = QApplication::clipboard()->text().toStdString();
+  for (const char* line : {"Acquire: 2 of 2 X-ray images", "Calibrate: FRE ", "Plan: within "})
+    EXPECT_THAT(log, HasSubstr(line));
+}
+
+TEST_F(WindowDisplay, PartsOfTheSceneAreHidden) {
+  open_tunnels();
+  auto* scene = find<SceneView>("scene");
+  const QImage all = scene->grab().toImage();
+  const auto* menu = window_->findChild<QMenu*>("sceneParts");
+  ASSERT_NE(menu, nullptr);
+  for (QAction* action : menu->actions())
+    if (action->isCheckable()) action->trigger();
+  EXPECT_FALSE(scene->parts());
+  EXPECT_NE(scene->grab().toImage(), all);
 }
 
 TEST_F(WindowDisplay, ExportMakesItsFolder) {

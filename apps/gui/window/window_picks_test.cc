@@ -234,6 +234,19 @@ TEST_F(WindowWithTunnels, LandmarkIsLocatedAndSavedInTheCase) {
   EXPECT_EQ(saved->picks.back().bone, (pipeline::BoneLabel{"humerus", pipeline::Side::left}));
 }
 
+TEST_F(WindowWithTunnels, TunnelsThatAreNotWantedAreAskedForNoMore) {
+  open_tunnels();
+  window_->strip().chosen(Phase::plan);
+  EXPECT_FALSE(find("noTunnels")->isVisible());
+  window_->controller().clear_picks();
+  ASSERT_TRUE(wait_idle());
+  ASSERT_TRUE(next_pick(state()));
+  click("noTunnels");
+  EXPECT_FALSE(next_pick(state()));
+  window_->controller().add_landmark("notch");
+  EXPECT_EQ(says().toStdString(), "Click notch in AP.");
+}
+
 TEST_F(WindowWithTunnels, LandmarkOfATakenNameIsRefused) {
   open_tunnels();
   window_->controller().add_landmark("FS");
