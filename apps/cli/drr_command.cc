@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "command_line.h"
@@ -17,6 +16,7 @@
 #include "helicarm/image/png.h"
 #include "helicarm/pipeline/result.h"
 #include "helicarm/volume/drr.h"
+#include "helicarm/volume/drr_view.h"
 #include "helicarm/volume/read_volume.h"
 
 namespace helicarm::cli {
@@ -29,22 +29,6 @@ volume::Ramp ramp_of(const std::string& values) {
   if (values != "hu")
     throw BadInput(Reason::usage, fmt::format("--values: \"{}\" is neither hu nor raw", values));
   return volume::attenuation_from_hu;
-}
-
-/// Rows run from head to foot; at angle 0 the patient's left is on the right.
-geometry::View view_of(const DrrArguments& arguments, const Vector3d& centre) {
-  const double angle = arguments.angle_deg * EIGEN_PI / 180;
-  const double tilt = arguments.tilt_deg * EIGEN_PI / 180;
-  const Vector3d ray(-std::sin(angle) * std::cos(tilt), std::cos(angle) * std::cos(tilt), -std::sin(tilt));
-  const Vector3d right = ray.cross(Vector3d::UnitZ()).normalized();
-  geometry::View view;
-  const double focal = arguments.source_detector_mm / arguments.pixel_mm;
-  const double middle = 0.5 * (arguments.size - 1);
-  view.intrinsics = {focal, focal, middle, middle, 0};
-  view.camera_from_world.rotation << right.transpose(), ray.cross(right).transpose(), ray.transpose();
-  view.camera_from_world.translation =
-      Vector3d(0, 0, arguments.source_centre_mm) - view.camera_from_world.rotation * centre;
-  return view;
 }
 
 std::string grey_png(const image::Image<float>& integrals, float greatest) {
@@ -82,7 +66,7 @@ CommandResult drr_command(const DrrArguments& arguments, Console& console) {
     print_warnings(volume.warnings, console);
     const Vector3d centre =
         arguments.centre_mm.empty() ? volume.centre() : Vector3d::Map(arguments.centre_mm.data());
-    const geometry::View view = view_of(arguments, centre);
+    const geometry::View view = volume::drr_view(arguments, centre);
     const auto start = std::chrono::steady_clock::now();
     const volume::Absorber absorber(volume, ramp, console.threads);
     const double prepare_ms = milliseconds_since(start);

@@ -23,21 +23,9 @@ struct ExportArguments {
 namespace {
 
 std::vector<report::Export> exports_named(const std::vector<std::string>& words) {
-  std::vector<report::Export> kinds;
-  for (const std::string& word : words) {
-    const auto found = std::ranges::find(report::export_words, word);
-    const auto requested = std::ranges::find(report::requested_words, word);
-    if (found != report::export_words.end())
-      kinds.push_back(report::every_export[std::size_t(found - report::export_words.begin())]);
-    else if (requested != report::requested_words.end())
-      kinds.push_back(report::requested_export[std::size_t(requested - report::requested_words.begin())]);
-    else
-      throw BadInput(Reason::usage, fmt::format("--as: \"{}\" is none of: {}, {}", word,
-                                                fmt::join(report::export_words, ", "),
-                                                fmt::join(report::requested_words, ", ")));
-  }
-  if (kinds.empty()) kinds.assign(report::every_export.begin(), report::every_export.end());
-  return kinds;
+  auto kinds = report::exports_named(words);
+  if (!kinds) throw BadInput(kinds.error().reason, "--" + kinds.error().message);
+  return *std::move(kinds);
 }
 
 }  // namespace

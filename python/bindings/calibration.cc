@@ -222,6 +222,15 @@ void add_calibration(py::module_& module) {
 World: calibrator frame, mm. Pixels: rectified unless raw=True. A view is given by its name or index.)");
   held.def_static("load", &loaded, py::arg("path"),
                   "From a file of save, or result.json of a run that was not refused. Raises InputError.")
+      .def_static(
+          "from_dict",
+          [](const py::object& given) -> Held {
+            return {value_or_raise(calibration::saved_calibration_from_json(json_from(given), "dict")), {}};
+          },
+          py::arg("dict"), "Of to_dict. Raises InputError.")
+      .def(
+          "to_dict", [](const Held& c) { return python_from(calibration::to_json(c)); },
+          "The content of the file that save writes.")
       .def(
           "save",
           [](const Held& c, const std::filesystem::path& path) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "failures.h"
 
+#include "helicarm/core/reason_code.h"
+
 namespace helicarm::python {
 
 py::dict warning_dict(const Warning& warning) {
@@ -10,6 +12,19 @@ py::dict warning_dict(const Warning& warning) {
   dict["view"] = warning.view.empty() ? py::object(py::none()) : py::object(py::str(warning.view));
   dict["figures"] = py::cast(warning.figures);
   return dict;
+}
+
+std::vector<Warning> warnings_from(const py::list& list) {
+  std::vector<Warning> warnings;
+  for (const py::handle& each : list) {
+    const auto given = each.cast<py::dict>();
+    const auto reason = reason_of(given["code"].cast<std::string>());
+    if (!reason) throw py::value_error("pickle: of another version of helicarm");
+    warnings.push_back({*reason, given["message"].cast<std::string>(),
+                        given["view"].is_none() ? std::string() : given["view"].cast<std::string>(),
+                        given["figures"].cast<std::map<std::string, double>>()});
+  }
+  return warnings;
 }
 
 void raise(const Failure& failure, const py::object& result) {

@@ -44,6 +44,9 @@ py::list warning_list(const Warnings& warnings) {
   return list;
 }
 
+/// The inverse, for pickles.
+std::vector<Warning> warnings_from(const py::list& list);
+
 /// JSON as Python's own dicts and lists, and back.
 py::object python_from(const Json& json);
 Json json_from(const py::object& value);

@@ -7,6 +7,7 @@
 #include "helicarm/detection/find_marks.h"
 #include "helicarm/image/grey_image.h"
 #include "helicarm/xray/dicom_acquisition.h"
+#include "helicarm/xray/image_in_memory.h"
 #include "helicarm/xray/read_xray_image.h"
 #include "module.h"
 
@@ -65,6 +66,45 @@ xray::XrayImage image_from(const py::array& pixels, const py::object& pixel_mm,
   image.acquisition.source_detector_mm = checked(
       source_detector_mm, {xray::min_source_detector_mm, xray::max_source_detector_mm}, "source_detector_mm");
   return image;
+}
+
+py::tuple state_of(const xray::XrayImage& image) {
+  const xray::Acquisition& a = image.acquisition;
+  const py::object acquired =
+      a.acquired
+          ? py::object(py::make_tuple(a.acquired->seconds, a.acquired->resolution_s, a.acquired->source))
+          : py::object(py::none());
+  return py::make_tuple(
+      py::array_t<float>({py::ssize_t(image.pixels.height()), py::ssize_t(image.pixels.width())},
+                         image.pixels.pixels().data()),
+      image.name, image.lowest, image.highest, warning_list(image.warnings), vector_array<2>(a.pixel_mm),
+      a.source_detector_mm, a.source_patient_mm, a.primary_angle_deg, a.secondary_angle_deg, acquired,
+      a.flip_hint, a.rotation_hint_deg, a.logarithmic, a.modality, a.technique, a.patient_key, a.study_key,
+      a.frame_of_reference_key, a.instance_key, a.uid_key);
+}
+
+std::shared_ptr<xray::XrayImage> image_of_state(const py::tuple& state) {
+  auto made = std::make_shared<xray::XrayImage>();
+  std::size_t next = 0;
+  const auto take = [&](auto& value) { value = state[next++].cast<std::decay_t<decltype(value)>>(); };
+  Floats pixels;
+  py::list warnings;
+  py::object pixel_mm, acquired;
+  xray::Acquisition& a = made->acquisition;
+  take(pixels), take(made->name), take(made->lowest), take(made->highest), take(warnings), take(pixel_mm);
+  take(a.source_detector_mm), take(a.source_patient_mm), take(a.primary_angle_deg);
+  take(a.secondary_angle_deg), take(acquired), take(a.flip_hint), take(a.rotation_hint_deg);
+  take(a.logarithmic), take(a.modality), take(a.technique), take(a.patient_key), take(a.study_key);
+  take(a.frame_of_reference_key), take(a.instance_key), take(a.uid_key);
+  made->pixels = image::Image<float>(int(pixels.shape(1)), int(pixels.shape(0)));
+  std::copy_n(pixels.data(), pixels.size(), made->pixels.pixels().begin());
+  made->warnings = warnings_from(warnings);
+  a.pixel_mm = spacing_of(pixel_mm);
+  if (!acquired.is_none()) {
+    const auto [seconds, resolution_s, source] = acquired.cast<std::tuple<double, double, std::string>>();
+    a.acquired = {seconds, resolution_s, source};
+  }
+  return made;
 }
 
 py::dict marks(const xray::XrayImage& image, const std::string& kind) {
@@ -126,6 +166,7 @@ Raises InputError: bad_size, bad_value, not_finite.)")
           "source_detector_mm", [](const xray::XrayImage& i) { return i.acquisition.source_detector_mm; },
           "mm, or None.")
       .def_property_readonly("warnings", [](const xray::XrayImage& i) { return warning_list(i.warnings); })
+      .def(py::pickle(&state_of, &image_of_state))
       .def("__repr__", [](const xray::XrayImage& i) {
         return fmt::format("<XrayImage {}: {} x {} pixels>", i.name, i.pixels.width(), i.pixels.height());
       });
@@ -136,6 +177,11 @@ Raises InputError: bad_size, bad_value, not_finite.)")
 pixel_mm and source_detector_mm may stand in a sidecar NAME.json, of DICOM NAME.dcm.json. frame: 1-based, needed only where the
 file holds several. name: of the view; the file's stem where not given. Releases the GIL.
 Raises InputError: missing_file, not_an_image, truncated, bad_size, bad_value, unsupported, bad_json.)");
+  module.def("_image_of_dicom",
+             [](const std::string& bytes, const std::string& name, std::optional<int> frame) {
+               auto image = without_gil([&] { return xray::image_of_dicom(bytes, name, frame); });
+               return std::make_shared<xray::XrayImage>(value_or_raise(std::move(image)));
+             });
   module.def("detect", &marks, py::arg("image"), py::kw_only(), py::arg("kind"),
              R"(Balls, holes or crosses (kind) anywhere in an image, without plate or calibrator.
 

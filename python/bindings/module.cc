@@ -14,12 +14,18 @@ PYBIND11_MODULE(_helicarm, module) {
   add_measures(module);
   add_cases(module);
   add_registration(module);
+  add_volume(module);
+  add_surface(module);
+  add_camera(module);
   add_c_arm(module);
   add_sweep(module);
   add_track(module);
   add_migration(module);
   add_segmentation(module);
   add_phantom_calibration(module);
+  add_in_memory(module);
+  add_session(module);
+  add_files(module);
 }
 
 }  // namespace helicarm::python

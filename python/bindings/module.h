@@ -25,6 +25,18 @@ void add_cases(py::module_& module);
 void add_registration(py::module_& module);
 /// check_c_arm, c_arm_report.
 void add_c_arm(py::module_& module);
+/// Volume, read_volume, drr.
+void add_volume(py::module_& module);
+/// Surface, read_surface.
+void add_surface(py::module_& module);
+/// Camera, import_camera, import_transform, solve.
+void add_camera(py::module_& module);
+/// register, sweep with arrays.
+void add_in_memory(py::module_& module);
+/// Session.
+void add_session(py::module_& module);
+/// new_case, bundle, schema, Result.export.
+void add_files(py::module_& module);
 /// sweep, Sweep.
 void add_sweep(py::module_& module);
 /// track, Track.

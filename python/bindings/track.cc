@@ -5,6 +5,9 @@
 #include <memory>
 
 #include "arrays.h"
+#include "checks.h"
+#include "helicarm/calibration/calibrated_view.h"
+#include "helicarm/exchange/import_matrix.h"
 #include "module.h"
 #include "signals.h"
 
@@ -42,6 +45,57 @@ std::unique_ptr<Tracked> tracked(const std::filesystem::path& folder, const std:
       return made;
     });
   }));
+}
+
+std::unique_ptr<Tracked> tracked_images(
+    const std::vector<std::tuple<std::string, std::vector<std::shared_ptr<xray::XrayImage>>,
+                                 exchange::ImportedMatrix, std::optional<rectification::DistortionMap>>>&
+        views,
+    const std::optional<Doubles>& camera_covariance, const std::vector<std::string>& markers,
+    const std::vector<std::tuple<std::size_t, std::size_t, double, double>>& picks,
+    const std::vector<std::tuple<std::string, std::vector<std::size_t>, std::optional<Doubles>>>& bodies,
+    double diameter_mm, std::optional<double> frame_rate_hz, const std::optional<std::filesystem::path>& out,
+    const py::object& progress) {
+  auto made = std::make_unique<Tracked>();
+  track::TrackCase& given = made->given;
+  for (const auto& [name, images, camera, map] : views) {
+    track::TrackView& view = given.views.emplace_back();
+    view.images.name = name;
+    view.images.image = name;
+    view.image_size = camera.image_size;
+    view.camera = camera.view;
+    view.map = map;
+    std::vector<xray::XrayImage> frames;
+    for (const auto& image : images) frames.push_back(*image);
+    view.opened = value_or_raise(xray::ImageFile::of(std::move(frames)));
+  }
+  const auto size = py::ssize_t(calibration::view_parameters * views.size());
+  if (camera_covariance)
+    given.camera_covariance = checked_covariance(
+        matrix_of(*camera_covariance, size, size, "camera_covariance"), "camera_covariance");
+  given.diameter_mm = checked(diameter_mm, {0.1, 30}, "diameter_mm");
+  given.frame_rate_hz = checked(frame_rate_hz, {0.01, 1e5}, "frame_rate_hz");
+  given.markers = markers;
+  for (const auto& [marker, view, u, v] : picks) given.picks.push_back({marker, view, {u, v}});
+  for (const auto& [name, of, geometry] : bodies)
+    given.bodies.push_back(
+        {name, of, geometry ? rows_of<3>(*geometry, "bodies: " + name) : std::vector<Eigen::Vector3d>{}});
+  const case_registration::FrameRange range{1, int(std::get<1>(views.front()).size()), 1};
+  const RunHooks hooks = run_hooks(py::none());
+  value_or_raise(without_gil([&] {
+    return guarded([&] {
+      if (out) track::forget_track(*out);
+      made->sequence = value_or_throw(track::run_track(given, range, {.out = out}, [&](int done) {
+        hooks.on_view();
+        if (progress.is_none()) return;
+        const py::gil_scoped_acquire acquire;
+        progress(double(done) / range.count());
+      }));
+      if (out) value_or_throw(track::write_track(made->sequence, given, *out));
+      if (made->sequence.failure) throw BadInput(*made->sequence.failure);
+    });
+  }));
+  return made;
 }
 
 /// (n, markers, ...) of the places, NaN where a marker is lost.
@@ -155,6 +209,10 @@ void add_track(py::module_& module) {
         return fmt::format("<Track: {} frames, {} markers, {} bodies>", t.sequence.frames.size(),
                            t.given.markers.size(), t.given.bodies.size());
       });
+  module.def("_track_images", &tracked_images, py::arg("views"), py::arg("camera_covariance"),
+             py::arg("markers"), py::arg("picks"), py::arg("bodies"), py::kw_only(), py::arg("diameter_mm"),
+             py::arg("frame_rate_hz") = py::none(), py::arg("out") = py::none(),
+             py::arg("progress") = py::none());
   const track::TrackOptions usual;
   module.def("track", &tracked, py::arg("case"), py::kw_only(), py::arg("frames"),
              py::arg("out") = py::none(), py::arg("resume") = usual.resume, py::arg("progress") = py::none(),

@@ -2,21 +2,30 @@
 """A C-arm as a measuring instrument: X-ray images to points in space with confidence regions.
 
 Points are (u, v) in pixels, (0, 0) the centre of the top-left pixel; images are indexed [v, u]. Lengths are mm, angles
-degrees. A matrix named a_from_b maps points of b into a. Failures are InputError and RefusedError.
+degrees. A matrix named a_from_b maps points of b into a. Volumes are indexed [i, j, k]; patients' frames are L, P, S.
+Failures are InputError and RefusedError.
 """
 from ._helicarm import (  # noqa: F401
-    CArmPrior, Calibration, Calibrator, DistortionMap, IntrinsicsPrior, LocatedPoint, MeasuredPhantom, Plate,
-    Rectification, Result, ResultPoint, Sweep, Track, ViewPoints, XrayImage, __version__, c_arm_report, calibrate,
-    check_c_arm, detect, label, measure, measure_phantom, migration, read_image, rectify, register, register_sequence,
-    run_case, segment, simulate_case, sweep, track, verify_phantom)
+    CArmPrior, Calibration, Calibrator, Camera, DistortionMap, IntrinsicsPrior, LocatedPoint, MeasuredPhantom, Plate,
+    Rectification, Result, ResultPoint, Surface, Sweep, Track, ViewPoints, Volume, XrayImage, __version__, bundle,
+    c_arm_report, calibrate, check_c_arm, detect, import_camera, import_transform, label, measure, measure_phantom, new_case,
+    read_image, read_surface, read_volume, rectify, run_case, schema, segment, simulate_case, verify_phantom)
+from .arrays import as_camera, as_image, as_surface, as_volume  # noqa: F401
+from .cameras import solve  # noqa: F401
+from .data import drr, migration, register, register_sequence, sweep, track  # noqa: F401
 from .errors import HelicarmError, InputError, RefusedError  # noqa: F401
+from .results import install as _install
+from .session import Record, Session  # noqa: F401
+
+_install()
 
 __all__ = [
-    "CArmPrior", "Calibration", "Calibrator", "DistortionMap", "HelicarmError", "InputError", "IntrinsicsPrior",
-    "LocatedPoint", "MeasuredPhantom", "Plate", "Rectification", "RefusedError", "Result", "ResultPoint", "Sweep",
-    "Track", "ViewPoints", "XrayImage", "c_arm_report", "calibrate", "check_c_arm", "detect", "figures", "label",
-    "measure", "measure_phantom", "migration", "read_image", "rectify", "register", "register_sequence",
-    "run_case", "segment", "simulate_case", "sweep", "track", "verify_phantom"]
+    "CArmPrior", "Calibration", "Calibrator", "Camera", "DistortionMap", "HelicarmError", "InputError", "IntrinsicsPrior",
+    "LocatedPoint", "MeasuredPhantom", "Plate", "Record", "Rectification", "RefusedError", "Result", "ResultPoint", "Session",
+    "Surface", "Sweep", "Track", "ViewPoints", "Volume", "XrayImage", "as_camera", "as_image", "as_surface", "as_volume",
+    "bundle", "c_arm_report", "calibrate", "check_c_arm", "detect", "drr", "figures", "import_camera", "import_transform",
+    "label", "measure", "measure_phantom", "migration", "new_case", "read_image", "read_surface", "read_volume", "rectify",
+    "register", "register_sequence", "run_case", "schema", "segment", "simulate_case", "solve", "sweep", "track", "verify_phantom"]
 
 
 def __getattr__(name):

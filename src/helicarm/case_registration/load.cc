@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/centred_view.h"
+#include "helicarm/case_registration/register_in_memory.h"
 #include "helicarm/exchange/import_matrix.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/pipeline/view_image.h"
@@ -97,21 +98,22 @@ void take_patient(std::string& known, const xray::XrayImage& image) {
                    fmt::format("{} is of another patient than the images before it", image.name));
 }
 
+void add_view(LoadedViews& loaded, xray::XrayImage image, const exchange::ImportedMatrix& camera) {
+  take_patient(loaded.patient_key, image);
+  if (camera.image_size) check_size(image.name, "the camera is for", *camera.image_size, image.pixels);
+  loaded.views.push_back(view_of(image, image.name, camera.view));
+  loaded.views.back().grey = std::move(image.pixels);
+  loaded.maps.emplace_back();
+  // The camera states what the pixels measure.
+  std::ranges::copy_if(image.warnings, std::back_inserter(loaded.warnings),
+                       [](const Warning& warning) { return warning.reason != Reason::spacing_missing; });
+}
+
 LoadedViews views_of_cameras(const pipeline::Case& given) {
   LoadedViews loaded;
-  for (std::size_t i = 0; i < given.views.size(); ++i) {
-    const pipeline::CaseView& view = given.views[i];
-    const xray::XrayImage image = value_or_throw(pipeline::image_of(view));
-    take_patient(loaded.patient_key, image);
-    const exchange::ImportedMatrix camera = value_or_throw(exchange::import_matrix(*view.camera));
-    if (camera.image_size) check_size(view.name, "the camera is for", *camera.image_size, image.pixels);
-    loaded.views.push_back(view_of(image, view.name, camera.view));
-    loaded.views.back().grey = std::move(image.pixels);
-    loaded.maps.emplace_back();
-    // The camera states what the pixels measure.
-    std::ranges::copy_if(image.warnings, std::back_inserter(loaded.warnings),
-                         [](const Warning& warning) { return warning.reason != Reason::spacing_missing; });
-  }
+  for (const pipeline::CaseView& view : given.views)
+    add_view(loaded, value_or_throw(pipeline::image_of(view)),
+             value_or_throw(exchange::import_matrix(*view.camera)));
   return loaded;
 }
 
@@ -169,6 +171,15 @@ Expected<LoadedViews> load_views(const pipeline::Case& given, const pipeline::Ru
     const auto calibration = pipeline::calibrate_case(given, run, progress);
     if (!calibration) throw BadInput(calibration.error().failure);
     return views_of_calibration(given, *calibration);
+  });
+}
+
+Expected<LoadedViews> views_of_images(std::vector<xray::XrayImage> images,
+                                      const std::vector<exchange::ImportedMatrix>& cameras) {
+  return guarded([&] {
+    LoadedViews loaded;
+    for (std::size_t i = 0; i < images.size(); ++i) add_view(loaded, std::move(images[i]), cameras[i]);
+    return loaded;
   });
 }
 

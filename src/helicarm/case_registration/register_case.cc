@@ -11,6 +11,7 @@
 #include "helicarm/case_registration/case_plans.h"
 #include "helicarm/case_registration/landmarks_alone.h"
 #include "helicarm/case_registration/plan_errors.h"
+#include "helicarm/case_registration/register_in_memory.h"
 #include "helicarm/case_registration/registration_figures.h"
 #include "helicarm/case_registration/start_poses.h"
 #include "helicarm/pipeline/case_frames.h"
@@ -112,6 +113,25 @@ class Registrar {
     return made;
   }
 
+  RegisteredModel registered(GivenModel given) const {
+    pipeline::CaseModel asked;
+    asked.name = given.model.name;
+    asked.scale_sigma = given.scale_sigma;
+    if (given.starts.empty() && loaded_.views.size() < 2)
+      throw BadInput(Reason::bad_value,
+                     fmt::format("starts: \"{}\" is missing: with one view a pose is needed", asked.name));
+    RegisteredModel made;
+    for (const RegistrationView& view : loaded_.views) made.views.push_back(view.view);
+    const double motion_sigma_mm = options_.run.motion_sigma_mm;
+    made.registration =
+        registered_by_images(asked, given.model, {given.starts, {}, {}}, {}, loaded_.views, motion_sigma_mm);
+    add_figures(given.model, loaded_.views, made);
+    if (loaded_.views.size() > 1) made.registration.notes.push_back(motion_note(asked, motion_sigma_mm));
+    made.model = std::make_shared<const registration::Model>(std::move(given.model));
+    add_warnings_of_files(*made.model, made.registration);
+    return made;
+  }
+
  private:
   registration::Registration registered_by_images(const pipeline::CaseModel& asked,
                                                   const registration::Model& model, const StartPoses& start,
@@ -199,6 +219,19 @@ Expected<CaseRegistration> register_loaded(const pipeline::Case& given, LoadedVi
     const Registrar registrar(given, options, progress, result.loaded);
     for (std::size_t i = 0; i < given.models.size(); ++i)
       result.models.push_back(registrar.registered(given.models[i], plans[i]));
+    return result;
+  });
+}
+
+Expected<CaseRegistration> register_given(std::vector<GivenModel> models, LoadedViews loaded,
+                                          const RegisterOptions& options, const Progress& progress) {
+  return guarded([&] {
+    CaseRegistration result;
+    result.loaded = std::move(loaded);
+    result.warnings = result.loaded.warnings;
+    const pipeline::RegistrationCase none;
+    const Registrar registrar(none, options, progress, result.loaded);
+    for (GivenModel& model : models) result.models.push_back(registrar.registered(std::move(model)));
     return result;
   });
 }

@@ -111,9 +111,8 @@ void check_corners(const TriangleMesh& mesh, const std::string& origin) {
 
 }  // namespace
 
-Expected<SurfaceMesh> surface_from(std::string_view bytes, const std::string& origin) {
+Expected<SurfaceMesh> surface_of_file(SurfaceFile file, const std::string& origin) {
   return guarded([&] {
-    SurfaceFile file = file_from(bytes, origin);
     convert(file, origin);
     check_corners(file.mesh, origin);
     SurfaceMesh surface{welded(file.mesh), std::move(file.warnings)};
@@ -122,6 +121,10 @@ Expected<SurfaceMesh> surface_from(std::string_view bytes, const std::string& or
                                                     origin, surface.triangles.size()));
     return surface;
   });
+}
+
+Expected<SurfaceMesh> surface_from(std::string_view bytes, const std::string& origin) {
+  return guarded([&] { return value_or_throw(surface_of_file(file_from(bytes, origin), origin)); });
 }
 
 Expected<SurfaceMesh> read_surface(const std::filesystem::path& path) {

@@ -7,6 +7,7 @@
 
 #include "helicarm/core/failure.h"
 #include "helicarm/phantom/mesh.h"
+#include "helicarm/registration/surface.h"
 
 namespace helicarm::registration {
 
@@ -16,6 +17,10 @@ struct SurfaceFile {
   std::string declares;  ///< text that may state a space or a unit
   std::vector<Warning> warnings;
 };
+
+/// The surface of what a file holds, or of a mesh in memory: in L, P, S and mm, corners joined. Fails as
+/// `read_surface`; more than `max_triangles` are for the caller to refuse.
+Expected<SurfaceMesh> surface_of_file(SurfaceFile file, const std::string& origin);
 
 // Readers of the formats; all throw BadInput. `bytes` is the whole file.
 bool is_text_stl(std::string_view bytes);

@@ -222,6 +222,24 @@ std::map<std::string, xray::DerivedImage> images_of(const pipeline::Result& resu
 
 }  // namespace
 
+Expected<std::vector<Export>> exports_named(const std::vector<std::string>& words) {
+  std::vector<Export> kinds;
+  for (const std::string& word : words) {
+    const auto found = std::ranges::find(export_words, word);
+    const auto requested = std::ranges::find(requested_words, word);
+    if (found != export_words.end())
+      kinds.push_back(every_export[std::size_t(found - export_words.begin())]);
+    else if (requested != requested_words.end())
+      kinds.push_back(requested_export[std::size_t(requested - requested_words.begin())]);
+    else
+      return fail(Reason::usage,
+                  fmt::format("as: \"{}\" is none of: {}, {}", word, fmt::join(export_words, ", "),
+                              fmt::join(requested_words, ", ")));
+  }
+  if (kinds.empty()) kinds.assign(every_export.begin(), every_export.end());
+  return kinds;
+}
+
 void forget_exports(const std::filesystem::path& folder) {
   std::vector<std::string> names;
   std::error_code ec;

@@ -47,6 +47,9 @@ inline constexpr std::array requested_export{Export::tigre,       Export::astra,
 inline constexpr std::array<std::string_view, requested_export.size()> requested_words{
     "tigre", "astra", "leap", "plastimatch", "diffdrr", "deepdrr", "ompl", "npy"};
 
+/// The formats with these words; none: `every_export`. Fails with usage for another word.
+Expected<std::vector<Export>> exports_named(const std::vector<std::string>& words);
+
 /// Removes the files of an earlier export, recognised by name and content.
 void forget_exports(const std::filesystem::path& folder);
 

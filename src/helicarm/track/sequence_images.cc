@@ -47,13 +47,14 @@ Expected<SequenceImages> SequenceImages::open(std::span<const SequenceView> view
         throw BadInput(Reason::bad_value,
                        fmt::format("{}: frame {} with \"frame_offset\" {} is image {}", view.images.name,
                                    frames.first, view.frame_offset, lowest));
-      if (!pipeline::is_numbered(view.images)) {
-        file = value_or_throw(xray::ImageFile::open(view.images.image));
+      if (view.opened || !pipeline::is_numbered(view.images)) {
+        file = view.opened ? view.opened : value_or_throw(xray::ImageFile::open(view.images.image));
         if (lowest < 1 || highest > file->frames())
-          throw BadInput(Reason::bad_value,
-                         fmt::format("{}: the frames {} to {} are asked for, but {} has the frames 1 to {}",
-                                     view.images.name, lowest, highest, view.images.image.filename().string(),
-                                     file->frames()));
+          throw BadInput(
+              Reason::bad_value,
+              fmt::format("{}: the frames {} to {} are asked for, but {} has the frames 1 to {}",
+                          view.images.name, lowest, highest,
+                          view.opened ? "it" : view.images.image.filename().string(), file->frames()));
         continue;
       }
       for (int i = 0; i < frames.count(); ++i) {

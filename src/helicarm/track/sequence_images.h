@@ -16,6 +16,7 @@ struct SequenceView {
   pipeline::CaseView images;                  ///< "image" with {frame}, or a file with several frames
   int frame_offset = 0;                       ///< the image's number is the sequence's frame plus this
   std::optional<Eigen::Vector2i> image_size;  ///< as the camera's file states it
+  std::shared_ptr<const xray::ImageFile> opened = {};  ///< instead of a file of `images`
 };
 
 /// The images of a sequence, checked for existence and size before the first is used. The polarity of a view

@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/volume/in_memory.h"
 #include "helicarm/volume/voxels.h"
 #include "helicarm/xray/dicom_check.h"
 #include "helicarm/xray/dicom_frame.h"
@@ -28,7 +29,8 @@ constexpr double uneven_part = 0.02;
 
 /// Geometry of one slice; columns of `axes`: along a row, along a column, mm per pixel.
 struct Slice {
-  std::filesystem::path path;
+  std::filesystem::path path;         ///< or its name, if `held`
+  const std::string* held = nullptr;  ///< its bytes, if they are in memory
   Eigen::Matrix<double, 3, 2> axes;
   Vector3d corner;
   int columns = 0;
@@ -78,7 +80,25 @@ struct FolderOfSlices {
   std::map<std::string, int> other_classes;
 };
 
-/// Localizer images and files that are not DICOM are skipped.
+/// Adds a file's slice to its series. Localizer images and files that are not DICOM are skipped.
+void add_slice(FolderOfSlices& found, const std::filesystem::path& path, const std::string& bytes,
+               const std::string* held) {
+  if (!may_be_dicom(bytes)) return;
+  const auto read = guarded([&] {
+    const xray::DicomElements elements = value_or_throw(xray::walk_dicom(bytes, path.string()));
+    if (const auto kind = elements.text(xray::tags::sop_class); kind != xray::ct_class) {
+      ++found.other_classes[std::string(kind)];
+      return;
+    }
+    if (elements.text(xray::tags::image_type).find("LOCALIZER") != std::string_view::npos) return;
+    Slice slice = slice_of(value_or_throw(xray::check_dicom(bytes, path.string(), xray::DicomKind::ct)));
+    slice.path = path;
+    slice.held = held;
+    found.series[std::string(elements.text(xray::tags::series))].push_back(std::move(slice));
+  });
+  if (!read) found.unreadable.push_back(read.error());
+}
+
 FolderOfSlices find_series(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(folder))
@@ -87,20 +107,10 @@ FolderOfSlices find_series(const std::filesystem::path& folder) {
   FolderOfSlices found;
   for (const auto& path : paths) {
     const auto bytes = read_file(path, most_slice_bytes);
-    if (!bytes) found.unreadable.push_back(bytes.error());
-    if (!bytes || !may_be_dicom(*bytes)) continue;
-    const auto read = guarded([&] {
-      const xray::DicomElements elements = value_or_throw(xray::walk_dicom(*bytes, path.string()));
-      if (const auto kind = elements.text(xray::tags::sop_class); kind != xray::ct_class) {
-        ++found.other_classes[std::string(kind)];
-        return;
-      }
-      if (elements.text(xray::tags::image_type).find("LOCALIZER") != std::string_view::npos) return;
-      Slice slice = slice_of(value_or_throw(xray::check_dicom(*bytes, path.string(), xray::DicomKind::ct)));
-      slice.path = path;
-      found.series[std::string(elements.text(xray::tags::series))].push_back(std::move(slice));
-    });
-    if (!read) found.unreadable.push_back(read.error());
+    if (bytes)
+      add_slice(found, path, *bytes, nullptr);
+    else
+      found.unreadable.push_back(bytes.error());
   }
   return found;
 }
@@ -178,7 +188,8 @@ void check_rescale_type(const Slice& slice, const xray::DicomElements& elements,
 
 void decode_slice(const Slice& slice, float* voxels, std::vector<Warning>& warnings) {
   const std::string origin = slice.path.string();
-  const std::string bytes = value_or_throw(read_file(slice.path, most_slice_bytes));
+  const std::string read = slice.held ? "" : value_or_throw(read_file(slice.path, most_slice_bytes));
+  const std::string_view bytes = slice.held ? *slice.held : read;
   const xray::DicomOutline outline = value_or_throw(xray::check_dicom(bytes, origin, xray::DicomKind::ct));
   if (outline.columns != slice.columns || outline.rows != slice.rows)
     throw BadInput(Reason::bad_size, origin + ": changed while it was read");
@@ -229,11 +240,7 @@ Volume volume_of(std::vector<Slice>& slices, const std::string& origin) {
   return volume;
 }
 
-}  // namespace
-
-Volume read_ct_series(const std::filesystem::path& folder) {
-  const std::string origin = folder.string();
-  FolderOfSlices found = find_series(folder);
+Volume volume_of(FolderOfSlices found, const std::string& origin) {
   // What makes the series incomplete may be the file that cannot be read.
   if (found.series.empty() && !found.unreadable.empty()) throw BadInput(found.unreadable.front());
   if (found.series.empty()) throw BadInput(Reason::not_an_image, no_slice(found, origin));
@@ -249,6 +256,23 @@ Volume read_ct_series(const std::filesystem::path& folder) {
   if (!found.unreadable.empty()) warnings.push_back(skipped(found.unreadable));
   read.warnings.insert(read.warnings.begin(), warnings.begin(), warnings.end());
   return read;
+}
+
+}  // namespace
+
+Volume read_ct_series(const std::filesystem::path& folder) {
+  return volume_of(find_series(folder), folder.string());
+}
+
+Expected<Volume> volume_of_slices(const std::vector<std::string>& files, const std::string& origin) {
+  return guarded([&] {
+    FolderOfSlices found;
+    for (std::size_t i = 0; i < files.size(); ++i)
+      add_slice(found, fmt::format("{}[{}]", origin, i), files[i], &files[i]);
+    Volume volume = volume_of(std::move(found), origin);
+    value_or_throw(check_read(volume, origin));
+    return volume;
+  });
 }
 
 }  // namespace helicarm::volume

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/volume/in_memory.h"
 #include "helicarm/volume/voxels.h"
 
 namespace helicarm::volume {
@@ -65,11 +66,25 @@ Expected<Volume> read_volume(const std::filesystem::path& path) {
     std::error_code error;
     Volume volume =
         std::filesystem::is_directory(path, error) ? read_ct_series(path) : read_file_of_voxels(path);
-    value_or_throw(check_grid(volume.patient_from_voxel, path.string()));
+    value_or_throw(check_read(volume, path.string()));
+    return volume;
+  });
+}
+
+Expected<Volume> volume_of_nifti(const std::string& bytes, const std::string& origin) {
+  return guarded([&] {
+    Volume volume = read_nifti(origin, bytes);
+    value_or_throw(check_read(volume, origin));
+    return volume;
+  });
+}
+
+Expected<void> check_read(const Volume& volume, const std::string& origin) {
+  return check_grid(volume.patient_from_voxel, origin).and_then([&]() -> Expected<void> {
     // Scaling by the file's factor can overflow.
     if (std::ranges::any_of(volume.voxels, [](float voxel) { return !std::isfinite(voxel); }))
-      throw BadInput(Reason::not_finite, path.string() + ": a voxel is not finite");
-    return volume;
+      return fail(Reason::not_finite, origin + ": a voxel is not finite");
+    return {};
   });
 }
 

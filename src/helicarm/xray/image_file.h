@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "helicarm/xray/xray_image.h"
 
@@ -15,6 +16,8 @@ class ImageFile {
  public:
   /// Fails as `read_xray_image`; the file may have 4 GiB.
   static Expected<std::shared_ptr<const ImageFile>> open(const std::filesystem::path& path);
+  /// Images that are in memory, as the frames of a file. Fails with bad_size for none.
+  static Expected<std::shared_ptr<const ImageFile>> of(std::vector<XrayImage> images);
   ~ImageFile();
 
   int frames() const;

@@ -13,6 +13,7 @@
 #include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/foreign_file.h"
 #include "helicarm/xray/image_file.h"
+#include "helicarm/xray/image_in_memory.h"
 #include "helicarm/xray/jpeg.h"
 #include "helicarm/xray/read_dicom.h"
 
@@ -140,6 +141,7 @@ struct ImageFile::Content {
   FileKind kind = FileKind::dicom;
   std::optional<DicomOutline> outline = {};
   int frames = 1;
+  std::vector<XrayImage> images = {};  ///< in memory: then there is no file
 };
 
 ImageFile::ImageFile(std::unique_ptr<Content> content) : content_(std::move(content)) {}
@@ -159,6 +161,14 @@ Expected<std::shared_ptr<const ImageFile>> ImageFile::open(const fs::path& path)
     }
     return std::shared_ptr<const ImageFile>(new ImageFile(std::move(content)));
   });
+}
+
+Expected<std::shared_ptr<const ImageFile>> ImageFile::of(std::vector<XrayImage> images) {
+  if (images.empty()) return fail(Reason::bad_size, "images: is empty, at least one is required");
+  auto content = std::make_unique<Content>();
+  content->frames = int(images.size());
+  content->images = std::move(images);
+  return std::shared_ptr<const ImageFile>(new ImageFile(std::move(content)));
 }
 
 int ImageFile::frames() const { return content_->frames; }
@@ -181,6 +191,11 @@ Expected<void> ImageFile::check_angles() const {
 
 Expected<XrayImage> ImageFile::read(const std::string& view_name, std::optional<int> frame) const {
   const Content& of = *content_;
+  if (!of.images.empty())
+    return named(choose_frame("images", of.frames, frame).map([&](int index) {
+      return of.images[std::size_t(index)];
+    }),
+                 view_name);
   return named(guarded([&] {
                  return read_by_content(of.path, of.bytes, of.kind, of.outline ? &*of.outline : nullptr,
                                         frame);
@@ -194,6 +209,14 @@ Expected<int> count_frames(const fs::path& path) {
     const std::string origin = path.filename().string();
     return frames_of(bytes, file_kind(bytes, origin), origin);
   });
+}
+
+Expected<XrayImage> image_of_dicom(const std::string& bytes, const std::string& view_name,
+                                   std::optional<int> frame) {
+  return named(check_dicom(bytes, view_name).and_then([&](const DicomOutline& outline) {
+    return read_dicom_frame(outline, frame);
+  }),
+               view_name);
 }
 
 Expected<XrayImage> read_xray_image(const fs::path& path, const std::string& view_name,

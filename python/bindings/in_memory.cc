@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+#include <set>
+#include <variant>
+
+#include "arrays.h"
+#include "checks.h"
+#include "helicarm/case_registration/register_in_memory.h"
+#include "helicarm/rectification/rectify.h"
+#include "helicarm/registration/model.h"
+#include "helicarm/sweep/sweep.h"
+#include "helicarm/xray/image_file.h"
+#include "measuring_options.h"
+#include "module.h"
+#include "signals.h"
+
+namespace helicarm::python {
+namespace {
+
+using Camera = exchange::ImportedMatrix;
+using VolumePointer = std::shared_ptr<volume::Volume>;
+using SurfacePointer = std::shared_ptr<registration::SurfaceMesh>;
+using ImagePointer = std::shared_ptr<xray::XrayImage>;
+/// Name, image, camera, and the map of a raw image.
+using GivenView = std::tuple<std::string, ImagePointer, Camera, std::optional<rectification::DistortionMap>>;
+
+geometry::RigidTransform pose_from(const Doubles& matrix, const std::string& name) {
+  constexpr double rounded = 1e-6;
+  const Eigen::Matrix4d given = matrix_of(matrix, 4, 4, name);
+  const geometry::RigidTransform pose{given.topLeftCorner<3, 3>(), given.topRightCorner<3, 1>()};
+  if (given.row(3) != Eigen::RowVector4d(0, 0, 0, 1) ||
+      !(pose.rotation * pose.rotation.transpose()).isIdentity(rounded) || pose.rotation.determinant() < 0)
+    raise({Reason::bad_value, fmt::format("{}: is not a rigid motion (4 x 4, mm)", name), {}, {}});
+  return pose;
+}
+
+case_registration::GivenModel model_of(const std::string& name, const py::dict& given,
+                                       const std::vector<Doubles>& starts) {
+  case_registration::GivenModel made;
+  if (given.contains("surface")) {
+    const auto surface = given["surface"].cast<SurfacePointer>();
+    made.model = value_or_raise(without_gil([&] { return registration::model_from(name, *surface); }));
+    made.model.warnings = surface->warnings;
+  } else {
+    const auto held = given["volume"].cast<VolumePointer>();
+    std::optional<volume::Volume> mask;
+    if (given.contains("mask")) mask = *given["mask"].cast<VolumePointer>();
+    std::optional<registration::HuWindow> window;
+    if (given.contains("window_hu")) {
+      const auto [low, high] = given["window_hu"].cast<std::pair<double, double>>();
+      checked(low, any_number, name + ": window_hu");
+      checked(high, {low, std::numeric_limits<double>::infinity(), true}, name + ": window_hu");
+      window = registration::HuWindow{low, high};
+    }
+    made.model =
+        value_or_raise(without_gil([&] { return registration::model_from(name, *held, mask, window); }));
+    made.model.warnings = held->warnings;
+    if (mask)
+      made.model.warnings.insert(made.model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
+  }
+  if (given.contains("scale_sigma"))
+    made.scale_sigma = checked(given["scale_sigma"].cast<double>(), {0, 0.1}, name + ": scale_sigma");
+  for (const Doubles& start : starts) made.starts.push_back(pose_from(start, "starts: " + name));
+  return made;
+}
+
+case_registration::LoadedViews views_of(const std::vector<GivenView>& views,
+                                        const std::optional<Doubles>& camera_covariance,
+                                        const std::vector<std::optional<py::array_t<bool>>>& usable) {
+  std::vector<xray::XrayImage> images;
+  std::vector<Camera> cameras;
+  for (const auto& [name, image, camera, map] : views) {
+    images.push_back(*image);
+    images.back().name = name;
+    if (map) images.back().pixels = rectification::resample(*image, *map);
+    cameras.push_back(camera);
+  }
+  auto loaded = value_or_raise(case_registration::views_of_images(std::move(images), cameras));
+  const auto size = py::ssize_t(calibration::view_parameters * views.size());
+  if (camera_covariance)
+    loaded.camera_covariance = checked_covariance(
+        matrix_of(*camera_covariance, size, size, "camera_covariance"), "camera_covariance");
+  for (std::size_t i = 0; i < usable.size(); ++i) {
+    if (!usable[i]) continue;
+    auto& view = loaded.views[i];
+    const py::array_t<bool> given = py::array_t<bool, py::array::c_style>::ensure(*usable[i]);
+    if (given.ndim() != 2 || given.shape(0) != view.grey.height() || given.shape(1) != view.grey.width())
+      raise({Reason::bad_size,
+             fmt::format("usable: shape {}, the image has ({}, {})", shape_of(given), view.grey.height(),
+                         view.grey.width()),
+             view.name,
+             {}});
+    view.usable = image::Image<std::uint8_t>(view.grey.width(), view.grey.height());
+    std::ranges::copy_n(given.data(), given.size(), view.usable.pixels().begin());
+  }
+  return loaded;
+}
+
+py::object register_given(const std::vector<std::pair<std::string, py::dict>>& models,
+                          const std::map<std::string, std::vector<Doubles>>& starts,
+                          const std::vector<GivenView>& views,
+                          const std::optional<Doubles>& camera_covariance,
+                          const std::vector<std::optional<py::array_t<bool>>>& usable,
+                          const std::optional<std::filesystem::path>& out, std::optional<double> max_error_mm,
+                          double motion_sigma_mm, double search_mm, double search_deg, unsigned threads,
+                          const py::object& progress) {
+  const auto options = measuring_options("register", "best", max_error_mm, motion_sigma_mm, search_mm,
+                                         search_deg, threads, {}, py::bool_(false));
+  std::vector<case_registration::GivenModel> given;
+  for (const auto& [name, model] : models) {
+    const auto at = starts.find(name);
+    given.push_back(model_of(name, model, at == starts.end() ? std::vector<Doubles>{} : at->second));
+  }
+  auto loaded = views_of(views, camera_covariance, usable);
+  const RunHooks hooks = run_hooks(progress);
+  const auto result = value_or_raise(without_gil([&] {
+    return case_registration::register_given(std::move(given), std::move(loaded), options, progress_of(hooks))
+        .and_then([&](case_registration::CaseRegistration made) {
+          const auto written = out ? case_registration::write_registration(made, *out) : Expected<void>{};
+          return written.map([&] { return std::move(made); });
+        });
+  }));
+  py::object answer = python_from(case_registration::to_json(result));
+  for (const case_registration::RegisteredModel& model : result.models)
+    if (model.registration.failure) raise(*model.registration.failure, answer);
+  return answer;
+}
+
+sweep::Sweep sweep_images(const std::vector<ImagePointer>& images, const phantom::Calibrator& calibrator,
+                          const std::optional<phantom::Plate>& plate, std::optional<bool> mirrored,
+                          const std::optional<std::string>& path, unsigned threads,
+                          const py::object& progress) {
+  constexpr std::size_t most_images = 1000;
+  if (images.empty() || images.size() > most_images)
+    raise({Reason::bad_value,
+           fmt::format("images: {} images, 1 to {} are possible", images.size(), most_images),
+           {},
+           {}});
+  sweep::SweepOptions options;
+  options.threads = threads;
+  if (path) options.path = value_or_raise(sweep::path_kind(*path));
+  sweep::SweepCase given;
+  given.base.calibrator = calibrator;
+  given.base.calibrator_name = calibrator.name;
+  given.base.plate = plate;
+  if (plate) given.base.plate_name = plate->name;
+  pipeline::CaseView run;
+  run.name = "RUN";
+  run.image = "images";
+  run.mirrored = mirrored;
+  given.base.views = {run};
+  std::vector<xray::XrayImage> frames;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    frames.push_back(*images[i]);
+    sweep::Frame frame{run, run.name, int(i) + 1};
+    frame.view.name = fmt::format("{}/{}", run.name, frame.number);
+    frame.view.frame = frame.number;
+    given.frames.push_back(std::move(frame));
+  }
+  given.files[run.image] = value_or_raise(xray::ImageFile::of(std::move(frames)));
+  const RunHooks hooks = run_hooks(py::none());
+  sweep::Sweep result = value_or_raise(without_gil([&] {
+    return sweep::run_sweep(given, options, [&](double share) {
+      hooks.on_view();
+      if (progress.is_none()) return;
+      const py::gil_scoped_acquire acquire;
+      progress(share);
+    });
+  }));
+  if (result.failure) raise(*result.failure, py::cast(result));
+  return result;
+}
+
+}  // namespace
+
+void add_in_memory(py::module_& module) {
+  const case_registration::RegisterOptions usual;
+  module.def("_register_given", &register_given, py::arg("models"), py::arg("starts"), py::arg("views"),
+             py::arg("camera_covariance"), py::arg("usable"), py::kw_only(), py::arg("out") = py::none(),
+             py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = usual.run.motion_sigma_mm,
+             py::arg("search_mm") = usual.search.shift_mm, py::arg("search_deg") = usual.search.turn_deg,
+             py::arg("threads") = usual.run.threads, py::arg("progress") = py::none());
+  const sweep::SweepOptions free;
+  module.def("_sweep_images", &sweep_images, py::arg("images"), py::arg("calibrator"), py::arg("plate"),
+             py::arg("mirrored"), py::kw_only(), py::arg("path") = py::none(),
+             py::arg("threads") = free.threads, py::arg("progress") = py::none());
+}
+
+}  // namespace helicarm::python

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Registration, DRR, sweep and track: of a case's folder, or of arrays in memory."""
+import os
+from collections.abc import Mapping
+
+import numpy as np
+
+from . import _helicarm as _c
+from .arrays import as_camera, as_image, as_model, as_volume
+from .errors import InputError, RefusedError
+from .results import MigrationAnswer, RegistrationAnswer, SequenceAnswer
+
+
+def _answered(answer, call, *arguments, **options):
+    try:
+        return answer(call(*arguments, **options))
+    except RefusedError as error:
+        if isinstance(error.result, dict):
+            error.result = answer(error.result)
+        raise
+
+
+def _one_of(function, folder, given):
+    named = [name for name, value in given.items() if value is not None]
+    if (folder is not None) == bool(named):
+        raise InputError("usage", f"{function}: give the folder of a case, or {', '.join(given)}" if folder is None else
+                         f"{function}: a folder is given, which states {', '.join(named)} itself")
+
+
+def drr(volume, camera, *, shape=None, values="hu", threads=0):
+    """Line integrals of a volume's attenuation (1) from the source to each pixel, as `helicarm drr` computes them.
+
+    volume: Volume or what as_volume takes. camera: Camera of the patient frame (LPS, mm) or what as_camera takes, or a list
+    of them. shape: (height, width); the cameras' own where None. values: "hu" (water 0.02059 / mm, 0 below -800 HU) or
+    "raw". Releases the GIL. Returns (height, width) float32, or (n, height, width) of a list.
+    Raises InputError: bad_value for a source inside the volume, bad_size, usage.
+    """
+    several = isinstance(camera, list)
+    cameras = [as_camera(each) for each in (camera if several else [camera])]
+    if shape is None:
+        shapes = {each.shape for each in cameras}
+        if len(shapes) != 1 or None in shapes:
+            raise InputError("usage", "shape: is missing, and the cameras do not state one")
+        shape = shapes.pop()
+    images = _c._drr(as_volume(volume), cameras, tuple(shape), values, threads)
+    return images if several else images[0]
+
+
+def _views_of(views):
+    """[(name, image or images, camera)]."""
+    if isinstance(views, Mapping):
+        return [(name, *pair) for name, pair in views.items()]
+    return [(f"V{i + 1}", *pair) for i, pair in enumerate(views)]
+
+
+def _cameras_of(views, covariance):
+    """[(Camera, DistortionMap or None)], and the covariance of calibrated views."""
+    cameras, held = [], []
+    for name, _, camera in views:
+        if isinstance(camera, _c.Calibration):
+            camera = (camera, name)
+        if isinstance(camera, (tuple, list)) and len(camera) == 2 and isinstance(camera[0], _c.Calibration):
+            calibration, view = camera
+            cameras.append((as_camera((calibration, view)), calibration.map(view)))
+            held.append((calibration, view if isinstance(view, int) else calibration.names.index(view)))
+        else:
+            cameras.append((as_camera(camera), None))
+    one = len(held) == len(views) and all(calibration is held[0][0] for calibration, _ in held)
+    if covariance is None and one and held[0][0].joint_covariance.size:
+        rows = np.concatenate([np.arange(11 * i, 11 * i + 11) for _, i in held])
+        covariance = held[0][0].joint_covariance[np.ix_(rows, rows)]
+    return cameras, covariance
+
+
+def register(folder=None, *, models=None, views=None, starts=None, camera_covariance=None, usable=None, **options):
+    """Registers CT volumes and surfaces to X-ray images: of a case, or of arrays.
+
+    register(folder, *, out=None, method="best", max_error_mm=None, motion_sigma_mm=0, search_mm, search_deg, threads=0,
+    history=None, cache=True, progress=None): the models of a case, as `helicarm register` does.
+
+    register(models={name: model}, views={name: (image, camera)}, starts={name: world_from_model}, ...): in memory.
+      model: what as_volume or as_surface takes, or a dict of "volume" with "mask" (on the volume's grid) or "window_hu"
+        (low, high), or "surface", and "scale_sigma" (relative). Model coordinates: L, P, S, mm.
+      image: what as_image takes, metal dark; of floats an XrayImage, which states their range. Free of distortion unless its
+        camera has a map.
+      camera: what as_camera takes, all of one world; or a Calibration, whose view of that name is used with its map, and
+        whose covariance then counts. Views may also be a list of pairs.
+      starts: 4 x 4 (rigid, mm) or a list of them for each model; without, two views or more are searched everywhere.
+      camera_covariance: (11 n, 11 n) of the cameras, as Calibration.joint_covariance; None: taken as exact, with a warning.
+      usable: {view: (height, width) bool}, False where fiducials, plate dots or tools are.
+      out, max_error_mm, motion_sigma_mm, search_mm, search_deg, threads, progress: as of a case.
+
+    Returns the content of registration.json: ["models"][i]["world_from_model"], "covariance" (6 x 6: rotation vector in
+    rad, then mm, world axes, about centre_mm), "decision", ...; each model also has .world_from_model, .covariance and
+    .rotation (SciPy), the whole .to_frame() (pandas). World: the calibrator's frame, or that of the cameras.
+    Releases the GIL; progress is called with the name of each step, an exception from it ends the work, and Ctrl-C does.
+    Raises InputError; RefusedError if the views or a model are refused, with all that was computed in .result.
+    """
+    given = {"models": models, "views": views, "starts": starts, "camera_covariance": camera_covariance, "usable": usable}
+    _one_of("register", folder, given)
+    if folder is not None:
+        return _answered(RegistrationAnswer, _c.register, folder, **options)
+    if not models or not views:
+        raise InputError("usage", "register: models and views are both required")
+    if not isinstance(models, Mapping):
+        raise InputError("bad_value", "models: is not {name: model}")
+    triples = _views_of(views)
+    names = [name for name, _, _ in triples]
+    for what, of, known in (("starts", starts, models), ("usable", usable, names)):
+        for name in of or ():
+            if name not in known:
+                raise InputError("bad_value", f'{what}: there is no "{name}"')
+    cameras, covariance = _cameras_of(triples, camera_covariance)
+    held = [(name, as_image(image, name=name), camera, map_)
+            for (name, image, _), (camera, map_) in zip(triples, cameras)]
+    poses = {name: list(start) if np.ndim(start) == 3 else [start] for name, start in (starts or {}).items()}
+    return _answered(RegistrationAnswer, _c._register_given, [(name, as_model(model)) for name, model in models.items()],
+                     poses, held, covariance, [(usable or {}).get(name) for name in names], **options)
+
+
+def register_sequence(folder, frames, **options):
+    return _answered(SequenceAnswer, _c.register_sequence, folder, frames, **options)
+
+
+def migration(first, second, **options):
+    return MigrationAnswer(_c.migration(first, second, **options))
+
+
+def sweep(folder=None, *, images=None, calibrator=None, plate=None, pixel_mm=None, source_detector_mm=None, range=None,
+          mirrored=None, **options):
+    """Calibrates every image of a rotation or tomosynthesis and all of them on one path: of a case, or of arrays.
+
+    sweep(folder, *, path=None, threads=0, progress=None): folder holds case.json, whose view has "frames".
+
+    sweep(images=..., calibrator=..., ...): images: (n, height, width) array, or a list of arrays, XrayImages, paths or pydicom
+    datasets, in the order of the path. calibrator: Calibrator, its path, or "udcsc". plate: Plate, its path or "plate48", seen
+    in every image; None for a flat panel. pixel_mm, source_detector_mm, range: of arrays, as XrayImage has them. mirrored:
+    what the C-arm is known to do.
+
+    path: "smooth", "free" or None (smooth for 16 or more images of one run). progress: called with the share of the images
+    that are done; an exception from it ends the run, and Ctrl-C does. Releases the GIL. Returns a Sweep.
+    Raises InputError; RefusedError with .result if the run as a whole is refused.
+    """
+    given = {"images": images, "calibrator": calibrator, "plate": plate, "pixel_mm": pixel_mm,
+             "source_detector_mm": source_detector_mm, "range": range, "mirrored": mirrored}
+    _one_of("sweep", folder, given)
+    if folder is not None:
+        return _c.sweep(folder, **options)
+    if images is None or calibrator is None:
+        raise InputError("usage", "sweep: images and calibrator are both required")
+    stated = {"pixel_mm": pixel_mm, "source_detector_mm": source_detector_mm, "range": range}
+    held = [as_image(image, **stated) for image in images]
+    return _c._sweep_images(held, _loaded(calibrator, _c.Calibrator, "udcsc"), _loaded(plate, _c.Plate, "plate48"), mirrored,
+                            **options)
+
+
+def _loaded(given, kind, built_in):
+    if given is None or isinstance(given, kind):
+        return given
+    return getattr(kind, built_in)() if given == built_in else kind.load(given)
+
+
+def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, bodies=None, frame_rate_hz=None,
+          camera_covariance=None, **options):
+    """Follows markers and bodies through a sequence: of a case, or of arrays.
+
+    track(case, *, frames="A-B[:STEP]", out=None, resume=False, progress=None): case: folder that holds case.json; the markers
+    are picked in frame A. out: folder for all files, whose rows are written as they are computed. resume: go on after the
+    frames of an interrupted run in `out`.
+
+    track(views={name: (images, camera)}, picks={marker: {view: (u, v)}}, diameter_mm=...): in memory.
+      images: (n, height, width) array, or a list of arrays, XrayImages, paths or pydicom datasets, as many in every view,
+        metal dark; frame i of all views is one moment. camera: as register takes it.
+      picks: raw pixels in the first frame, each marker in one view or more. diameter_mm: of the markers, 0.1 to 30.
+      bodies: {name: [markers]}, or {name: {marker: (x, y, z)}} where the body's geometry is known, mm.
+      frame_rate_hz, out, progress: as of a case; camera_covariance: as register takes it.
+
+    progress: called with the share of the frames that are done; an exception from it ends the run, and Ctrl-C does.
+    Releases the GIL. Returns a Track. Raises InputError; RefusedError if the picks contradict each other or the geometry.
+    """
+    given = {"views": views, "picks": picks, "diameter_mm": diameter_mm, "bodies": bodies, "frame_rate_hz": frame_rate_hz,
+             "camera_covariance": camera_covariance}
+    _one_of("track", case, given)
+    if case is not None:
+        if frames is None:
+            raise InputError("usage", "track: frames is missing, such as frames=\"1-100\"")
+        return _c.track(case, frames=frames, **options)
+    if views is None or not picks or diameter_mm is None or frames is not None:
+        raise InputError("usage", "track: views, picks and diameter_mm are required; frames is for a case")
+    triples = _views_of(views)
+    if len(triples) < 2:
+        raise RefusedError("too_few_views", "track: markers are located in two views or more")
+    cameras, covariance = _cameras_of(triples, camera_covariance)
+    counts = {name: len(images) for name, images, _ in triples}
+    if len(set(counts.values())) != 1 or 0 in counts.values():
+        raise InputError("bad_size", f"views: numbers of images differ or are 0: {counts}")
+    held = [(name, [as_image(image, name=name) for image in images], camera, map_)
+            for (name, images, _), (camera, map_) in zip(triples, cameras)]
+    names, markers = list(counts), list(picks)
+    flat = []
+    for marker, places in picks.items():
+        for view, uv in places.items():
+            if view not in counts:
+                raise InputError("bad_value", f'picks: "{marker}": there is no view "{view}"')
+            u, v = map(float, uv)
+            flat.append((markers.index(marker), names.index(view), u, v))
+    return _c._track_images(held, covariance, markers, flat, _bodies_of(bodies or {}, markers),
+                            diameter_mm=diameter_mm, frame_rate_hz=frame_rate_hz, **options)
+
+
+def _bodies_of(bodies, markers):
+    plans, taken = [], set()
+    for name, members in bodies.items():
+        if not name or name.startswith(".") or "/" in name or os.sep in name:
+            raise InputError("bad_value", f'bodies: "{name}" is no file name: NAME.tra is written')
+        for marker in members:
+            if marker not in markers:
+                raise InputError("bad_value", f'bodies: "{name}": "{marker}" has no pick')
+            if marker in taken:
+                raise InputError("name_clash", f'bodies: "{marker}" is given twice')
+            taken.add(marker)
+        places = np.array(list(members.values()), float) if isinstance(members, Mapping) else None
+        plans.append((name, [markers.index(marker) for marker in members], places))
+    return plans
+
+
+register_sequence.__doc__, migration.__doc__ = _c.register_sequence.__doc__, _c.migration.__doc__

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Volumes, surfaces and cameras from arrays, and registration, DRR, sweep and track of them."""
+import json
+
+import numpy as np
+import pytest
+
+import helicarm
+from test_registration import body_hu, image_of, sequence  # noqa: F401
+from test_sweep import BALLS, DISTANCE_MM, FRAMES, PIXEL_MM, drawn, projection
+
+TETRAHEDRON = np.array([[0, 0, 0], [40, 0, 0], [0, 30, 0], [0, 0, 20]], float), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+PLACE = np.array([[0, -2, 0, 5], [1, 0, 0, -7], [0, 0, 3, 11], [0, 0, 0, 1.0]])
+LPS_FROM_RAS = np.diag([-1, -1, 1, 1.0])
+
+
+def refused(code, match, call, *arguments, **options):
+    with pytest.raises(helicarm.HelicarmError, match=match) as error:
+        call(*arguments, **options)
+    assert error.value.code == code, error.value
+
+
+def test_a_volume_keeps_its_voxels_and_its_place():
+    voxels = np.random.default_rng(1).integers(-1000, 3000, (3, 4, 5)).astype(np.int16)
+    volume = helicarm.Volume(voxels, PLACE, frame="LPS")
+    assert volume.shape == (3, 4, 5) and np.array_equal(volume.array, voxels) and np.array_equal(volume.affine, PLACE)
+    assert not volume.array.flags.writeable and volume.array.flags.f_contiguous
+    assert np.array_equal(helicarm.Volume(voxels, PLACE[:3], frame="RAS").affine, LPS_FROM_RAS @ PLACE)
+    assert volume.centre_mm == pytest.approx((PLACE @ [1, 1.5, 2, 1])[:3])
+
+
+def test_a_view_of_a_volume_keeps_it_alive():
+    array = helicarm.Volume(np.full((50, 50, 50), 7, np.uint8), PLACE, frame="LPS").array
+    assert (array == 7).all()
+
+
+@pytest.mark.parametrize("array, affine, frame, code, match", [
+    (np.zeros((3, 3)), PLACE, "LPS", "bad_size", r"shape \(3, 3\) is not \(i, j, k\)"),
+    (np.zeros((3, 3, 0)), PLACE, "LPS", "bad_size", "a side of 0"),
+    (np.full((3, 3, 3), np.nan), PLACE, "LPS", "not_finite", "a voxel is not finite"),
+    (np.zeros((3, 3, 3), complex), PLACE, "LPS", "bad_value", "not real numbers"),
+    (np.zeros((3, 3, 3)), PLACE, "MNI", "unsupported", "frame.*MNI"),
+    (np.zeros((3, 3, 3)), np.diag([1, 1, 0, 1]), "LPS", "bad_value", "a spacing of 0 mm"),
+    (np.zeros((3, 3, 3)), np.diag([1, 1, 1, 2]), "LPS", "bad_value", "the last row is not 0 0 0 1"),
+    (np.zeros((3, 3, 3)), np.array([[1, 0, 2, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]), "LPS", "bad_value", "coplanar"),
+    (np.zeros((3, 3, 3)), PLACE * np.nan, "LPS", "not_finite", "affine")])
+def test_a_volume_without_a_usable_place_is_refused(array, affine, frame, code, match):
+    refused(code, match, helicarm.Volume, array, affine, frame=frame)
+
+
+def test_the_tilt_of_a_gantry_is_kept():
+    tilted = np.diag([0.5, 0.5, 2, 1])
+    tilted[1, 2] = 2 * np.tan(np.radians(20))
+    assert np.array_equal(helicarm.Volume(np.zeros((3, 3, 3)), tilted, frame="LPS").affine, tilted)
+
+
+def test_a_surface_is_converted_to_lps_and_mm():
+    vertices, faces = TETRAHEDRON
+    surface = helicarm.Surface(vertices / 10, faces, frame="RAS", unit="cm")
+    assert surface.vertices[surface.faces] == pytest.approx((vertices * [-1, -1, 1])[faces])
+
+
+@pytest.mark.parametrize("vertices, faces, more, code, match", [
+    (TETRAHEDRON[0], TETRAHEDRON[1] + 1, {}, "bad_value", "row 1 holds 4, the vertices are 0 to 3"),
+    (TETRAHEDRON[0], TETRAHEDRON[1] - 1, {}, "bad_value", "holds -1"),
+    (TETRAHEDRON[0], np.zeros((3, 4), int), {}, "bad_value", r"shape \(3, 4\)"),
+    (TETRAHEDRON[0], TETRAHEDRON[1].astype(float), {}, "bad_value", "whole numbers"),
+    (TETRAHEDRON[0] * np.nan, TETRAHEDRON[1], {}, "not_finite", "vertices"),
+    (TETRAHEDRON[0] * 1000, TETRAHEDRON[1], {}, "bad_value", "not in mm"),
+    (TETRAHEDRON[0], TETRAHEDRON[1], {"unit": "cubit"}, "unsupported", "unit.*cubit")])
+def test_a_surface_that_is_none_is_refused(vertices, faces, more, code, match):
+    refused(code, match, helicarm.Surface, vertices, faces, frame="LPS", **more)
+
+
+def test_frames_are_never_assumed():
+    refused("usage", "has no place", helicarm.as_volume, np.zeros((3, 3, 3)))
+    refused("usage", 'give frame="LPS" or frame="RAS"', helicarm.as_surface, TETRAHEDRON)
+    with pytest.raises(TypeError):
+        helicarm.Volume(np.zeros((3, 3, 3)), PLACE)
+
+
+def test_a_camera_of_a_projection_and_of_its_parts_are_one():
+    k, rotation, source = projection(2)
+    camera = helicarm.Camera(k, rotation, -rotation @ source, shape=(240, 256))
+    again = helicarm.as_camera(-3 * camera.projection)
+    for name in ("K", "R", "t"):
+        assert getattr(again, name) == pytest.approx(getattr(camera, name), abs=1e-9)
+    assert camera.source_mm == pytest.approx(source) and camera.shape == (240, 256) and again.shape is None
+    homogeneous = camera.projection @ [1, 2, 3, 1]
+    assert camera.project([1, 2, 3]) == pytest.approx(homogeneous[:2] / homogeneous[2])
+    assert np.isnan(camera.project(2 * source)).all()
+
+
+def test_a_camera_that_is_none_is_refused():
+    k, rotation, source = projection(0)
+    refused("bad_value", "not a proper rotation", helicarm.Camera, k, -rotation, source)
+    refused("bad_value", "not upper triangular", helicarm.Camera, k.T, rotation, source)
+    refused("not_finite", "K", helicarm.Camera, k * np.nan, rotation, source)
+    refused("point_at_infinity", "", helicarm.as_camera, np.eye(3, 4) * [[1], [1], [0]])
+    refused("unsupported", "neither a Camera", helicarm.as_camera, 7)
+
+
+def test_a_drr_is_the_exact_chord_of_a_block():
+    volume = helicarm.Volume(np.ones((10, 10, 10)), np.diag([2, 2, 2, 1.0]), frame="LPS")
+    camera = helicarm.Camera.orbit(volume.centre_mm, size=5, pixel_mm=1)
+    image = helicarm.drr(volume, camera, values="raw")
+    assert image.shape == (5, 5) and image[2, 2] == pytest.approx(20, rel=1e-4)
+    assert image[2, 0] == pytest.approx(20 * np.hypot(1, 2 / 1020), rel=1e-4)
+    both = helicarm.drr(volume, [camera, camera], shape=(3, 5), values="raw", threads=1)
+    assert both.shape == (2, 3, 5) and np.array_equal(both[0], both[1])
+    refused("bad_value", "inside", helicarm.drr, volume, helicarm.Camera.orbit(volume.centre_mm, source_centre_mm=1))
+    refused("usage", "values", helicarm.drr, volume, camera, values="ct")
+    refused("usage", "shape", helicarm.drr, volume, (camera.K, camera.R, camera.t))
+
+
+def views_of(folder, frame=1):
+    views = {}
+    for name in "AB":
+        k, rotation, t = json.loads((folder / f"{name}.json").read_text()).values()
+        views[name] = helicarm.read_image(folder / f"{name}{frame}.png"), (k, rotation, t)
+    return views
+
+
+def start():
+    pose = np.eye(4)
+    pose[:3, 3] = 2, -1, 1
+    return pose
+
+
+def volume_of_body():
+    place = np.eye(4)
+    place[:3, 3] = -20
+    return helicarm.Volume(body_hu().transpose(2, 1, 0), place, frame="LPS")
+
+
+def alike(model):
+    return {key: value for key, value in model.items() if key != "seconds"}
+
+
+def test_arrays_and_files_are_registered_alike(sequence, tmp_path):  # noqa: F811
+    steps = []
+    answer = helicarm.register(models={"body": {"volume": volume_of_body(), "window_hu": (300, 3000)}}, views=views_of(sequence),
+                               starts={"body": start()}, out=tmp_path / "out", progress=steps.append)
+    case = json.loads((sequence / "case.json").read_text())
+    case["models"] = case["models"][:1]
+    for view in case["views"]:
+        view["image"] = view["image"].replace("{frame}", "1")
+    for file in sequence.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    (tmp_path / "case.json").write_text(json.dumps(case))
+    of_files = helicarm.register(tmp_path)
+    assert alike(answer["models"][0]) == alike(of_files["models"][0]) and steps
+    assert answer == json.loads((tmp_path / "out/registration.json").read_text())
+    assert answer.models["body"].world_from_model[:3, 3] == pytest.approx([1, 0, 0], abs=0.2)
+    assert (tmp_path / "out/report.html").exists() and (tmp_path / "out/A_overlay.png").exists()
+
+
+def test_a_start_may_be_one_of_several_and_views_a_list(sequence):  # noqa: F811
+    far = start()
+    far[:3, 3] += 60
+    answer = helicarm.register(models={"body": {"volume": volume_of_body(), "window_hu": (300, 3000)}},
+                               views=list(views_of(sequence).values()), starts={"body": [far, start()]}, search_mm=5)
+    assert answer["models"][0]["world_from_model"][0][3] == pytest.approx(1, abs=0.2)
+    assert [view["name"] for view in answer["views"]] == ["V1", "V2"]
+
+
+def test_what_registration_of_arrays_needs_is_named(sequence):  # noqa: F811
+    models, views = {"body": volume_of_body()}, views_of(sequence)
+    refused("usage", "folder of a case, or models, views", helicarm.register)
+    refused("usage", "states models itself", helicarm.register, sequence, models=models)
+    refused("usage", "both required", helicarm.register, models=models)
+    refused("bad_value", 'starts: there is no "femur"', helicarm.register, models=models, views=views, starts={"femur": start()})
+    refused("bad_value", "not a rigid motion", helicarm.register, models=models, views=views, starts={"body": 2 * start()})
+    refused("bad_value", "with one view a pose is needed", helicarm.register, models=models, views={"A": views["A"]})
+    refused("unknown_key", "window", helicarm.register, models={"body": {"volume": models["body"], "window": 3}}, views=views)
+    refused("bad_size", "usable", helicarm.register, models=models, views=views, usable={"A": np.ones((3, 3), bool)})
+    image = views["A"][0]
+    small = helicarm.Camera(*views["A"][1], shape=(10, 10))
+    refused("bad_size", "the camera is for 10 x 10", helicarm.register, models=models, views={"A": (image, small), "B": views["B"]})
+    refused("bad_value", "range", helicarm.register, models=models, views={"A": (image.pixels, small)}, starts={"body": start()})
+
+
+def test_a_sweep_of_arrays_is_that_of_files():
+    stack = np.stack([drawn(frame) for frame in range(FRAMES)])
+    calibrator = helicarm.Calibrator.from_arrays([f"G{i}" for i in range(len(BALLS))], BALLS,
+                                                 [7 if i % 3 == 0 else 5 for i in range(len(BALLS))])
+    shares = []
+    sweep = helicarm.sweep(images=stack.astype(np.uint16), calibrator=calibrator, pixel_mm=PIXEL_MM, source_detector_mm=DISTANCE_MM,
+                           progress=shares.append)
+    assert sweep.frames == [1, 2, 3, 4] and all(sweep.accepted) and len(shares) == FRAMES
+    for frame in range(FRAMES):
+        assert np.linalg.norm(sweep.sources[frame] - projection(frame)[2]) < 4 * np.sqrt(np.trace(sweep.source_covariances[frame]))
+    refused("usage", "both required", helicarm.sweep, images=stack)
+    refused("usage", "give the folder", helicarm.sweep)
+
+
+def spheres(places, camera, shape):
+    """Dark discs of markers of 3 mm."""
+    v, u = np.mgrid[:shape[0], :shape[1]]
+    image = np.full(shape, 3000.0)
+    for at in places:
+        uv = camera.project(at)
+        radius = 1.5 * camera.K[1, 1] / (camera.R @ at + camera.t)[2]
+        chord = np.sqrt(np.maximum(radius ** 2 - (u - uv[0]) ** 2 - (v - uv[1]) ** 2, 0)) / radius
+        image *= np.exp(-1.2 * chord)
+    return np.rint(image + np.random.default_rng(5).normal(0, 8, shape)).astype(np.uint16)
+
+
+def test_markers_are_tracked_in_arrays(tmp_path):
+    shape, n = (200, 220), 4
+    cameras = {name: helicarm.Camera.orbit([0, 0, 0], angle_deg=angle, size=200, pixel_mm=0.5) for name, angle in (("A", 0), ("B", 80))}
+    body = np.array([[0, 0, 0], [20, 0, 5], [0, 18, -8], [-12, 6, 14.0]])
+    moved = [body + [0.5 * frame, 0, 0.25 * frame] for frame in range(n)]
+    views = {name: (np.stack([spheres(places, camera, shape) for places in moved]), camera) for name, camera in
+             ((name, helicarm.Camera(c.K, c.R, c.t, shape=shape)) for name, c in cameras.items())}
+    names = ["a", "b", "c", "d"]
+    picks = {name: {view: views[view][1].project(at) for view in views} for name, at in zip(names, body)}
+    shares = []
+    motion = helicarm.track(views=views, picks=picks, diameter_mm=3, bodies={"bone": names}, out=tmp_path / "out", progress=shares.append)
+    assert motion.markers == names and motion.frames == [1, 2, 3, 4] and shares == pytest.approx([0.25, 0.5, 0.75, 1])
+    assert motion.places == pytest.approx(np.array(moved), abs=0.1)
+    assert motion.smoothed["bone"][-1, :3, 3] == pytest.approx([1.5, 0, 0.75], abs=0.1)
+    assert (tmp_path / "out/markers.csv").exists() and (tmp_path / "out/bone.tra").exists()
+    refused("too_few_views", "two views", helicarm.track, views={"A": views["A"]}, picks=picks, diameter_mm=3)
+    refused("bad_size", "numbers of images differ", helicarm.track, views={"A": views["A"], "B": (views["B"][0][:2], views["B"][1])},
+            picks=picks, diameter_mm=3)
+    refused("bad_value", '"x" has no pick', helicarm.track, views=views, picks=picks, diameter_mm=3, bodies={"bone": ["x"]})
+    refused("bad_value", "diameter_mm", helicarm.track, views=views, picks=picks, diameter_mm=300)
