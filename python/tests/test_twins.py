@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every command of the program has its Python twin, or a reason why it has none."""
+import json
+import os
+import re
+import subprocess
+
+import numpy as np
+import pytest
+
+import helicarm
+
+PROGRAM = os.environ.get("HELICARM_PROGRAM")
+pytestmark = pytest.mark.skipif(not PROGRAM, reason="HELICARM_PROGRAM does not name the program")
+
+TWINS = {
+    "new": ["new_case"],
+    "run": ["run_case"],
+    "predict": ["Calibration.predict", "Calibration.tre_map"],
+    "measure": ["measure"],
+    "bundle": ["bundle"],
+    "schema": ["schema"],
+    "demo": ["simulate_case", "run_case"],
+    "solve": ["solve"],
+    "locate": ["Calibration.load", "Calibration.locate", "Calibration.locate_all"],
+    "rectify": ["rectify", "DistortionMap.rectify_image", "DistortionMap.rectified_from_raw", "DistortionMap.raw_from_rectified"],
+    "detect": ["detect"],
+    "import": ["import_camera", "import_transform"],
+    "export": ["Result.export"],
+    "sweep": ["sweep"],
+    "c-arm": ["check_c_arm", "c_arm_report", "run_case"],
+    "phantom": ["Calibrator", "measure_phantom", "verify_phantom"],
+    "register": ["register", "register_sequence"],
+    "track": ["track"],
+    "migration": ["migration"],
+    "replay": ["Session.replay"],
+    "simulate": ["simulate_case"],
+    "drr": ["drr", "Camera.orbit"],
+}
+WITHOUT = {
+    "pick": "picks by hand in the desktop application or by a table; Calibration.locate takes pixels",
+    "receive": "a service that runs beside the program which uses its images",
+    "tracker": "a service, and a calibration at the device; its files are CSV",
+    "robot": "watches a device",
+    "virtual-or": "a service: virtual devices on the protocols of the real ones",
+    "navigate": "a person confirms each order at the program; Session reads and replays its record",
+    "operate": "an operation with virtual devices; Session reads and replays its record",
+    "study": "runs on MPI ranks; its files are CSV and JSON",
+}
+
+
+def program(*arguments):
+    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def commands():
+    listed = program("--help").split("Options:")[1]
+    return re.findall(r"^  ([a-z][a-z-]*)  +[A-Z]", listed, re.MULTILINE)
+
+
+def test_every_command_has_a_twin_or_a_reason():
+    assert sorted(commands()) == sorted([*TWINS, *WITHOUT])
+
+
+@pytest.mark.parametrize("name", sorted({name for names in TWINS.values() for name in names}))
+def test_a_twin_is_there_and_says_what_it_does(name):
+    twin = helicarm
+    for part in name.split("."):
+        twin = getattr(twin, part)
+    assert callable(twin) and twin.__doc__
+
+
+def csv(path, rows, header):
+    path.write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("method", ["ml", "dlt", "homogeneous"])
+@pytest.mark.parametrize("sigma", [None, 0.3])
+def test_solve_gives_the_same_numbers(pair, tmp_path, method, sigma):
+    uv = pair.pixels("AP", pair.xyz) + np.random.default_rng(4).normal(0, 0.2, (len(pair.xyz), 2))
+    more = "" if sigma is None else ",sigma_px"
+    rows = [(f"P{i}", *map(repr, map(float, (*xyz, *at))), *([] if sigma is None else [sigma])) for i, (xyz, at) in enumerate(zip(pair.xyz, uv))]
+    file = csv(tmp_path / "p.csv", rows, "label,x_mm,y_mm,z_mm,u_px,v_px" + more)
+    answer = json.loads(program("solve", "--points", file, "--method", method, "--json"))
+    found = helicarm.solve(pair.xyz, uv, sigma_px=sigma, method=method)
+    assert found["camera"].projection == pytest.approx(np.array(answer["projection"]), rel=1e-9, abs=1e-9)
+    assert found["dlt"] == pytest.approx(answer["dlt"], rel=1e-8)
+    assert found["condition"] == pytest.approx(answer["condition"], rel=1e-6)
+    assert found["reprojection_rms_px"] == pytest.approx(answer["reprojection_rms_px"], rel=1e-6)
+    if method == "ml":
+        assert found["covariance"] == pytest.approx(np.array(answer["covariance"]), rel=1e-6, abs=1e-12)
+
+
+def test_drr_gives_the_same_pixels(tmp_path):
+    voxels = np.random.default_rng(2).integers(-1000, 2000, (9, 8, 7)).astype("<i2")
+    (tmp_path / "a.mha").write_bytes(b"NDims = 3\nDimSize = 9 8 7\nElementSpacing = 2 2 3\nElementType = MET_SHORT\n"
+                                     b"ElementDataFile = LOCAL\n" + voxels.tobytes("F"))
+    program("drr", tmp_path / "a.mha", "--raw", tmp_path / "a.f32", "--size", 40, "--pixel", 1, "--angle", 30, "--tilt", 10)
+    volume = helicarm.read_volume(tmp_path / "a.mha")
+    camera = helicarm.Camera.orbit(volume.centre_mm, angle_deg=30, tilt_deg=10, size=40, pixel_mm=1)
+    assert np.array_equal(helicarm.drr(volume, camera).ravel(), np.fromfile(tmp_path / "a.f32", "<f4"))
+
+
+def test_import_gives_the_same_camera(tmp_path):
+    camera = helicarm.Camera.orbit([1, 2, 3], angle_deg=20)
+    (tmp_path / "m.json").write_text(json.dumps(camera.projection.tolist()))
+    answer = json.loads(program("import", tmp_path / "m.json", "--json"))
+    found = helicarm.import_camera(tmp_path / "m.json")
+    for key, value in (("K", found.K), ("R", found.R), ("t", found.t), ("projection", found.projection)):
+        assert np.array_equal(value, answer[key])
+    assert found.warnings == answer["warnings"]
+
+
+def test_import_gives_the_same_transform(tmp_path):
+    (tmp_path / "t.tfm").write_text("#Insight Transform File V1.0\n#Transform 0\nTransform: Euler3DTransform_double_3_3\n"
+                                    "Parameters: 0.1 0.2 0.3 4 5 6\nFixedParameters: 7 8 9 0\n")
+    answer = json.loads(program("import", tmp_path / "t.tfm", "--json"))
+    found = helicarm.import_transform(tmp_path / "t.tfm")
+    assert {key: value.tolist() for key, value in found.items()} == answer
+    (tmp_path / "t.tfm").write_text("nothing")
+    with pytest.raises(helicarm.InputError, match="import_camera reads cameras"):
+        helicarm.import_transform(tmp_path / "t.tfm")
+
+
+def test_export_writes_the_same_files(case, result, tmp_path):
+    program("export", case[0], "--out", tmp_path / "program", "--as", "csv,opencv,npy", "--quiet")
+    written = result.export(tmp_path / "python", ["csv", "opencv", "npy"])
+    assert sorted(written) == sorted(str(tmp_path / "python" / file.name) for file in (tmp_path / "program").iterdir())
+    for file in (tmp_path / "program").iterdir():
+        assert file.read_bytes() == (tmp_path / "python" / file.name).read_bytes()
+    with pytest.raises(helicarm.InputError, match="word.*csv"):
+        result.export(tmp_path / "python", ["word"])
+
+
+@pytest.mark.parametrize("name", ["calibrator", "case", "machine", "plan", "plate", "session"])
+def test_schemas_are_the_same(name):
+    assert helicarm.schema(name) == json.loads(program("schema", name))
+
+
+def test_a_schema_of_another_file_is_refused():
+    with pytest.raises(helicarm.InputError, match="none of: calibrator, case"):
+        helicarm.schema("result")
+
+
+def test_a_new_case_is_the_same(case, tmp_path):
+    images = [f"{name}={case[0] / name}.dcm" for name in ("AP", "LAT")]
+    program("new", *images, "--calibrator", "udcsc", "--plate", "plate48", "--out", tmp_path / "program", "--quiet")
+    made = helicarm.new_case(images, tmp_path / "python", calibrator="udcsc", plate="plate48")
+    assert made["case"] == str(tmp_path / "python/case.json")
+    assert (tmp_path / "program/case.json").read_text() == (tmp_path / "python/case.json").read_text()
+    with pytest.raises(helicarm.InputError, match="calibrator"):
+        helicarm.new_case(images, tmp_path / "other", calibrator="")
+
+
+def test_a_bundle_is_the_same(case, tmp_path):
+    program("bundle", case[0], "--out", tmp_path / "program.tar.gz", "--no-run", "--quiet")
+    made = helicarm.bundle(case[0], out=tmp_path / "python.tar.gz", run=False)
+    assert "case.json" in made["files"]
+    assert (tmp_path / "program.tar.gz").read_bytes() == (tmp_path / "python.tar.gz").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """An operation with virtual devices."""
+    folder = tmp_path_factory.mktemp("operate")
+    subprocess.run([PROGRAM, "operate", "--cases", "1", "--size", "512", "--out", folder, "--quiet"], capture_output=True, check=True)
+    return next(path.parent for path in folder.rglob("session.log"))
+
+
+def test_a_session_is_listed_and_replayed(session):
+    record = helicarm.Session(session)
+    assert record.records[0].kind == "session" and not record.torn and len(record) == sum(record.kinds.values())
+    assert [each.number for each in record.records] == list(range(len(record)))
+    assert all(result["format"] == "helicarm-result/1" for result in record.results) and record.results
+    assert len(record.of_kind("exposure")) == record.kinds["exposure"]
+    shares = []
+    report = record.replay(progress=shares.append)
+    assert report["complete"] and report["records"] == len(record) and shares == sorted(shares) and len(shares) > 1
+    answer = json.loads(program("replay", session, "--json"))
+    assert {key: report[key] for key in answer} == answer
+
+
+def test_a_changed_or_cut_session_is_refused(session, tmp_path):
+    lines = (session / "session.log").read_bytes().split(b"\n")
+    (tmp_path / "session.log").write_bytes(b"\n".join(lines[:5]) + b"\n")
+    with pytest.raises(helicarm.RefusedError, match="no end|differ") as error:
+        helicarm.Session(tmp_path).replay()
+    assert error.value.code == "replay_differs" and not error.value.result["complete"]
+    (tmp_path / "session.log").write_bytes(b"\n".join([lines[0], *lines[2:]]))
+    with pytest.raises(helicarm.InputError):
+        helicarm.Session(tmp_path)
+    with pytest.raises(helicarm.InputError) as error:
+        helicarm.Session(tmp_path / "nowhere")
+    assert error.value.code == "missing_file"
+
+
+def test_a_replay_ends_where_progress_raises(session):
+    def stop(share):
+        raise KeyboardInterrupt
+    with pytest.raises(KeyboardInterrupt):
+        helicarm.Session(session).replay(progress=stop)
