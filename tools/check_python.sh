@@ -11,17 +11,20 @@ trap 'rm -rf "$folder"' EXIT
 /usr/bin/python3 -m venv --system-site-packages "$folder/venv"
 HELICARM_BUILD_FOLDER=$PWD/build "$folder/venv/bin/pip" install -q --no-build-isolation --no-deps .
 rm -rf build/lib build/bdist.*
-cp -r python/tests examples/first_steps.ipynb "$folder"
+cp -r python/tests examples/*.ipynb "$folder"
 cd "$folder"
 export MPLBACKEND=Agg
 venv/bin/python -c 'import helicarm; assert "venv" in helicarm.__file__, helicarm.__file__'
 venv/bin/python -m pytest -q -p no:cacheprovider tests
 venv/bin/python -m ipykernel install --prefix "$folder/venv" --name python3 >/dev/null
-JUPYTER_PATH=$folder/venv/share/jupyter venv/bin/python -m nbconvert --to notebook --execute --output ran.ipynb first_steps.ipynb
-venv/bin/python - <<END
-import json
+for notebook in first_steps arrays; do
+  JUPYTER_PATH=$folder/venv/share/jupyter venv/bin/python -m nbconvert --to notebook --execute --output ran.ipynb "$notebook.ipynb"
+  venv/bin/python - "$notebook" <<END
+import json, sys
 cells = json.load(open("ran.ipynb"))["cells"]
 pictures = sum("image/png" in o.get("data", {}) for c in cells for o in c.get("outputs", []))
-assert pictures >= 3, f"{pictures} pictures"
-print(f"notebook: {pictures} pictures")
+least = {"first_steps": 3, "arrays": 1}[sys.argv[1]]
+assert pictures >= least, f"{pictures} pictures"
+print(f"{sys.argv[1]}: {pictures} pictures")
 END
+done
