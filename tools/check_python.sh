@@ -15,7 +15,7 @@ cp -r python/tests examples/*.ipynb "$folder"
 cd "$folder"
 export MPLBACKEND=Agg
 venv/bin/python -c 'import helicarm; assert "venv" in helicarm.__file__, helicarm.__file__'
-venv/bin/python -m pytest -q -p no:cacheprovider tests
+venv/bin/python -m pytest -q -rs -p no:cacheprovider tests
 venv/bin/python -m ipykernel install --prefix "$folder/venv" --name python3 >/dev/null
 for notebook in first_steps arrays; do
   JUPYTER_PATH=$folder/venv/share/jupyter venv/bin/python -m nbconvert --to notebook --execute --output ran.ipynb "$notebook.ipynb"
