@@ -226,20 +226,16 @@ class WindowStates : public Window, public testing::WithParamInterface<InputChan
   /// As `helicarm run` measures the folder, with the present picks and the tunnels of which both ends are
   /// picked.
   void expect_as_measured_afresh() {
-    pipeline::RegistrationCase given;
-    if (GetParam().has_model)
-      given = pipeline::read_registration_case(folder_ / "case").value();
-    else
-      given.base = pipeline::read_case(folder_ / "case").value();
-    given.base.picks = state().picks;
+    pipeline::Case given = pipeline::read_case(folder_ / "case").value();
+    given.picks = state().picks;
     const auto lacks = [&](const std::string& end) {
-      return std::ranges::find(given.base.picks, end, &pipeline::Pick::name) == given.base.picks.end();
+      return std::ranges::find(given.picks, end, &pipeline::Pick::name) == given.picks.end();
     };
-    for (std::size_t i = given.base.tunnels.size(); i-- > 0;) {
-      const pipeline::TunnelPlan tunnel = given.base.tunnels[i];
+    for (std::size_t i = given.tunnels.size(); i-- > 0;) {
+      const pipeline::TunnelPlan tunnel = given.tunnels[i];
       if (!lacks(tunnel.start) && !lacks(tunnel.end)) continue;
-      given.base.tunnels.erase(given.base.tunnels.begin() + std::ptrdiff_t(i));
-      std::erase_if(given.base.tool_lines, [&](const auto& line) { return line.tunnel == tunnel.name; });
+      given.tunnels.erase(given.tunnels.begin() + std::ptrdiff_t(i));
+      std::erase_if(given.tool_lines, [&](const auto& line) { return line.tunnel == tunnel.name; });
     }
     const auto measured = case_registration::measure_case(given, options_);
     ASSERT_TRUE(measured) << measured.error().message;

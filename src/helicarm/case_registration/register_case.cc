@@ -229,7 +229,7 @@ Expected<CaseRegistration> register_given(std::vector<GivenModel> models, Loaded
     CaseRegistration result;
     result.loaded = std::move(loaded);
     result.warnings = result.loaded.warnings;
-    const pipeline::RegistrationCase none;
+    const pipeline::Case none;
     const Registrar registrar(none, options, progress, result.loaded);
     for (GivenModel& model : models) result.models.push_back(registrar.registered(std::move(model)));
     return result;
