@@ -38,9 +38,15 @@ void flood(ByteGrid& bone, std::vector<std::uint32_t> front, std::span<const int
   }
 }
 
-/// Marks what is reached from the edges of the grid's faces within the faces, and from there everywhere.
+/// Marks what is reached from `outside`; if that is nothing, from the edges of the grid's faces within the
+/// faces, and from there everywhere.
 template <class Passable>
-void flood_from_outside(ByteGrid& bone, const Passable& passable, const pipeline::Progress& progress) {
+void flood_from_outside(ByteGrid& bone, const std::vector<std::uint32_t>& outside, const Passable& passable,
+                        const pipeline::Progress& progress) {
+  std::vector<std::uint32_t> front;
+  for (const std::uint32_t i : outside)
+    if (passable(i)) bone.values[i] = reached, front.push_back(i);
+  if (!front.empty()) return flood(bone, std::move(front), std::array{0, 1, 2}, passable, nullptr, progress);
   std::vector<std::uint32_t> on_faces;
   for (int axis = 0; axis < 3; ++axis) {
     const int p = (axis + 1) % 3, q = (axis + 2) % 3;
@@ -65,11 +71,12 @@ void flood_from_outside(ByteGrid& bone, const Passable& passable, const pipeline
 
 /// Cavities that are wider than their wall's gaps.
 void fill_behind_gaps(ByteGrid& bone, const ChamferSteps& steps, double gap_mm,
-                      const pipeline::Progress& progress) {
+                      const std::vector<std::uint32_t>& outside, const pipeline::Progress& progress) {
   const auto gap = static_cast<std::uint16_t>(std::min(double(farthest) - 1, gap_mm / steps.unit_mm));
   auto distances = distances_to(bone, steps, progress, [](std::uint8_t value) { return value == dense; });
   flood_from_outside(
-      bone, [&](std::uint32_t i) { return bone.values[i] == empty && distances[i] > gap; }, progress);
+      bone, outside, [&](std::uint32_t i) { return bone.values[i] == empty && distances[i] > gap; },
+      progress);
   for (std::size_t i = 0; i < distances.size(); ++i)
     bone.values[i] = bone.values[i] == reached                       ? empty
                      : bone.values[i] == empty && distances[i] > gap ? cavity
@@ -84,10 +91,10 @@ void fill_behind_gaps(ByteGrid& bone, const ChamferSteps& steps, double gap_mm,
 }  // namespace
 
 void fill_cavities(ByteGrid& bone, const ChamferSteps& steps, double gap_mm,
-                   const pipeline::Progress& progress) {
-  if (gap_mm > 0) fill_behind_gaps(bone, steps, gap_mm, progress);
+                   const std::vector<std::uint32_t>& outside, const pipeline::Progress& progress) {
+  if (gap_mm > 0) fill_behind_gaps(bone, steps, gap_mm, outside, progress);
   flood_from_outside(
-      bone, [&](std::uint32_t i) { return bone.values[i] == empty; }, progress);
+      bone, outside, [&](std::uint32_t i) { return bone.values[i] == empty; }, progress);
   for (std::uint8_t& value : bone.values) value = value == reached ? empty : value == empty ? cavity : value;
 }
 

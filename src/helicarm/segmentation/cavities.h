@@ -9,9 +9,10 @@ namespace helicarm::segmentation {
 inline constexpr std::uint8_t empty = 0, dense = 1, cavity = 2;
 
 /// Marks as `cavity` what dense voxels enclose, such as marrow. Gaps of the wall up to twice `gap_mm` wide
-/// count as closed for a cavity that is wider than that. On the grid's faces, where a bone may be cut off, a
-/// cavity is what the face's own edges do not reach.
+/// count as closed for a cavity that is wider than that. `outside`: voxels that are known to be outside; a
+/// cavity is what they do not reach. Without any, a cavity on the grid's faces, where a bone may be cut off,
+/// is what the face's own edges do not reach.
 void fill_cavities(volume::ByteGrid& bone, const ChamferSteps& steps, double gap_mm,
-                   const pipeline::Progress& progress);
+                   const std::vector<std::uint32_t>& outside, const pipeline::Progress& progress);
 
 }  // namespace helicarm::segmentation

@@ -19,8 +19,8 @@ volume::ByteGrid box(const Open& open) {
   return grid;
 }
 
-std::size_t filled(volume::ByteGrid grid, double gap_mm) {
-  fill_cavities(grid, ChamferSteps(Eigen::Matrix3d::Identity()), gap_mm, {});
+std::size_t filled(volume::ByteGrid grid, double gap_mm, const std::vector<std::uint32_t>& outside = {}) {
+  fill_cavities(grid, ChamferSteps(Eigen::Matrix3d::Identity()), gap_mm, outside, {});
   std::size_t count = 0;
   for (const std::uint8_t value : grid.values) count += value == cavity;
   return count;
@@ -49,6 +49,19 @@ TEST(FillCavities, ReachTheFaceThatCutsThemOff) {
     if (std::max(std::abs(at.x() - 7), std::abs(at.y() - 7)) == 4) tube.values[tube.index(at)] = dense;
   });
   EXPECT_EQ(filled(tube, 1), 490U);
+}
+
+TEST(FillCavities, AnOpenSideAtAFaceIsClosedWhereTheOutsideIsKnown) {
+  volume::ByteGrid trough = volume::byte_grid({15, 15, 10});
+  trough.each([&](const Vector3i& at) {
+    if (at.x() >= 6 && std::max(std::abs(at.x() - 10), std::abs(at.y() - 7)) == 4)
+      trough.values[trough.index(at)] = dense;
+  });
+  trough.each([&](const Vector3i& at) {
+    if (at.x() == 14 && std::abs(at.y() - 7) < 4) trough.values[trough.index(at)] = empty;
+  });
+  EXPECT_EQ(filled(trough, 1), 0U);
+  EXPECT_NEAR(double(filled(trough, 1, {0})), 7 * 8 * 10, 5);
 }
 
 }  // namespace

@@ -23,6 +23,7 @@ using volume::ByteGrid;
 // Muscle and blood end at 80 HU, cancellous bone begins at 100 to 150, cortical bone at 500.
 constexpr double least_threshold_hu = 200, most_threshold_hu = 400;
 constexpr double noise_sigmas = 4;
+constexpr float air_hu = -400;
 // Of the voxels of a CT of a limb 1 to 10 % are bone; more than half are another kind of image.
 constexpr double most_bone = 0.5;
 constexpr double fragment_mm = 1.5;
@@ -121,6 +122,28 @@ Work thresholded(const volume::Volume& ct, double threshold, double margin_mm,
         work.bone.values[i++] = double(*row++) >= threshold ? dense : empty;
     }
   return work;
+}
+
+/// Voxels of the grid's faces that are outside every bone: within the volume the margin, on its own faces
+/// air. Marrow of a bone that the volume cuts off is neither.
+std::vector<std::uint32_t> outside_of(const volume::Volume& ct, const Work& work) {
+  std::vector<std::uint32_t> outside;
+  const Vector3i& size = work.bone.size;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int p = (axis + 1) % 3, q = (axis + 2) % 3;
+    for (const int face : {0, size[axis] - 1}) {
+      const int of_volume = work.first[axis] + face;
+      const bool within = of_volume > 0 && of_volume + 1 < ct.size[axis];
+      for (int i = 0; i < size[p]; ++i)
+        for (int j = 0; j < size[q]; ++j) {
+          Vector3i at;
+          at[axis] = face, at[p] = i, at[q] = j;
+          if (within || ct.voxels[index_in(ct, at + work.first)] < air_hu)
+            outside.push_back(static_cast<std::uint32_t>(work.bone.index(at)));
+        }
+    }
+  }
+  return outside;
 }
 
 bool on_bone(const Work& work, const Vector3i& voxel) {
@@ -244,12 +267,16 @@ double usual_threshold(const volume::Volume& ct) {
   constexpr std::size_t bins = std::size_t(last / width), most_modes = std::size_t(100 / width);
   constexpr std::size_t most_samples = 2'000'000;
   std::array<double, bins> counts{};
-  double total = 0, soft = 0;
-  for (std::size_t i = 0; i < ct.voxels.size(); i += 1 + ct.voxels.size() / most_samples, ++total)
-    if (const double bin = double(ct.voxels[i]) / width; bin >= 0 && bin < double(bins))
-      ++counts[std::size_t(bin)], soft += bin < double(most_modes);
-  constexpr double least_soft = 0.01;  // of the samples: else a CT without its surroundings
-  if (soft < least_soft * total) return least_threshold_hu;
+  constexpr double air = -500;
+  double matter = 0, soft = 0;
+  for (std::size_t i = 0; i < ct.voxels.size(); i += 1 + ct.voxels.size() / most_samples) {
+    const double hu = double(ct.voxels[i]), bin = hu / width;
+    matter += hu > air;
+    if (bin >= 0 && bin < double(bins)) ++counts[std::size_t(bin)], soft += bin < double(most_modes);
+  }
+  // Of what is no air: 3 to 6 % where all but a bone was removed, whose marrow says nothing of the noise.
+  constexpr double least_soft = 0.15;
+  if (soft < least_soft * matter) return least_threshold_hu;
   const auto mode =
       std::size_t(std::max_element(counts.begin(), counts.begin() + most_modes) - counts.begin());
   std::size_t end = mode;
@@ -268,7 +295,7 @@ Expected<Segmentation> segment(const volume::Volume& ct, std::span<const Seed> s
     Work work = thresholded(ct, threshold, options.gap_mm, progress);
     progress.begin("fill");
     const ChamferSteps steps(ct.patient_from_voxel.linear());
-    fill_cavities(work.bone, steps, options.gap_mm, progress);
+    fill_cavities(work.bone, steps, options.gap_mm, outside_of(ct, work), progress);
     for (const Seed& seed : seeds) check_on_bone(ct, work, seed, threshold);
     progress.begin("distance");
     const auto depths =
