@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "import_command.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "command_line.h"
@@ -18,6 +20,7 @@ namespace {
 Json json_of(const exchange::ImportedMatrix& imported) {
   const geometry::View& view = imported.view;
   Json json;
+  if (!imported.name.empty()) json["name"] = imported.name;
   json["K"] = geometry::json_rows(view.intrinsics.matrix());
   json["R"] = geometry::json_rows(view.camera_from_world.rotation);
   json["t"] = geometry::json_list(view.camera_from_world.translation);
@@ -69,6 +72,44 @@ void print_matrix(const geometry::RigidTransform& transform, Console& console) {
               << back.format(rows) << '\n';
 }
 
+/// One camera, or the list of several.
+void print_cameras(const std::vector<exchange::ImportedMatrix>& cameras, Console& console) {
+  if (!console.json)
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      if (cameras.size() > 1)
+        console.out << fmt::format("{}camera {}{}{}\n", i == 0 ? "" : "\n", i + 1,
+                                   cameras[i].name.empty() ? "" : ": ", cameras[i].name);
+      print_table(cameras[i], console.out);
+    }
+  else if (cameras.size() == 1)
+    console.out << to_text(json_of(cameras.front())) << '\n';
+  else {
+    Json list = Json::array();
+    for (const auto& camera : cameras) list.push_back(json_of(camera));
+    console.out << to_text(Json{{"cameras", std::move(list)}}) << '\n';
+  }
+}
+
+/// Of all cameras, each once.
+std::vector<Warning> warnings_of(const std::vector<exchange::ImportedMatrix>& cameras) {
+  std::vector<Warning> warnings;
+  for (std::size_t i = 0; i < cameras.size(); ++i)
+    for (Warning warning : cameras[i].warnings) {
+      const auto same = [&](const Warning& other) { return other.reason == warning.reason; };
+      if (std::ranges::any_of(warnings, same)) continue;
+      if (cameras.size() > 1) warning.message = fmt::format("camera {}: {}", i + 1, warning.message);
+      warnings.push_back(std::move(warning));
+    }
+  return warnings;
+}
+
+Expected<std::optional<exchange::RowKind>> row_kind(const std::optional<std::string>& word) {
+  if (!word) return std::nullopt;
+  if (*word == "matrix") return exchange::RowKind::matrix;
+  if (*word == "astra") return exchange::RowKind::astra;
+  return fail(Reason::usage, fmt::format("--rows: \"{}\" is none of: matrix, astra", *word));
+}
+
 Expected<std::optional<double>> mm_per_unit(const std::optional<std::string>& unit) {
   if (!unit) return std::nullopt;
   for (const auto& [word, mm] : {std::pair{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}})
@@ -81,13 +122,19 @@ Expected<std::optional<double>> mm_per_unit(const std::optional<std::string>& un
 CommandResult import_command(const ImportArguments& arguments, Console& console) {
   const auto mm = mm_per_unit(arguments.unit);
   if (!mm) return tl::unexpected<Failure>(mm.error());
-  exchange::ImportOptions options{
-      .mm_per_unit = *mm, .column = arguments.column, .undistorted = arguments.undistorted};
+  const auto rows = row_kind(arguments.rows);
+  if (!rows) return tl::unexpected<Failure>(rows.error());
+  exchange::ImportOptions options{.mm_per_unit = *mm,
+                                  .column = arguments.column,
+                                  .undistorted = arguments.undistorted,
+                                  .rows = *rows,
+                                  .rows_upwards = arguments.rows_upwards};
   if (!arguments.image_size.empty()) options.image_size = {arguments.image_size[0], arguments.image_size[1]};
   if (!arguments.pixel_mm.empty()) options.pixel_mm = {arguments.pixel_mm[0], arguments.pixel_mm[1]};
   if (!arguments.origin_mm.empty()) options.origin_mm = {arguments.origin_mm[0], arguments.origin_mm[1]};
   for (const auto& [read, print] : {std::pair{&exchange::read_itk_transform, &print_transform},
                                     {&exchange::read_matrix_transform, &print_matrix}}) {
+    if (std::filesystem::is_directory(arguments.file)) break;
     auto transform = read(arguments.file);
     if (!transform) return tl::unexpected<Failure>(transform.error());
     if (!*transform) continue;
@@ -95,42 +142,42 @@ CommandResult import_command(const ImportArguments& arguments, Console& console)
     print(**transform, console);
     return {};
   }
-  const auto imported = exchange::import_matrix(arguments.file, options);
-  if (!imported) return tl::unexpected<Failure>(imported.error());
-  print_warnings(imported->warnings, console);
-  if (console.json)
-    console.out << to_text(json_of(*imported)) << '\n';
-  else
-    print_table(*imported, console.out);
+  const auto cameras = exchange::import_cameras(arguments.file, options);
+  if (!cameras) return tl::unexpected<Failure>(cameras.error());
+  print_warnings(warnings_of(*cameras), console);
+  print_cameras(*cameras, console);
   return {};
 }
 
 void add_import(CLI::App& app, Action& action) {
   auto* command = add_command(
       app, group::images, "import",
-      "Read a projection or transform of another program: MayaCam, DLT, NRRD, OpenCV, RTK, ITK",
+      "Read cameras or a transform of another program: MayaCam, OpenCV, RTK, TIGRE, ASTRA, LEAP, ITK, ...",
       "helicarm import camera.txt --unit cm --json\n"
       "  helicarm import MergedDlts.csv --column 2 --image-size 1760,1700 --json\n"
-      "  helicarm import geometry.xml --column 1 --pixel-mm 0.388,0.388 --image-size 1024,768 --json\n"
+      "  helicarm import geometry.xml --pixel-mm 0.388,0.388 --image-size 1024,768 --json\n"
+      "  helicarm import my-geometry/geometry/astra.txt --image-size 976,976 --json\n"
       "  helicarm import femur.tfm --json");
   auto& a = arguments_of(command, action, import_command);
   command
       ->add_option(
           "FILE", a.file,
-          "MayaCam 1 or 2, NRRD header, OpenCV (YAML, XML, JSON), RTK (XML), a 3x4 matrix as text or JSON, "
-          "XMALab's DLT coefficients, an ITK transform (.tfm, .h5), or a rigid 4x4 matrix")
+          "MayaCam 1 or 2, NRRD header, OpenCV (YAML, XML, JSON), a 3x4 matrix as text or JSON, XMALab's DLT "
+          "coefficients, plastimatch's projection matrix; of a whole run RTK (XML), TIGRE, LEAP, DiffDRR, "
+          "DeepDRR (JSON), ASTRA's vectors, .ompl, matrices.csv, .npy, or a folder with a file for each "
+          "camera; an ITK transform (.tfm, .h5), or a rigid 4x4 matrix")
       ->required();
   command
       ->add_option("--unit", a.unit,
                    "Unit of length in the file: mm, cm or m; needed where mm would be implausible")
       ->type_name("WORD");
   command
-      ->add_option("--column", a.column,
-                   "Camera of DLT coefficients, projection of RTK, image of OpenCV; from 1")
-      ->check(within(1, 100));
+      ->add_option("--column", a.column, "This camera of a file of several, from 1 (default: all, as a list)")
+      ->check(within(1, 10000));
   command
       ->add_option("--image-size", a.image_size,
-                   "Width,height in px; DLT coefficients count rows upwards from 1, RTK's mm from the centre")
+                   "Width,height in px, where the file does not state them; needed for DLT coefficients, "
+                   "ASTRA, RTK")
       ->delimiter(',')
       ->expected(2)
       ->check(within(1, 16384));
@@ -144,6 +191,13 @@ void add_import(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->expected(2)
       ->check(within(-1e5, 1e5));
+  command
+      ->add_option("--rows", a.rows,
+                   "What rows of 12 numbers without a word on them are: matrix (3x4, row by row) or astra "
+                   "(cone_vec)")
+      ->type_name("WORD");
+  command->add_flag("--rows-upwards", a.rows_upwards,
+                    "The file's images have their last row first (RTK): row = height - 1 - v");
   command->add_flag("--undistorted", a.undistorted,
                     "The images are undistorted already: a lens distortion in the file is left out");
 }

@@ -63,5 +63,27 @@ TEST(ImportCommand, RigidMatrixIsPrintedWithItsInverse) {
   EXPECT_EQ(json["inverse"][0][3], -2000.0);
 }
 
+/// The list is read again.
+TEST(ImportCommand, RunIsPrintedAsAListOfCameras) {
+  const fs::path path = fs::temp_directory_path() / fmt::format("helicarm_import_command_{}.csv", ::getpid());
+  ASSERT_TRUE(write_file(path,
+                         "view,p11,p12,p13,p14,p21,p22,p23,p24,p31,p32,p33,p34\n"
+                         "RUN/1,6000,0,512,409600,0,6000,500,400000,0,0,1,800\n"
+                         "RUN/2,6000,0,512,409600,0,6000,500,400000,0,0,1,810\n"));
+  std::ostringstream out, again, progress;
+  Console console{out, progress}, second{again, progress};
+  console.json = second.json = true;
+  const auto imported = import_command({path}, console);
+  ASSERT_TRUE(write_file(path, out.str()));
+  const auto list = import_command({path}, second);
+  fs::remove(path);
+  ASSERT_TRUE(imported) << imported.error().message;
+  ASSERT_TRUE(list) << list.error().message;
+  const Json json = *parse_json(out.str(), "out");
+  EXPECT_EQ(json["cameras"][1]["name"], "RUN/2");
+  EXPECT_NEAR(json["cameras"][1]["t"][2].get<double>(), 810, 1e-9);
+  EXPECT_EQ(parse_json(again.str(), "again")->at("cameras").size(), 2u);
+}
+
 }  // namespace
 }  // namespace helicarm::cli

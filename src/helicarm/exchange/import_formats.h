@@ -11,6 +11,10 @@
 namespace helicarm::exchange {
 
 inline constexpr int largest_side_px = 16384;
+inline constexpr std::size_t most_cameras = 10000;  // of one file
+inline constexpr double largest_number = 1e12;
+
+using Cameras = std::vector<ImportedMatrix>;
 
 std::string trimmed(std::string_view line);
 std::string without_byte_order_mark(const std::string& text);
@@ -46,17 +50,32 @@ std::vector<FileField> xml_fields(std::string_view text, const std::string& orig
 Json file_storage_json(std::string_view text, const std::string& origin);
 
 bool is_rtk_geometry(std::string_view text);
-ImportedMatrix parse_rtk_geometry(std::string_view text, const std::string& origin,
-                                  const ImportOptions& options);
+Cameras parse_rtk_geometry(std::string_view text, const std::string& origin, const ImportOptions& options);
 bool is_opencv_file(std::string_view text);
-ImportedMatrix parse_opencv_camera(std::string_view text, const std::string& origin,
-                                   const ImportOptions& options);
-/// A camera by OpenCV's keys.
-ImportedMatrix camera_of_keys(const Json& json, const std::string& origin, const ImportOptions& options);
+Cameras parse_opencv_camera(std::string_view text, const std::string& origin, const ImportOptions& options);
+/// A camera by OpenCV's keys; several of its table of poses.
+Cameras camera_of_keys(const Json& json, const std::string& origin, const ImportOptions& options);
 ImportedMatrix parse_maya_cam(const std::string& text, const std::string& origin,
                               const ImportOptions& options);
 /// The five lines of MayaCam 1.
 ImportedMatrix from_maya_cam_1(const std::vector<std::vector<double>>& rows, const std::string& origin,
                                const ImportOptions& options);
+
+/// TIGRE's, LEAP's, DiffDRR's or DeepDRR's geometry of a run as `run_geometry.h` writes it.
+bool is_run_geometry(const Json& json);
+Cameras cameras_of_run(const Json& json, const std::string& origin);
+/// ASTRA's cone_vec, 12 numbers a row. Needs the image size (`usage`).
+Cameras cameras_of_astra(const std::vector<std::vector<double>>& rows, const std::string& origin,
+                         const ImportOptions& options);
+
+/// A table with the heading view,p11,...,p34.
+bool is_matrix_table(std::string_view text);
+Cameras parse_matrix_table(std::string_view text, const std::string& origin);
+/// NumPy's array (3, 4) or (n, 3, 4) of floats.
+bool is_numpy_array(std::string_view bytes);
+Cameras parse_numpy_array(std::string_view bytes, const std::string& origin);
+/// plastimatch's projection matrix file.
+bool is_plastimatch_matrix(std::string_view text);
+ImportedMatrix parse_plastimatch_matrix(std::string_view text, const std::string& origin);
 
 }  // namespace helicarm::exchange

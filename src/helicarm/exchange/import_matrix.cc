@@ -13,12 +13,12 @@
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
 #include "helicarm/exchange/import_formats.h"
+#include "helicarm/exchange/run_geometry.h"
 
 namespace helicarm::exchange {
 namespace {
 
 constexpr std::uintmax_t max_bytes = 256u << 20;  // an NRRD file includes its pixels
-constexpr double largest_number = 1e12;
 
 ImportedMatrix parse_nrrd(const std::string& text, const std::string& origin, const ImportOptions& options) {
   std::istringstream lines(text);
@@ -82,9 +82,36 @@ ImportedMatrix from_4x4(std::vector<double> numbers, const std::string& origin) 
   return camera;
 }
 
-ImportedMatrix parse_json_matrix(const std::string& text, const std::string& origin,
-                                 const ImportOptions& options) {
-  Json json = value_or_throw(parse_json(text, origin));
+Cameras cameras_of_json(Json json, const std::string& origin, const ImportOptions& options);
+
+/// What `helicarm import --json` prints of several cameras.
+Cameras cameras_of_list(const Json& list, const std::string& origin, const ImportOptions& options) {
+  if (!list.is_array() || list.empty() || list.size() > most_cameras)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: cameras: must be a list of 1 to {}", origin, most_cameras));
+  Cameras cameras;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string where = fmt::format("{}: cameras[{}]", origin, i);
+    Json camera = list[i];
+    std::string name;
+    if (camera.is_object() && camera.contains("name")) {
+      name = JsonReader(camera, where).text("name");
+      camera.erase("name");
+    }
+    if (!camera.is_object() || camera.contains("cameras"))
+      throw BadInput(Reason::bad_value, fmt::format("{}: must be an object of one camera", where));
+    for (ImportedMatrix& each : cameras_of_json(std::move(camera), where, options)) {
+      each.name = name;
+      cameras.push_back(std::move(each));
+    }
+  }
+  return cameras;
+}
+
+Cameras cameras_of_json(Json json, const std::string& origin, const ImportOptions& options) {
+  if (is_run_geometry(json)) return cameras_of_run(json, origin);
+  if (json.is_object() && json.size() == 1 && json.contains("cameras"))
+    return cameras_of_list(json["cameras"], origin, options);
   if (json.is_array()) json = Json{{"projection", std::move(json)}};
   if (!json.contains("projection") && holds_camera(json)) return camera_of_keys(json, origin, options);
   if (!json.contains("projection") && json.size() == 1 && json.front().is_array() && json.front().size() == 4)
@@ -101,35 +128,60 @@ ImportedMatrix parse_json_matrix(const std::string& text, const std::string& ori
     result.image_size = image_size_from(reader.numbers("image_size", 2, {1, largest_side_px}), origin);
   reader.raw("image_size");
   reader.finish();
-  return result;
+  return {result};
 }
 
 /// L1 to L11 of one camera (XMALab's MergedDlts).
-ImportedMatrix from_dlt(const std::vector<std::vector<double>>& rows, const std::string& origin,
-                        const ImportOptions& options) {
-  const std::size_t cameras = rows.front().size();
+Cameras from_dlt(const std::vector<std::vector<double>>& rows, const std::string& origin,
+                 const ImportOptions& options) {
+  const std::size_t count = rows.front().size();
   for (const auto& row : rows)
-    if (row.size() != cameras)
+    if (row.size() != count)
       throw BadInput(Reason::bad_size,
                      fmt::format("{}: the rows of DLT coefficients differ in length", origin));
-  if (!options.image_size || (cameras > 1 && !options.column))
+  if (!options.image_size)
+    throw BadInput(Reason::usage,
+                   fmt::format("{}: DLT coefficients of {} camera(s): give the image's size, whose rows they "
+                               "count upwards from 1 (--image-size)",
+                               origin, count));
+  Cameras cameras;
+  for (std::size_t column = 0; column < count; ++column) {
+    if (options.column && std::size_t(*options.column) != column + 1) {
+      cameras.emplace_back();  // not chosen: another camera's coefficients may be empty
+      continue;
+    }
+    Eigen::Matrix<double, 12, 1> l;
+    for (std::size_t i = 0; i < rows.size(); ++i) l[Eigen::Index(i)] = rows[i][column];
+    l[11] = 1;
+    const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> projection =
+        xmalab_from_pixels(options.image_size->y()).inverse() *
+        Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(l.data());
+    cameras.push_back(imported({projection.data(), projection.data() + projection.size()}, origin));
+  }
+  return cameras;
+}
+
+/// Rows of 12 numbers are flattened matrices (.ompl has them in brackets) or ASTRA's vectors.
+Cameras from_rows_of_12(const std::vector<std::vector<double>>& rows, bool in_brackets, bool says_astra,
+                        const std::string& origin, const ImportOptions& options) {
+  const std::optional<RowKind> stated = says_astra    ? std::optional(RowKind::astra)
+                                        : in_brackets ? std::optional(RowKind::matrix)
+                                                      : std::nullopt;
+  if (stated && options.rows && *stated != *options.rows)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: its rows are {}, --rows states otherwise", origin,
+                               says_astra ? "ASTRA's vectors by its comment" : "matrices by their brackets"));
+  const std::optional<RowKind> kind = stated ? stated : options.rows;
+  if (!kind && rows.size() > 1)
     throw BadInput(
         Reason::usage,
-        fmt::format("{}: DLT coefficients of {} camera(s): give the image's size, whose rows they count "
-                    "upwards from 1{}",
-                    origin, cameras, cameras > 1 ? ", and the column" : ""));
-  const int column = options.column.value_or(1);
-  if (column < 1 || std::size_t(column) > cameras)
-    throw BadInput(Reason::bad_value, fmt::format("{}: column {}, must be 1 to {}", origin, column, cameras));
-  Eigen::Matrix<double, 12, 1> l;
-  for (std::size_t i = 0; i < rows.size(); ++i) l[Eigen::Index(i)] = rows[i][std::size_t(column) - 1];
-  l[11] = 1;
-  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> projection =
-      xmalab_from_pixels(options.image_size->y()).inverse() *
-      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(l.data());
-  ImportedMatrix result = imported({projection.data(), projection.data() + projection.size()}, origin);
-  result.image_size = options.image_size;
-  return result;
+        fmt::format("{}: {} rows of 12 numbers, which may be matrices or ASTRA's vectors: state it "
+                    "(--rows matrix or astra)",
+                    origin, rows.size()));
+  if (kind == RowKind::astra) return cameras_of_astra(rows, origin, options);
+  Cameras cameras;
+  for (const auto& row : rows) cameras.push_back(imported(row, origin));
+  return cameras;
 }
 
 /// "3532,97 0;" separates by blanks or semicolons and writes the decimal point as a comma.
@@ -141,12 +193,13 @@ bool has_decimal_commas(std::string_view text) {
   return other_separators && text.find(',') != text.npos;
 }
 
-ImportedMatrix parse_text_matrix(const std::string& text, const std::string& origin,
-                                 const ImportOptions& options) {
-  constexpr std::size_t dlt_rows = 11, most_rows = 12;
+Cameras parse_text_matrix(const std::string& text, const std::string& origin, const ImportOptions& options) {
+  constexpr std::size_t dlt_rows = 11;
   std::istringstream lines(text);
   std::vector<std::vector<double>> rows;
-  for (std::string line; rows.size() <= most_rows && std::getline(lines, line);) {
+  bool says_astra = false;
+  for (std::string line; rows.size() <= most_cameras && std::getline(lines, line);) {
+    says_astra = says_astra || (line.starts_with('#') && line.find("cone_vec") != line.npos);
     if (line.starts_with('#')) continue;
     if (has_decimal_commas(trimmed(line)))
       throw BadInput(Reason::bad_value,
@@ -157,30 +210,39 @@ ImportedMatrix parse_text_matrix(const std::string& text, const std::string& ori
   const auto all_have = [&](std::size_t count) {
     return std::ranges::all_of(rows, [&](const auto& row) { return row.size() == count; });
   };
+  if (rows.size() > most_cameras)
+    throw BadInput(Reason::bad_size, fmt::format("{}: more than {} rows", origin, most_cameras));
+  const bool in_brackets = text.find('[') != text.npos;
+  const bool may_be_dlt = rows.size() == dlt_rows && !options.rows && !in_brackets && !says_astra;
+  if (!rows.empty() && all_have(12) && !may_be_dlt)
+    return from_rows_of_12(rows, in_brackets, says_astra, origin, options);
   if (rows.size() == dlt_rows) return from_dlt(rows, origin, options);
-  if (rows.size() == 5 && all_have(3)) return from_maya_cam_1(rows, origin, options);
+  if (rows.size() == 5 && all_have(3)) return {from_maya_cam_1(rows, origin, options)};
   std::vector<double> numbers;
   for (const auto& row : rows) {
-    if (row.size() != 4 && row.size() != 12)
+    if (row.size() != 4)
       throw BadInput(Reason::bad_size,
                      fmt::format("{}: a row of {} numbers, a 3x4 matrix has rows of 4", origin, row.size()));
     numbers.insert(numbers.end(), row.begin(), row.end());
   }
-  return rows.size() == 4 && all_have(4) ? from_4x4(std::move(numbers), origin) : imported(numbers, origin);
+  return {rows.size() == 4 ? from_4x4(std::move(numbers), origin) : imported(numbers, origin)};
 }
 
-ImportedMatrix parse(const std::string& text, const std::string& origin, const ImportOptions& options) {
+Cameras parse(const std::string& text, const std::string& origin, const ImportOptions& options) {
   const auto first = text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) throw BadInput(Reason::truncated, fmt::format("{}: is empty", origin));
-  if (text.starts_with("NRRD")) return parse_nrrd(text, origin, options);
+  if (text.starts_with("NRRD")) return {parse_nrrd(text, origin, options)};
+  if (is_numpy_array(text)) return parse_numpy_array(text, origin);
   refuse_other_formats(text, origin);
   const std::string_view content = std::string_view(text).substr(first);
   const auto second = content.find_first_not_of(" \t\r\n", 1);
   if (content[0] == '{' || (content[0] == '[' && second != content.npos && content[second] == '['))
-    return parse_json_matrix(text, origin, options);
+    return cameras_of_json(value_or_throw(parse_json(text, origin)), origin, options);
   if (is_rtk_geometry(text)) return parse_rtk_geometry(text, origin, options);
   if (is_opencv_file(text)) return parse_opencv_camera(text, origin, options);
-  if (text.find("camera matrix") != std::string::npos) return parse_maya_cam(text, origin, options);
+  if (text.find("camera matrix") != std::string::npos) return {parse_maya_cam(text, origin, options)};
+  if (is_plastimatch_matrix(text)) return {parse_plastimatch_matrix(text, origin)};
+  if (is_matrix_table(text)) return parse_matrix_table(text, origin);
   return parse_text_matrix(text, origin, options);
 }
 
@@ -222,6 +284,63 @@ void add_warnings(ImportedMatrix& camera, const std::string& origin) {
          {{"u0_px", k.u0}, {"v0_px", k.v0}}});
 }
 
+/// The size, the rows' direction, mm and the warnings.
+void complete(ImportedMatrix& camera, const ImportOptions& options, const std::string& origin) {
+  const auto &given = options.image_size, &stated = camera.image_size;
+  if (given && stated && *given != *stated)
+    throw BadInput(Reason::bad_size, fmt::format("{}: is for images of {} x {}, --image-size states {} x {}",
+                                                 origin, stated->x(), stated->y(), given->x(), given->y()));
+  if (given) camera.image_size = given;
+  if (options.rows_upwards) {
+    if (!camera.image_size)
+      throw BadInput(Reason::usage,
+                     fmt::format("{}: rows that run upwards need the image's size (--image-size)", origin));
+    camera.view = with_rows_reversed(camera.view, camera.image_size->y());
+  }
+  to_mm(camera, options.mm_per_unit, origin);
+  add_warnings(camera, origin);
+}
+
+Cameras chosen(Cameras cameras, std::optional<int> column, const std::string& origin) {
+  if (!column) return cameras;
+  if (*column < 1 || std::size_t(*column) > cameras.size())
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: column {}, must be 1 to {}", origin, *column, cameras.size()));
+  return {std::move(cameras[std::size_t(*column) - 1])};
+}
+
+Cameras cameras_of_file(const std::filesystem::path& path, const ImportOptions& options) {
+  const std::string text = value_or_throw(read_file(path, max_bytes)), origin = path.filename().string();
+  Cameras cameras = chosen(parse(without_byte_order_mark(text), origin, options), options.column, origin);
+  for (ImportedMatrix& camera : cameras) complete(camera, options, origin);
+  return cameras;
+}
+
+/// A file for each camera, as plastimatch has them.
+Cameras cameras_of_folder(const std::filesystem::path& folder, const ImportOptions& options) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.is_regular_file() && !entry.path().filename().string().starts_with('.'))
+      files.push_back(entry.path());
+  std::ranges::sort(files);
+  if (files.empty() || files.size() > most_cameras)
+    throw BadInput(Reason::bad_size, fmt::format("{}: holds {} files, must be 1 to {}, one for each camera",
+                                                 folder.string(), files.size(), most_cameras));
+  ImportOptions each = options;
+  each.column.reset();
+  Cameras cameras;
+  for (const auto& file : files) {
+    Cameras of_file = cameras_of_file(file, each);
+    if (of_file.size() != 1)
+      throw BadInput(Reason::unsupported,
+                     fmt::format("{}: holds {} cameras; in a folder each file holds one: name this file",
+                                 file.string(), of_file.size()));
+    of_file.front().name = file.stem().string();
+    cameras.push_back(std::move(of_file.front()));
+  }
+  return chosen(std::move(cameras), options.column, folder.string());
+}
+
 }  // namespace
 
 Eigen::Matrix3d xmalab_from_pixels(int image_height) {
@@ -235,26 +354,25 @@ std::optional<Warning> mirrored_or_upwards(const geometry::Intrinsics& k) {
   return Warning{
       Reason::ambiguous_handedness,
       fmt::format("fx {:.4g} and fy {:.4g} px have different signs: the image is mirrored, or its v "
-                  "points upwards; v points downwards here (height - 1 - v)",
+                  "points upwards; v points downwards here (height - 1 - v: import --rows-upwards)",
                   k.fx, k.fy),
       {},
       {{"fx_px", k.fx}, {"fy_px", k.fy}}};
 }
 
-Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, const ImportOptions& options) {
-  const auto text = read_file(path, max_bytes);
-  if (!text) return tl::unexpected<Failure>(text.error());
+Expected<std::vector<ImportedMatrix>> import_cameras(const std::filesystem::path& path,
+                                                     const ImportOptions& options) {
   return guarded([&] {
-    const std::string origin = path.filename().string();
-    ImportedMatrix result = parse(without_byte_order_mark(*text), origin, options);
-    const auto &given = options.image_size, &stated = result.image_size;
-    if (given && stated && *given != *stated)
-      throw BadInput(Reason::bad_size,
-                     fmt::format("{}: is for images of {} x {}, --image-size states {} x {}", origin,
-                                 stated->x(), stated->y(), given->x(), given->y()));
-    to_mm(result, options.mm_per_unit, origin);
-    add_warnings(result, origin);
-    return result;
+    return std::filesystem::is_directory(path) ? cameras_of_folder(path, options)
+                                               : cameras_of_file(path, options);
+  });
+}
+
+Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, const ImportOptions& options) {
+  return import_cameras(path, options).and_then([&](Cameras cameras) -> Expected<ImportedMatrix> {
+    if (cameras.size() == 1) return std::move(cameras.front());
+    return fail(Reason::usage, fmt::format("{}: {} cameras: choose one (helicarm import --column)",
+                                           path.filename().string(), cameras.size()));
   });
 }
 

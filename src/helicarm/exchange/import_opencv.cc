@@ -95,26 +95,19 @@ struct PoseNumbers {
 };
 
 /// calibrateCamera's table: a row of rvec and tvec for each image.
-PoseNumbers pose_of_image(const CameraKeys& file, const std::string& key, std::optional<int> row) {
+std::vector<PoseNumbers> poses_of_table(const CameraKeys& file, const std::string& key) {
   const auto numbers = file.numbers(key);
   const std::size_t rows = numbers.size() / 6;
   if (rows == 0 || numbers.size() % 6 != 0)
     throw BadInput(Reason::bad_size,
                    fmt::format("{}: {} numbers, must be 6 for each image", file.where(key), numbers.size()));
-  if (rows > 1 && !row)
-    throw BadInput(Reason::usage,
-                   fmt::format("{}: poses of {} images: choose one (--column)", file.where(key), rows));
-  const int chosen = row.value_or(1);
-  if (chosen < 1 || std::size_t(chosen) > rows)
-    throw BadInput(Reason::bad_value,
-                   fmt::format("{}: column {}, must be 1 to {}", file.where(key), chosen, rows));
-  const double* first = numbers.data() + 6 * std::size_t(chosen - 1);
-  return {rows_of_rotation(Eigen::Vector3d(first)), {first + 3, first + 6}};
+  std::vector<PoseNumbers> poses;
+  for (const double* first = numbers.data(); poses.size() < rows; first += 6)
+    poses.push_back({rows_of_rotation(Eigen::Vector3d(first)), {first + 3, first + 6}});
+  return poses;
 }
 
-PoseNumbers pose_of(const CameraKeys& file, std::optional<int> row) {
-  if (const auto table = file.key_of({"extrinsicparameters"}); !table.empty())
-    return pose_of_image(file, table, row);
+PoseNumbers pose_of(const CameraKeys& file) {
   const auto t = file.key_of({"tvec", "tvecs", "translationvector", "translation", "t"});
   const auto rvec = file.key_of({"rvec", "rvecs", "rotationvector"});
   const auto r = file.key_of({"r", "rotationmatrix", "rotation"});
@@ -201,18 +194,19 @@ bool is_opencv_file(std::string_view text) {
   return false;
 }
 
-ImportedMatrix camera_of_keys(const Json& json, const std::string& origin, const ImportOptions& options) {
+Cameras camera_of_keys(const Json& json, const std::string& origin, const ImportOptions& options) {
   const CameraKeys file(json, origin);
   const auto k = camera_matrix(file);
   refuse_lens(json, origin, options);
-  const PoseNumbers pose = pose_of(file, options.column);
-  ImportedMatrix result{camera_of(k, pose.r, pose.t, origin), size_of(file)};
-  if (!result.image_size) result.image_size = options.image_size;
-  return result;
+  const auto table = file.key_of({"extrinsicparameters"});
+  const auto poses = table.empty() ? std::vector<PoseNumbers>{pose_of(file)} : poses_of_table(file, table);
+  Cameras cameras;
+  for (const PoseNumbers& pose : poses)
+    cameras.push_back({camera_of(k, pose.r, pose.t, origin), size_of(file)});
+  return cameras;
 }
 
-ImportedMatrix parse_opencv_camera(std::string_view text, const std::string& origin,
-                                   const ImportOptions& options) {
+Cameras parse_opencv_camera(std::string_view text, const std::string& origin, const ImportOptions& options) {
   return camera_of_keys(file_storage_json(text, origin), origin, options);
 }
 

@@ -30,7 +30,6 @@ constexpr OtherFormat other_formats[] = {
     {"\xFF\xD8\xFF", "an image (JPEG), not a camera"},
     {"II*", "an image (TIFF), not a camera"},
     {"PK\x03\x04", "a ZIP archive (Excel, NumPy .npz), which is not read: save it as text or JSON"},
-    {"\x93NUMPY", "a NumPy array, which is not read: save it as text (numpy.savetxt)"},
     {"\x1F\x8B", "compressed (gzip): unpack it; a displacement field (Warp.nii.gz) has no matrix"}};
 
 constexpr std::string_view ants_marks[] = {"AffineTransform_", "MatrixOffsetTransformBase_",

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <optional>
+#include <vector>
 
 #include <Eigen/Core>
 #include <fmt/format.h>
@@ -46,39 +47,68 @@ void check_matrix(const RtkProjection& projection, const FileField& field, const
                                apart, limit));
 }
 
-/// The chosen projection. A parameter holds until it is given anew, as in RTK.
-RtkProjection chosen_projection(std::string_view text, const std::string& origin, std::optional<int> column) {
+/// A parameter holds until it is given anew, as in RTK.
+std::vector<RtkProjection> projections_of(std::string_view text, const std::string& origin) {
   RtkProjection current;
-  std::optional<RtkProjection> chosen;
+  std::vector<RtkProjection> all;
   const FileField* matrix = nullptr;
-  int count = 0;
   const auto fields = xml_fields(text, origin);
   for (const FileField& field : fields) {
     if (!field.path.starts_with(rtk_root)) continue;
     const std::string name = field.path.substr(field.path.rfind('/') + 1);
-    const std::string where = fmt::format("{}: projection {}: {}", origin, count + 1, name);
+    const std::string where = fmt::format("{}: projection {}: {}", origin, all.size() + 1, name);
     if (double* parameter = rtk_parameter(current, name)) *parameter = one_number(field, where);
     if (name == "RadiusCylindricalDetector" && one_number(field, where) != 0)
       throw BadInput(Reason::unsupported, fmt::format("{}: only flat detectors are read", where));
     if (name == "Matrix") matrix = &field;
     if (name != "Projection") continue;
-    if (matrix) check_matrix(current, *matrix, fmt::format("{}: projection {}: Matrix", origin, count + 1));
-    if (++count == column.value_or(1)) chosen = current;
+    if (matrix)
+      check_matrix(current, *matrix, fmt::format("{}: projection {}: Matrix", origin, all.size() + 1));
+    matrix = nullptr;
+    all.push_back(current);
   }
-  if (count == 0) throw BadInput(Reason::truncated, fmt::format("{}: no Projection", origin));
-  if (count > 1 && !column)
-    throw BadInput(Reason::usage, fmt::format("{}: {} projections: choose one (--column)", origin, count));
-  if (!chosen)
-    throw BadInput(Reason::bad_value, fmt::format("{}: column {}, must be 1 to {}", origin, *column, count));
-  if (!(chosen->source_to_detector > 0) || !(chosen->source_to_isocenter > 0))
-    throw BadInput(
-        Reason::unsupported,
-        fmt::format("{}: SourceToDetectorDistance {:g} and SourceToIsocenterDistance {:g} must be positive",
-                    origin, chosen->source_to_detector, chosen->source_to_isocenter));
-  return *chosen;
+  if (all.empty()) throw BadInput(Reason::truncated, fmt::format("{}: no Projection", origin));
+  for (const RtkProjection& each : all)
+    if (!(each.source_to_detector > 0) || !(each.source_to_isocenter > 0))
+      throw BadInput(
+          Reason::unsupported,
+          fmt::format("{}: SourceToDetectorDistance {:g} and SourceToIsocenterDistance {:g} must be positive",
+                      origin, each.source_to_detector, each.source_to_isocenter));
+  return all;
 }
 
-RtkPixels pixels_of(const std::string& origin, const ImportOptions& options) {
+/// The comment of `rtk_geometry`: "Projection image: spacing A B mm, origin C D mm".
+std::optional<RtkPixels> stated_pixels(std::string_view text, const std::string& origin) {
+  constexpr std::string_view spacing = "<!-- Projection image: spacing ", between = " mm, origin ",
+                             end = " mm";
+  const std::size_t start = text.find(spacing);
+  if (start == text.npos) return std::nullopt;
+  const std::size_t middle = text.find(between, start);
+  const std::size_t last = middle == text.npos ? text.npos : text.find(end, middle + between.size());
+  if (last == text.npos) return std::nullopt;
+  const std::string where = origin + ": comment on the projection image";
+  auto numbers = numbers_in(text.substr(start + spacing.size(), middle - start - spacing.size()), where);
+  const auto of_origin =
+      numbers_in(text.substr(middle + between.size(), last - middle - between.size()), where);
+  if (numbers.size() != 2 || of_origin.size() != 2 || !(numbers[0] > 0) || !(numbers[1] > 0))
+    throw BadInput(Reason::bad_value, fmt::format("{}: spacing and origin must be two numbers each", where));
+  return RtkPixels{{numbers[0], numbers[1]}, {of_origin[0], of_origin[1]}};
+}
+
+void check_stated(const std::optional<Eigen::Vector2d>& option, const Eigen::Vector2d& stated,
+                  const char* name, double tolerance, const std::string& origin) {
+  if (option && (*option - stated).cwiseAbs().maxCoeff() > tolerance)
+    throw BadInput(Reason::bad_value, fmt::format("{}: its comment states {},{} mm, {} {},{}", origin,
+                                                  stated.x(), stated.y(), name, option->x(), option->y()));
+}
+
+RtkPixels pixels_of(std::string_view text, const std::string& origin, const ImportOptions& options) {
+  if (const auto stated = stated_pixels(text, origin)) {
+    const double tolerance = 1e-3 * stated->spacing_mm.minCoeff();
+    check_stated(options.pixel_mm, stated->spacing_mm, "--pixel-mm", tolerance, origin);
+    check_stated(options.origin_mm, stated->origin_mm, "--origin-mm", tolerance, origin);
+    return *stated;
+  }
   if (!options.pixel_mm || (!options.image_size && !options.origin_mm))
     throw BadInput(
         Reason::usage,
@@ -93,16 +123,15 @@ RtkPixels pixels_of(const std::string& origin, const ImportOptions& options) {
 
 bool is_rtk_geometry(std::string_view text) { return text.find("<RTKThreeDCircularGeometry") != text.npos; }
 
-ImportedMatrix parse_rtk_geometry(std::string_view text, const std::string& origin,
-                                  const ImportOptions& options) {
-  const RtkPixels pixels = pixels_of(origin, options);
-  const geometry::Projection projection =
-      pixels.pixels_from_mm() * chosen_projection(text, origin, options.column).matrix();
-  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = projection;
-  ImportedMatrix result = imported({rows.data(), rows.data() + rows.size()}, origin);
-  result.image_size = options.image_size;
-  result.in_mm = true;
-  return result;
+Cameras parse_rtk_geometry(std::string_view text, const std::string& origin, const ImportOptions& options) {
+  const Eigen::Matrix3d pixels = pixels_of(text, origin, options).pixels_from_mm();
+  Cameras cameras;
+  for (const RtkProjection& projection : projections_of(text, origin)) {
+    const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = pixels * projection.matrix();
+    cameras.push_back(imported({rows.data(), rows.data() + rows.size()}, origin));
+    cameras.back().in_mm = true;
+  }
+  return cameras;
 }
 
 }  // namespace helicarm::exchange

@@ -9,6 +9,7 @@
 
 #include "helicarm/core/json.h"
 #include "helicarm/exchange/rtk_projection.h"
+#include "helicarm/geometry/decomposition.h"
 #include "helicarm/geometry/view_json.h"
 
 namespace helicarm::exchange {
@@ -59,6 +60,29 @@ PlacedDetector placed_detector(const geometry::View& view, const Eigen::Vector2i
   const Eigen::Vector2d middle = (size - Eigen::Vector2i::Ones()).cast<double>() / 2;
   const Eigen::Vector3d source = view.source_in_world();
   return {source, source + back * Eigen::Vector3d(middle.x(), middle.y(), 1), back.col(0), back.col(1)};
+}
+
+Expected<geometry::View> view_of_detector(const PlacedDetector& detector, const Eigen::Vector2i& size) {
+  const Eigen::Vector2d middle = (size - Eigen::Vector2i::Ones()).cast<double>() / 2;
+  Eigen::Matrix3d ray_of_pixel;
+  ray_of_pixel << detector.along_u, detector.along_v,
+      detector.centre - detector.source - middle.x() * detector.along_u - middle.y() * detector.along_v;
+  constexpr double least_sine = 1e-6;
+  const double volume = std::abs(ray_of_pixel.determinant());
+  if (volume <= least_sine * detector.along_u.norm() * detector.along_v.norm() *
+                    (detector.centre - detector.source).norm())
+    return fail(Reason::bad_value, "the source lies in the detector's plane, or its pixels have no area");
+  geometry::Projection projection;
+  projection.leftCols<3>() = ray_of_pixel.inverse();
+  projection.col(3) = -(projection.leftCols<3>() * detector.source);
+  return geometry::decompose(projection, detector.centre);
+}
+
+geometry::View with_rows_reversed(const geometry::View& view, int height) {
+  const Eigen::DiagonalMatrix<double, 3> half_turn(-1, -1, 1);
+  const geometry::Intrinsics& k = view.intrinsics;
+  return {{-k.fx, k.fy, k.u0, height - 1 - k.v0, -k.skew},
+          {half_turn * view.camera_from_world.rotation, half_turn * view.camera_from_world.translation}};
 }
 
 Expected<std::string> rtk_geometry(const RunGeometry& run) {

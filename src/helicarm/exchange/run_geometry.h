@@ -31,6 +31,13 @@ struct PlacedDetector {
 };
 PlacedDetector placed_detector(const geometry::View& view, const Eigen::Vector2i& size, double pixel_mm);
 
+/// The view whose source and pixels these are. Refuses a source in the detector's plane (`bad_value`) and
+/// numbers that are not finite (`not_finite`).
+Expected<geometry::View> view_of_detector(const PlacedDetector& detector, const Eigen::Vector2i& size);
+
+/// The view of the image whose rows are in the other order.
+geometry::View with_rows_reversed(const geometry::View& view, int height);
+
 /// RTK's ThreeDCircularProjectionGeometry with one Projection an image. Fails as `rtk_view`.
 Expected<std::string> rtk_geometry(const RunGeometry& run);
 
