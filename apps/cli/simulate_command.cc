@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "command_line.h"
+#include "helicarm/simulation/rotation.h"
 #include "helicarm/simulation/write_case.h"
 #include "helicarm/volume/read_volume.h"
 #include "named_files.h"
@@ -24,9 +25,11 @@ struct SimulateArguments {
   int size = 1024;                ///< 512 or 1024 pixels per side
   int bits = 12;                  ///< 8, 10, 12, 14 or 16
   bool knee = true;
-  std::string calibrator;                 ///< a built-in or a file; empty: udcsc with check targets
-  std::string plate;                      ///< a built-in or a file; empty: plate48
-  std::string response;                   ///< linear or log; empty: log with the knee
+  std::string calibrator;     ///< a built-in or a file; empty: udcsc with check targets
+  std::string plate;          ///< a built-in or a file; empty: plate48
+  std::string response;       ///< linear or log; empty: log with the knee
+  std::optional<int> frames;  ///< of a rotational run; none: views
+  std::optional<double> arc_deg, flex_mm, jitter_mm;
   std::vector<std::string> views;         ///< NAME:PRIMARY,SECONDARY (deg); none: AP and LAT
   std::optional<std::uint64_t> arm_seed;  ///< none: the seed
   std::filesystem::path ct;               ///< a CT volume instead of the synthetic knee
@@ -118,6 +121,20 @@ simulation::SimulationOptions options_from(const SimulateArguments& arguments, c
   return options;
 }
 
+std::optional<simulation::Rotation> rotation_from(const SimulateArguments& arguments) {
+  if (!arguments.frames) {
+    if (arguments.arc_deg || arguments.flex_mm || arguments.jitter_mm)
+      throw BadInput(Reason::usage, "simulate: --arc, --flex and --jitter require --run");
+    return std::nullopt;
+  }
+  simulation::Rotation rotation;
+  rotation.frames = *arguments.frames;
+  rotation.arc_deg = arguments.arc_deg.value_or(rotation.arc_deg);
+  rotation.flex_mm = arguments.flex_mm;
+  rotation.jitter_mm = arguments.jitter_mm.value_or(rotation.jitter_mm);
+  return rotation;
+}
+
 Json summary(const SimulateArguments& arguments, const simulation::SimulatedCase& simulated) {
   Json json = {{"folder", arguments.folder.string()},
                {"kind", arguments.kind},
@@ -145,8 +162,17 @@ CommandResult simulate_command(const SimulateArguments& arguments, Console& cons
     value_or_throw(simulation::check_case_folder(arguments.folder));
     simulation::forget_case(arguments.folder);
     const simulation::SimulationOptions options = options_from(arguments, console);
-    const simulation::SimulatedCase simulated = value_or_throw(simulation::simulate_case(options));
-    value_or_throw(simulation::write_case(arguments.folder, simulated));
+    const auto rotation = rotation_from(arguments);
+    const simulation::SimulatedCase simulated = [&] {
+      if (rotation) {
+        auto run = value_or_throw(simulation::simulate_run(options, *rotation));
+        value_or_throw(simulation::write_run(arguments.folder, run));
+        return std::move(run.images);
+      }
+      auto made = value_or_throw(simulation::simulate_case(options));
+      value_or_throw(simulation::write_case(arguments.folder, made));
+      return made;
+    }();
     const Json written = summary(arguments, simulated);
     if (console.json) {
       console.out << to_text(written) << '\n';
@@ -155,6 +181,16 @@ CommandResult simulate_command(const SimulateArguments& arguments, Console& cons
     if (console.quiet) return;
     console.out << fmt::format("{}: case of kind {}, preset {}, seed {}\n", arguments.folder.string(),
                                arguments.kind, simulation::word(options.c_arm_preset()), options.seed);
+    if (rotation) {
+      const auto clear = [](const Json& view) { return view["clear_balls"].get<int>(); };
+      const auto [least, most] = std::ranges::minmax(written["views"], {}, clear);
+      console.out << fmt::format(
+          "  RUN.dcm  {} images over {:g} degrees, {} to {} of {} balls unobstructed\n", rotation->frames,
+          rotation->arc_deg, clear(least), clear(most), least["balls"].get<int>());
+      console.out << fmt::format("  case.json, calibrator.json, {}truth.json\n",
+                                 simulated.plate ? "plate.json, " : "");
+      return;
+    }
     const bool grid = options.kind == simulation::CaseKind::grid;
     const std::string things = grid ? "crosses" : "balls";
     for (const Json& view : written["views"]) {
@@ -174,7 +210,8 @@ void add_simulate(CLI::App& app, Action& action) {
       add_command(app, group::studies, "simulate",
                   "Simulate a case with known ground truth: X-ray images of a knee with the calibrator",
                   "helicarm simulate my-case --kind tunnels --seed 7\n"
-                  "  helicarm simulate my-case --calibrator my-phantom.json --plate my-plate.json");
+                  "  helicarm simulate my-case --calibrator my-phantom.json --plate my-plate.json\n"
+                  "  helicarm simulate my-run --preset flat-panel --run 133 --arc 200 --flex 3");
   auto& a = arguments_of(command, action, simulate_command);
   command->add_option("DIR", a.folder, "Folder for the case and truth.json")->required();
   command
@@ -201,7 +238,25 @@ void add_simulate(CLI::App& app, Action& action) {
           "ii-9in: 9 inch intensifier, 997 mm, 0.2295 mm: plate, distortion, sag (default)\n"
           "flat-panel: 1020 mm, 0.29 mm: sag, no distortion (default of kind flat)")
       ->type_name("WORD");
-  command->add_option("--size", a.size, "Pixels per side: 512 or 1024")->capture_default_str();
+  command
+      ->add_option("--run", a.frames,
+                   "A rotational run of this many images for sweep, about AP: RUN.dcm with angles per frame")
+      ->check(within(2, 1000));
+  command
+      ->add_option("--arc", a.arc_deg, "run: angle from the first image to the last, degrees (default: 200)")
+      ->check(within(1, 360));
+  command
+      ->add_option("--flex", a.flex_mm,
+                   "run: largest displacement of source or detector by the arm's sag, mm (default: as the "
+                   "C-arm has it)")
+      ->check(within(0, 20));
+  command
+      ->add_option("--jitter", a.jitter_mm,
+                   "run: displacement of source and detector in each image, standard deviation per axis, mm "
+                   "(default: 0.03)")
+      ->check(within(0, 20));
+  command->add_option("--size", a.size, "Pixels per side: 512 or 1024, of a run also 256")
+      ->capture_default_str();
   command->add_option("--bits", a.bits, "Stored bits: 8, 10, 12, 14 or 16")->capture_default_str();
   command->add_flag_callback(
       "--no-knee", [&a] { a.knee = false; }, "Without the knee");

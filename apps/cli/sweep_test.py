@@ -55,9 +55,28 @@ class Sweep(SimulatedCase):
         frames = json.loads((self.root / "blank-out/sweep.json").read_text())["frames"]
         self.assertEqual([frame["failure"]["code"] for frame in frames], 3 * ["blank_image"])
 
+    def test_a_simulated_run_is_found_within_its_regions(self):
+        case, out = self.root / "run", self.root / "run-out"
+        done = run("simulate", case, "--preset", "flat-panel", "--kind", "flat", "--no-knee", "--run", 16, "--arc", 60,
+                   "--flex", 2, "--jitter", 0.05, "--size", 512, "--seed", 3, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run("sweep", case, "--out", out, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        truth, found = (json.loads(path.read_text()) for path in (case / "truth.json", out / "sweep.json"))
+        self.assertEqual([view["frame"] for view in truth["views"]], list(range(1, 17)))
+        accepted = [frame for frame in found["frames"] if frame["projection"]]
+        self.assertGreaterEqual(len(accepted), 15)
+        within = 0
+        for frame in accepted:
+            true = truth["views"][frame["frame"] - 1]
+            errors = [a - b for a, b in zip(frame["source_mm"], true["source_mm"])]
+            within += all(abs(e) <= 2.4 * s for e, s in zip(errors, frame["source_sigma_mm"]))  # 95 %: three axes
+            self.assertTrue(all(abs(e) <= 5 * s for e, s in zip(errors, frame["source_sigma_mm"])), (frame["frame"], errors))
+        self.assertGreaterEqual(within, len(accepted) - 4)
+
     def test_wrong_input_is_named(self):
         out = self.root / "wrong"
-        for name, frames, word in (("missing", "1-5", "2 of 5 images do not exist, the first: run_04.png"),
+        for name, frames, word in (("missing", "1-5", "2 of 5 images do not exist, the first: run_04.png; the frames 4-5."),
                                    ("words", "some", 'frames: "some" is neither A-B nor A-B:STEP')):
             done = run("sweep", self.case_of(name, frames), "--out", out)
             self.assertEqual((done.returncode, word in done.stderr), (2, True), done.stderr)

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/phantom/conical_helix.h"
 #include "helicarm/simulation/random_pose.h"
+#include "helicarm/simulation/rotation.h"
 #include "helicarm/simulation/streams.h"
 
 namespace helicarm::simulation {
@@ -34,6 +37,36 @@ Imaging draw_imaging(const SimulationOptions& options, double field_radius_px, d
   imaging.bits = options.bits;
   if (options.has(Fault::saturated)) imaging.open_level = options.logarithmic() ? 1.12 : 1.6;
   return imaging;
+}
+
+Displacement displacement_of(const ArmState& from, const ArmState& to) {
+  const Vector3d source = to.source_mm - from.source_mm;
+  const Vector2d principal = to.principal_mm - from.principal_mm;
+  return {source, source + Vector3d(-principal.x(), -principal.y(), to.f_mm - from.f_mm)};
+}
+
+/// The arm whose sag is `factor` times this one's.
+ArmFlex with_sag(ArmFlex arm, double factor) {
+  arm.f_per_weight *= factor;
+  arm.principal_per_weight *= factor;
+  arm.source_per_weight *= factor;
+  arm.roll_per_weight *= factor;
+  return arm;
+}
+
+/// After independent displacements of source and detector, `sigma_mm` per axis.
+ArmState jittered(const ArmState& state, double sigma_mm, RandomStream& random) {
+  const auto draw = [&] {
+    Vector3d displacement;
+    for (int axis = 0; axis < 3; ++axis) displacement[axis] = sigma_mm * random.normal();
+    return displacement;
+  };
+  const Vector3d source = draw(), detector = draw();
+  ArmState taken = state;
+  taken.source_mm += source;
+  taken.principal_mm += (source - detector).head<2>();
+  taken.f_mm += detector.z() - source.z();
+  return taken;
 }
 
 double rounded(double value, double step) { return step * std::round(value / step); }
@@ -83,13 +116,75 @@ std::vector<TrueView> paper_stand(const SimulationOptions& options) {
   return true_views;
 }
 
-/// Orientation of an undeformed arm in the patient's frame (x distal, y lateral, z anterior); lateral images
-/// are rotated by 90 degrees, so that the leg lies across as in the operating room.
-Matrix3d pointing(const ArmAngles& angles) {
+/// Orientation of an undeformed arm in the patient's frame (x distal, y lateral, z anterior).
+Matrix3d upright(const ArmAngles& angles) {
   const Matrix3d from_below = (Matrix3d() << 0, -1, 0, 1, 0, 0, 0, 0, 1).finished();
+  return from_below * turn(angles.secondary_deg, Vector3d::UnitY()) *
+         turn(-angles.primary_deg, Vector3d::UnitX());
+}
+
+/// The same, lateral images rotated by 90 degrees, so that the leg lies across as in the operating room.
+Matrix3d pointing(const ArmAngles& angles) {
   const bool from_the_side = std::abs(std::sin(angles.primary_deg * radian)) > std::sqrt(0.5);
-  return turn(from_the_side ? 90 : 0, Vector3d::UnitZ()) * from_below *
-         turn(angles.secondary_deg, Vector3d::UnitY()) * turn(-angles.primary_deg, Vector3d::UnitX());
+  return turn(from_the_side ? 90 : 0, Vector3d::UnitZ()) * upright(angles);
+}
+
+std::vector<ArmAngles> angles_of(const Rotation& rotation) {
+  std::vector<ArmAngles> angles;
+  for (int i = 0; i < rotation.frames; ++i)
+    angles.push_back({rotation.arc_deg * (double(i) / (rotation.frames - 1) - 0.5), 0});
+  return angles;
+}
+
+/// Whose sag over the run is as requested.
+ArmFlex sagging(const ArmFlex& arm, const Rotation& rotation) {
+  if (!rotation.flex_mm) return arm;
+  const ArmState undeformed = with_sag(arm, 0).at(Matrix3d::Identity());
+  double largest = 0;
+  for (const ArmAngles& angles : angles_of(rotation)) {
+    const Displacement sag = displacement_of(undeformed, arm.at(upright(angles)));
+    largest = std::max({largest, sag.source.norm(), sag.detector.norm()});
+  }
+  return with_sag(arm, *rotation.flex_mm / largest);
+}
+
+/// Camera, detector, imaging and plate of the arm in one state.
+struct Surroundings {
+  const SimulationOptions& options;
+  const CArmModel& model;
+  const ArmFlex& arm;
+  Vector3d isocentre;
+  double plate_height_mm;
+  const geometry::RigidTransform& calibrator_from_patient;
+};
+
+void place(TrueView& true_view, const Surroundings& at, const Matrix3d& unbent, const ArmState& state,
+           RandomStream& once) {
+  const double pixel_mm = at.model.receiver_mm / at.options.size;
+  const Vector2d middle = Vector2d::Constant(0.5 * (at.options.size - 1));
+  true_view.f_mm = state.f_mm;
+  true_view.nominal_f_mm = at.model.source_detector_mm;
+  const Vector2d centre = middle + state.principal_mm / pixel_mm;
+  true_view.view.intrinsics = {true_view.f_mm / pixel_mm, true_view.f_mm / pixel_mm, centre.x(), centre.y()};
+  const Matrix3d rotation = turn(state.roll_deg, Vector3d::UnitZ()) * unbent;
+  const geometry::RigidTransform camera_from_patient{
+      rotation, Vector3d(0, 0, at.model.source_isocentre_mm) - state.source_mm - rotation * at.isocentre};
+  true_view.view.camera_from_world = camera_from_patient * at.calibrator_from_patient.inverse();
+
+  true_view.detector = {at.options.size, at.options.size, pixel_mm, at.arm.distortion, {}};
+  true_view.detector.distortion.s_rotation = state.s_rotation;
+  true_view.detector.distortion.shift_px = state.shift_mm / pixel_mm;
+  if (at.model.intensifier) true_view.detector.field_radius_px = at.arm.distortion.radius_px;
+  true_view.imaging = draw_imaging(at.options, 0.4925 * at.options.size, pixel_mm);
+  // The plate is positioned manually and centred on the receiver, not on the central ray.
+  true_view.camera_from_plate = {
+      turn(once.uniform(-0.5, 0.5), Vector3d::UnitZ()),
+      {once.uniform(-2, 2), once.uniform(-2, 2), true_view.f_mm - at.plate_height_mm}};
+  true_view.camera_from_plate.translation.head<2>() += pixel_mm * (middle - centre);
+}
+
+Vector3d draw_isocentre(RandomStream& random) {
+  return Vector3d(random.uniform(-4, 4), random.uniform(-4, 4), random.uniform(34, 40));
 }
 
 }  // namespace
@@ -119,10 +214,8 @@ std::vector<TrueView> take_stand(const SimulationOptions& options, double plate_
   const CArmModel model = model_of(options.c_arm_preset());
   const ArmFlex arm = draw_arm(options.arm_seed.value_or(options.seed), model, options.size);
   RandomStream random(options.seed, stream::c_arm);
-  const double pixel_mm = model.receiver_mm / options.size;
-  const Vector2d middle = Vector2d::Constant(0.5 * (options.size - 1));
-  const Vector3d isocentre(random.uniform(-4, 4), random.uniform(-4, 4), random.uniform(34, 40));
-
+  const Surroundings at{
+      options, model, arm, draw_isocentre(random), plate_height_mm, calibrator_from_patient};
   std::vector<TrueView> true_views;
   for (const ViewAngles& view : angles_of(options, random)) {
     TrueView true_view = named_view(options, view, static_cast<std::uint32_t>(true_views.size()));
@@ -131,29 +224,42 @@ std::vector<TrueView> take_stand(const SimulationOptions& options, double plate_
     true_view.true_angles.secondary_deg += once.uniform(-0.05, 0.05);
     const Matrix3d unbent = pointing(true_view.true_angles);
     const ArmState state = unrepeated(arm.at(unbent), once);
-    true_view.f_mm = state.f_mm;
-    true_view.nominal_f_mm = model.source_detector_mm;
-    const Vector2d centre = middle + state.principal_mm / pixel_mm;
-    true_view.view.intrinsics = {true_view.f_mm / pixel_mm, true_view.f_mm / pixel_mm, centre.x(),
-                                 centre.y()};
-    const Matrix3d rotation = turn(state.roll_deg, Vector3d::UnitZ()) * unbent;
-    const geometry::RigidTransform camera_from_patient{
-        rotation, Vector3d(0, 0, model.source_isocentre_mm) - state.source_mm - rotation * isocentre};
-    true_view.view.camera_from_world = camera_from_patient * calibrator_from_patient.inverse();
-
-    true_view.detector = {options.size, options.size, pixel_mm, arm.distortion, {}};
-    true_view.detector.distortion.s_rotation = state.s_rotation;
-    true_view.detector.distortion.shift_px = state.shift_mm / pixel_mm;
-    if (model.intensifier) true_view.detector.field_radius_px = arm.distortion.radius_px;
-    true_view.imaging = draw_imaging(options, 0.4925 * options.size, pixel_mm);
-    // The plate is positioned manually and centred on the receiver, not on the central ray.
-    true_view.camera_from_plate = {
-        turn(once.uniform(-0.5, 0.5), Vector3d::UnitZ()),
-        {once.uniform(-2, 2), once.uniform(-2, 2), true_view.f_mm - plate_height_mm}};
-    true_view.camera_from_plate.translation.head<2>() += pixel_mm * (middle - centre);
+    place(true_view, at, unbent, state, once);
     true_views.push_back(true_view);
   }
   return true_views;
+}
+
+RunStand take_run(const SimulationOptions& options, const Rotation& rotation, double plate_height_mm,
+                  const geometry::RigidTransform& calibrator_from_patient) {
+  const CArmModel model = model_of(options.c_arm_preset());
+  const ArmFlex arm =
+      sagging(draw_arm(options.arm_seed.value_or(options.seed), model, options.size), rotation);
+  RandomStream random(options.seed, stream::c_arm);
+  const Surroundings at{
+      options, model, arm, draw_isocentre(random), plate_height_mm, calibrator_from_patient};
+  RunStand stand;
+  for (const ArmAngles& angles : angles_of(rotation)) {
+    const auto number = static_cast<std::uint32_t>(stand.views.size());
+    TrueView true_view;
+    true_view.name = fmt::format("RUN/{}", number + 1);
+    true_view.number = number;
+    true_view.mirrored = options.has(Fault::mirrored);
+    true_view.true_angles = angles;
+    true_view.primary_angle_deg = rounded(angles.primary_deg, 0.01);
+    true_view.secondary_angle_deg = rounded(angles.secondary_deg, 0.01);
+    const Matrix3d unbent = upright(angles);
+    const ArmState bent = arm.at(unbent);
+    RandomStream once(options.seed, stream::jitter, number);
+    const ArmState state = jittered(bent, rotation.jitter_mm, once);
+    // The plate is mounted once for the run.
+    RandomStream mounting(options.seed, stream::true_views);
+    place(true_view, at, unbent, state, mounting);
+    stand.views.push_back(true_view);
+    stand.deviations.push_back(
+        {displacement_of(with_sag(arm, 0).at(unbent), bent), displacement_of(bent, state)});
+  }
+  return stand;
 }
 
 }  // namespace helicarm::simulation

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -10,6 +12,7 @@
 #include "helicarm/simulation/faults.h"
 #include "helicarm/simulation/knee.h"
 #include "helicarm/simulation/random_pose.h"
+#include "helicarm/simulation/rotation.h"
 #include "helicarm/simulation/streams.h"
 #include "helicarm/simulation/wire_grid.h"
 
@@ -77,7 +80,32 @@ Expected<void> check_views(const SimulationOptions& options) {
   return {};
 }
 
-Expected<void> check(const SimulationOptions& options, const phantom::Calibrator& calibrator) {
+Expected<void> check_rotation(const SimulationOptions& options, const Rotation& rotation) {
+  constexpr double most_mm = 20;
+  if (options.kind == CaseKind::tunnels || options.kind == CaseKind::grid)
+    return fail(Reason::usage, fmt::format("run: is not of kind {}", word(options.kind)));
+  if (!options.views.empty()) return fail(Reason::usage, "run: views cannot be given too");
+  if (options.c_arm_preset() == Preset::paper_sim)
+    return fail(Reason::bad_value, "run: preset paper-sim has two views; choose ii-9in or flat-panel");
+  if (options.has(Fault::wires))
+    return fail(Reason::bad_value, "fault: wires, one over a ball of each view, do not occur in a run");
+  if (rotation.frames < 2 || rotation.frames > 1000)
+    return fail(Reason::bad_value, fmt::format("run: {} images, must be 2 to 1000", rotation.frames));
+  if (!(rotation.arc_deg >= 1 && rotation.arc_deg <= 360))
+    return fail(Reason::bad_value, fmt::format("arc: {} degrees, must be 1 to 360", rotation.arc_deg));
+  for (const auto& [name, value] :
+       {std::pair{"flex", rotation.flex_mm.value_or(0)}, {"jitter", rotation.jitter_mm}})
+    if (!(value >= 0 && value <= most_mm))
+      return fail(Reason::bad_value, fmt::format("{}: {} mm, must be 0 to {}", name, value, most_mm));
+  return {};
+}
+
+Expected<void> check(const SimulationOptions& options, const phantom::Calibrator& calibrator, bool is_run) {
+  if (is_run && options.size == 256) {
+    SimulationOptions larger = options;
+    larger.size = 512;
+    return check(larger, calibrator, is_run);
+  }
   if (options.size != 512 && options.size != 1024)
     return fail(Reason::bad_value, fmt::format("size: {}, must be 512 or 1024", options.size));
   if (options.bits < 8 || options.bits > 16 || options.bits % 2 != 0)
@@ -196,13 +224,14 @@ SimulatedCase simulate_grid(SimulationOptions options) {
   return simulated_case;
 }
 
-}  // namespace
+/// By the height of the plate and the pose of the patient.
+using Stand = std::function<std::vector<TrueView>(double, const geometry::RigidTransform&)>;
 
-Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
+Expected<SimulatedCase> simulate_views(const SimulationOptions& options, const Stand& stand, bool is_run) {
   SimulatedCase simulated_case;
   simulated_case.options = options;
   simulated_case.calibrator = options.calibrator.value_or(phantom::udcsc());
-  if (const auto checked = check(options, simulated_case.calibrator); !checked)
+  if (const auto checked = check(options, simulated_case.calibrator, is_run); !checked)
     return tl::unexpected<Failure>(checked.error());
   if (options.kind == CaseKind::grid) {
     if (const auto checked = check_grid(options); !checked) return tl::unexpected<Failure>(checked.error());
@@ -230,7 +259,7 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
   if (options.knee) simulated_case.calibrator_from_knee = calibrator_from_knee;
 
   const double plate_height = simulated_case.plate ? plate_height_mm(*simulated_case.plate) : 0;
-  const std::vector<TrueView> true_views = take_stand(options, plate_height, calibrator_from_patient);
+  const std::vector<TrueView> true_views = stand(plate_height, calibrator_from_patient);
   Scene patient = calibrator_body(simulated_case.calibrator);
   std::erase_if(patient, [&](const Body& body) {
     return std::find(options.lost_balls.begin(), options.lost_balls.end(), body.name) !=
@@ -258,6 +287,34 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
     simulated_case.views.push_back(take_view(simulated_case, patient, true_views[i],
                                              static_cast<std::uint32_t>(i), ct ? &*ct : nullptr));
   return simulated_case;
+}
+
+}  // namespace
+
+Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
+  return simulate_views(
+      options,
+      [&](double plate_height_mm, const geometry::RigidTransform& calibrator_from_patient) {
+        return take_stand(options, plate_height_mm, calibrator_from_patient);
+      },
+      false);
+}
+
+Expected<SimulatedRun> simulate_run(const SimulationOptions& options, const Rotation& rotation) {
+  if (const auto checked = check_rotation(options, rotation); !checked)
+    return tl::unexpected<Failure>(checked.error());
+  std::vector<RunDeviation> deviations;
+  auto images = simulate_views(
+      options,
+      [&](double plate_height_mm, const geometry::RigidTransform& calibrator_from_patient) {
+        RunStand stand = take_run(options, rotation, plate_height_mm, calibrator_from_patient);
+        deviations = std::move(stand.deviations);
+        return std::move(stand.views);
+      },
+      true);
+  return std::move(images).map([&](SimulatedCase made) {
+    return SimulatedRun{rotation, std::move(made), std::move(deviations)};
+  });
 }
 
 xray::XrayImage exposure_of(const SimulatedView& view) {

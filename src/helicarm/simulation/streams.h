@@ -16,6 +16,7 @@ inline constexpr std::uint32_t grid = 1006;
 inline constexpr std::uint32_t readings = 1100;  ///< and following: two per tracked body
 inline constexpr std::uint32_t arm = 1007;
 inline constexpr std::uint32_t true_views = 1008;
+inline constexpr std::uint32_t jitter = 1009;
 inline constexpr std::uint32_t noise = 1010;  ///< and following: two per view
 
 }  // namespace helicarm::simulation::stream

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/simulation/rotation.h"
 #include "helicarm/simulation/streams.h"
 #include "helicarm/simulation/truth_json.h"
 #include "helicarm/xray/digest.h"
@@ -70,6 +71,7 @@ void forget_case(const std::filesystem::path& folder) {
   std::error_code ignored;
   for (const char* file : {plate_file, calibrator_file, case_file})
     std::filesystem::remove(folder / file, ignored);
+  if (truth->is_object() && truth->contains("run")) std::filesystem::remove(folder / run_file, ignored);
   const Json views = truth->value("views", Json::array());
   for (const Json& view : views) {
     if (!view.is_object() || !view.contains("name") || !view["name"].is_string()) continue;

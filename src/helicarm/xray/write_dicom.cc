@@ -21,6 +21,7 @@
 #include "helicarm/image/grey_image.h"
 #include "helicarm/xray/dicom_time.h"
 #include "helicarm/xray/uid.h"
+#include "helicarm/xray/write_run.h"
 
 namespace helicarm::xray {
 namespace fs = std::filesystem;
@@ -208,17 +209,33 @@ void put_digital(DcmDataset& dataset, const DerivedImage& image) {
   must(dataset.putAndInsertSint16(DCM_PixelIntensityRelationshipSign, 1), "sign");
 }
 
-void put_modules(DcmDataset& dataset, const DerivedImage& image) {
+/// Frames of a run and their angles (PS3.3 C.8.7.5).
+void put_motion(DcmDataset& dataset, const RunFrames& run) {
+  put(dataset, DCM_PositionerMotion, run.further.empty() ? "STATIC" : "DYNAMIC");
+  if (run.further.empty()) return;
+  put(dataset, DCM_NumberOfFrames, std::to_string(run.further.size() + 1));
+  put(dataset, DCM_FrameTime, "33.333");
+  must(dataset.putAndInsertTagKey(DCM_FrameIncrementPointer, DCM_FrameTime), "frame increment pointer");
+  std::string primary, secondary;
+  for (const Eigen::Vector2d& increment : run.angle_increments_deg) {
+    primary += (primary.empty() ? "" : "\\") + decimal(increment.x());
+    secondary += (secondary.empty() ? "" : "\\") + decimal(increment.y());
+  }
+  put(dataset, DCM_PositionerPrimaryAngleIncrement, primary);
+  put(dataset, DCM_PositionerSecondaryAngleIncrement, secondary);
+}
+
+void put_modules(DcmDataset& dataset, const DerivedImage& image, const RunFrames& run) {
   const SopClass sop_class = class_of(image);
   put_identity(dataset, image, sop_class);
   put_acquisition(dataset, image, sop_class);
-  if (sop_class.modality == "XA") put(dataset, DCM_PositionerMotion, "STATIC");
+  if (sop_class.modality == "XA") put_motion(dataset, run);
   if (sop_class.modality == "XA" || sop_class.modality == "RF") put_projection(dataset, image);
   if (sop_class.modality == "DX") put_digital(dataset, image);
   put_required(dataset, sop_class);
 }
 
-void put_pixels(DcmDataset& dataset, const DerivedImage& image) {
+void put_pixels(DcmDataset& dataset, const DerivedImage& image, const RunFrames& run) {
   const int allocated = image.bits_stored > 8 ? 16 : 8;
   put(dataset, DCM_SamplesPerPixel, 1);
   put(dataset, DCM_PhotometricInterpretation, "MONOCHROME2");
@@ -228,38 +245,73 @@ void put_pixels(DcmDataset& dataset, const DerivedImage& image) {
   put(dataset, DCM_BitsStored, image.bits_stored);
   put(dataset, DCM_HighBit, image.bits_stored - 1);
   put(dataset, DCM_PixelRepresentation, 0);
-  const auto pixels = image.pixels.pixels();
+  // Filled in place: a run may have gigabytes.
+  auto data = std::make_unique<DcmPixelData>(DCM_PixelData);
+  const std::size_t count = image.pixels.pixels().size() * (run.further.size() + 1);
+  const auto fill = [&](auto* values) {
+    values = std::ranges::copy(image.pixels.pixels(), values).out;
+    for (const auto* further : run.further) values = std::ranges::copy(further->pixels(), values).out;
+  };
   if (allocated == 16) {
-    must(dataset.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size()), "pixels");
+    data->setVR(EVR_OW);
+    Uint16* words = nullptr;
+    must(data->createUint16Array(static_cast<Uint32>(count), words), "pixels");
+    fill(words);
   } else {
-    const std::vector<Uint8> bytes(pixels.begin(), pixels.end());
-    must(dataset.putAndInsertUint8Array(DCM_PixelData, bytes.data(), bytes.size()), "pixels");
+    data->setVR(EVR_OB);
+    Uint8* bytes = nullptr;
+    must(data->createUint8Array(static_cast<Uint32>(count), bytes), "pixels");
+    fill(bytes);
   }
+  must(dataset.insert(data.get(), true), "pixels");
+  static_cast<void>(data.release());
 }
 
-void check(const fs::path& path, const DerivedImage& image) {
+void check(const fs::path& path, const image::Image<std::uint16_t>& pixels, int bits_stored) {
   const auto side = static_cast<int>(image::max_image_side);
-  if (image.pixels.empty() || image.pixels.width() > side || image.pixels.height() > side)
+  if (pixels.empty() || pixels.width() > side || pixels.height() > side)
     throw BadInput(Reason::bad_size, fmt::format("{}: {} x {} pixels, must be 1 to {} a side", path.string(),
-                                                 image.pixels.width(), image.pixels.height(), side));
-  const int limit = (1 << image.bits_stored) - 1;
-  const int greatest = *std::ranges::max_element(image.pixels.pixels());
-  if (image.bits_stored < 8 || image.bits_stored > 16 || greatest > limit)
+                                                 pixels.width(), pixels.height(), side));
+  const int limit = (1 << bits_stored) - 1;
+  const int greatest = *std::ranges::max_element(pixels.pixels());
+  if (bits_stored < 8 || bits_stored > 16 || greatest > limit)
     throw BadInput(Reason::bad_value, fmt::format("{}: pixel value {} does not fit in {} bits (8 to 16)",
-                                                  path.string(), greatest, image.bits_stored));
+                                                  path.string(), greatest, bits_stored));
+}
+
+void check_frames(const fs::path& path, const DerivedImage& image, const RunFrames& run) {
+  constexpr std::size_t most_bytes = 0xFFFFFFF0;  // of uncompressed pixel data
+  const std::size_t frames = run.further.size() + 1;
+  if (2 * image.pixels.pixels().size() * frames > most_bytes)
+    throw BadInput(Reason::bad_size,
+                   fmt::format("{}: {} frames of {} x {} exceed the 4 GB of a DICOM file", path.string(),
+                               frames, image.pixels.width(), image.pixels.height()));
+  for (const auto* further : run.further) {
+    if (further->width() != image.pixels.width() || further->height() != image.pixels.height())
+      throw BadInput(Reason::bad_size, fmt::format("{}: its frames differ in size", path.string()));
+    check(path, *further, image.bits_stored);
+  }
+  if (frames > 1 && run.angle_increments_deg.size() != frames)
+    throw BadInput(Reason::bad_value, fmt::format("{}: {} angle increments of {} frames", path.string(),
+                                                  run.angle_increments_deg.size(), frames));
 }
 
 }  // namespace
 
 Expected<void> write_dicom(const fs::path& path, const DerivedImage& image) {
+  return write_run(path, image, {});
+}
+
+Expected<void> write_run(const fs::path& path, const DerivedImage& image, const RunFrames& run) {
   const E_TransferSyntax syntax = image.rle ? EXS_RLELossless : EXS_LittleEndianExplicit;
   const auto file = guarded([&] {
-    check(path, image);
+    check(path, image.pixels, image.bits_stored);
+    check_frames(path, image, run);
     prepare_dcmtk();
     auto made = std::make_unique<DcmFileFormat>();
     DcmDataset& dataset = *made->getDataset();
-    put_modules(dataset, image);
-    put_pixels(dataset, image);
+    put_modules(dataset, image, run);
+    put_pixels(dataset, image, run);
     must(dataset.chooseRepresentation(syntax, nullptr), "compression");
     return made;
   });
