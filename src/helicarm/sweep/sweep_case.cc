@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/case_registration/follow_case.h"
+#include "helicarm/core/number_ranges.h"
 #include "helicarm/pipeline/case_frames.h"
 
 namespace helicarm::sweep {
@@ -41,7 +42,6 @@ std::vector<int> numbers_of_files(const pipeline::CaseView& view) {
 
 /// Warns of numbers without a file between the first and the last, if all others have one step.
 void warn_of_gaps(const std::vector<int>& numbers, const std::string& view, std::vector<Warning>& warnings) {
-  constexpr std::size_t most_named = 20;
   if (numbers.size() < 3) return;
   int step = numbers.back() - numbers.front();
   for (std::size_t i = 1; i < numbers.size(); ++i) step = std::min(step, numbers[i] - numbers[i - 1]);
@@ -49,12 +49,9 @@ void warn_of_gaps(const std::vector<int>& numbers, const std::string& view, std:
   for (std::size_t i = 1; i < numbers.size(); ++i)
     for (int number = numbers[i - 1] + step; number < numbers[i]; number += step) gaps.push_back(number);
   if (gaps.empty()) return;
-  const std::size_t named = std::min(most_named, gaps.size());
   warnings.push_back({Reason::frames_missing,
-                      fmt::format("{} of {} numbers of the run have no image: {}{}", gaps.size(),
-                                  gaps.size() + numbers.size(),
-                                  fmt::join(gaps.begin(), gaps.begin() + std::ptrdiff_t(named), ", "),
-                                  named < gaps.size() ? ", ..." : ""),
+                      fmt::format("{} of {} numbers of the run have no image: {}", gaps.size(),
+                                  gaps.size() + numbers.size(), number_ranges(gaps)),
                       view,
                       {{"missing", double(gaps.size())}, {"images", double(numbers.size())}}});
 }
@@ -84,7 +81,7 @@ void add_frames(SweepCase& read, pipeline::CaseView view) {
   }
   view.frames.reset();  // each frame is a view like any other
   std::string first;
-  int missing = 0;
+  std::vector<int> missing;
   const std::vector<int> numbers = numbers_of(read, view, frames);
   if (frames == "all" && pipeline::is_numbered(view)) warn_of_gaps(numbers, view.name, read.base.warnings);
   if (read.frames.size() + numbers.size() > pipeline::most_frames)
@@ -93,12 +90,19 @@ void add_frames(SweepCase& read, pipeline::CaseView view) {
   for (const int number : numbers) {
     Frame frame{at_number(view, number), view.name, number};
     frame.view.name = fmt::format("{}/{}", view.name, number);
-    if (!fs::exists(frame.view.image) && missing++ == 0) first = frame.view.image.filename().string();
+    if (!fs::exists(frame.view.image)) {
+      if (missing.empty()) first = frame.view.image.filename().string();
+      missing.push_back(number);
+    }
     read.frames.push_back(std::move(frame));
   }
-  if (missing > 0)
-    throw BadInput(Reason::missing_file, fmt::format("{}: {} of {} images do not exist, the first: {}",
-                                                     view.name, missing, numbers.size(), first));
+  if (!missing.empty())
+    throw BadInput(
+        Reason::missing_file,
+        fmt::format(
+            "{}: {} of {} images do not exist, the first: {}; the frames {}. \"frames\": \"all\" takes "
+            "those that exist",
+            view.name, missing.size(), numbers.size(), first, number_ranges(missing)));
 }
 
 Expected<SweepCase> read_runs(const fs::path& path, pipeline::Purpose purpose) {

@@ -71,7 +71,7 @@ TEST_F(SweepCaseFile, MissingFilesAreNamed) {
   ASSERT_FALSE(failed);
   EXPECT_EQ(failed.error().reason, Reason::missing_file);
   EXPECT_THAT(failed.error().message,
-              testing::HasSubstr("2 of 4 images do not exist, the first: run_005.png"));
+              testing::HasSubstr("2 of 4 images do not exist, the first: run_005.png; the frames "));
 }
 
 TEST_F(SweepCaseFile, FramesThatAFileDoesNotHaveAreRefused) {

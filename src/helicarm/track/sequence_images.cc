@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/number_ranges.h"
 #include "helicarm/core/parallel.h"
 #include "helicarm/pipeline/case_frames.h"
 #include "helicarm/pipeline/view_image.h"
@@ -31,8 +32,8 @@ Expected<SequenceImages> SequenceImages::open(std::span<const SequenceView> view
   return guarded([&] {
     SequenceImages images;
     images.views_.assign(views.begin(), views.end());
-    std::string first;
-    int missing = 0;
+    std::string first, missing;
+    std::size_t missing_count = 0;
     for (const SequenceView& view : views) {
       if (view.images.frame)
         throw BadInput(Reason::bad_value,
@@ -57,12 +58,14 @@ Expected<SequenceImages> SequenceImages::open(std::span<const SequenceView> view
                           view.opened ? "it" : view.images.image.filename().string(), file->frames()));
         continue;
       }
+      std::vector<int> of_view;
       for (int i = 0; i < frames.count(); ++i) {
         const int frame = frames.first + i * frames.step;
         const fs::path path =
             value_or_throw(pipeline::at_number(view.images, frame + view.frame_offset)).image;
         if (!fs::exists(path)) {
-          if (missing++ == 0) first = path.filename().string();
+          if (missing_count++ == 0) first = path.filename().string();
+          of_view.push_back(frame + view.frame_offset);
           continue;
         }
         if (const auto stated = xray::stated_size(path)) {
@@ -70,10 +73,14 @@ Expected<SequenceImages> SequenceImages::open(std::span<const SequenceView> view
           check_size(view.images.name, frame + view.frame_offset, *stated, size);
         }
       }
+      if (!of_view.empty())
+        missing +=
+            fmt::format("{}{}: {}", missing.empty() ? "" : "; ", view.images.name, number_ranges(of_view));
     }
-    if (missing > 0)
-      throw BadInput(Reason::missing_file, fmt::format("{} of {} images do not exist, the first: {}", missing,
-                                                       frames.count() * int(views.size()), first));
+    if (missing_count > 0)
+      throw BadInput(Reason::missing_file,
+                     fmt::format("{} of {} images do not exist, the first: {}; the numbers {}", missing_count,
+                                 frames.count() * int(views.size()), first, missing));
     images.decide_polarity(frames);
     return images;
   });
