@@ -14,7 +14,9 @@
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/earlier_results.h"
 #include "helicarm/track/model_sequence.h"
+#include "interruption.h"
 #include "progress_line.h"
+#include "resumed_sequence.h"
 #include "run_command.h"
 
 namespace helicarm::cli {
@@ -64,9 +66,26 @@ void follow(const RegisterArguments& arguments, const case_registration::Registe
   const auto given =
       value_or_throw(pipeline::read_case(arguments.run.folder, pipeline::Purpose::registration));
   ProgressLine progress(console);
-  const auto sequence = value_or_throw(track::follow_models(
-      given, range, options, {.out = arguments.run.out, .resume = arguments.resume},
-      [&](double share) { progress.notify(share); }, steps));
+  Interruption interruption;
+  int followed = 0;
+  const auto on_frame = [&](double share) {
+    progress.notify(share);
+    if (++followed < range.count() && interruption.is_requested()) throw Interruption::Requested();
+  };
+  const auto sequence = [&] {
+    try {
+      return value_or_throw(track::follow_models(
+          given, range, options,
+          {.out = arguments.run.out, .resume = arguments.resume, .on_note = noted(console)}, on_frame,
+          steps));
+    } catch (const Interruption::Requested&) {
+      console.progress << kept_after_interruption("register", arguments.run.folder, arguments.frames,
+                                                  arguments.run.out, followed, range.count())
+                       << std::flush;
+      interruption.end_program();
+      throw;
+    }
+  }();
   print_warnings(sequence.warnings, console);
   value_or_throw(track::write_models(sequence, arguments.run.out));
   const Json summary = track::to_json(sequence);

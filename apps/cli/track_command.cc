@@ -9,7 +9,9 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/track/track.h"
+#include "interruption.h"
 #include "progress_line.h"
+#include "resumed_sequence.h"
 
 namespace helicarm::cli {
 
@@ -62,8 +64,26 @@ CommandResult track_command(const TrackArguments& arguments, Console& console) {
     const auto given = track::read_track_case(arguments.folder, range);
     if (!given) refuse(given.error());
     ProgressLine progress(console);
-    const auto sequence = track::run_track(*given, range, {.out = arguments.out, .resume = arguments.resume},
-                                           [&](int done) { progress.notify(double(done) / range.count()); });
+    Interruption interruption;
+    int followed = 0;
+    const auto on_frame = [&](int done) {
+      followed = done;
+      progress.notify(double(done) / range.count());
+      if (interruption.is_requested() && done < range.count()) throw Interruption::Requested();
+    };
+    const auto sequence = [&] {
+      try {
+        return track::run_track(*given, range,
+                                {.out = arguments.out, .resume = arguments.resume, .on_note = noted(console)},
+                                on_frame);
+      } catch (const Interruption::Requested&) {
+        console.progress << kept_after_interruption("track", arguments.folder, arguments.frames,
+                                                    arguments.out, followed, range.count())
+                         << std::flush;
+        interruption.end_program();
+        throw;
+      }
+    }();
     if (!sequence) refuse(sequence.error());
     value_or_throw(track::write_track(*sequence, *given, arguments.out));
     print_warnings(sequence->warnings, console);

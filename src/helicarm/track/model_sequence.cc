@@ -12,6 +12,7 @@
 #include "helicarm/pipeline/case_frames.h"
 #include "helicarm/track/body_series.h"
 #include "helicarm/track/growing_table.h"
+#include "helicarm/track/image_keys.h"
 #include "helicarm/track/rows.h"
 #include "helicarm/track/sequence_images.h"
 #include "helicarm/xray/digest.h"
@@ -76,6 +77,30 @@ std::vector<RegisteredFrame> kept_frames(const fs::path& folder, const std::stri
   return frames_from(text.substr(first.size()), names, numbers);
 }
 
+/// The frame's line of frames.jsonl with the digests of its images.
+std::string line_with_keys(const RegisteredFrame& frame, const ImageKeys& keys) {
+  return frame_line(frame).insert(1, fmt::format("\"images\":{},", Json(keys).dump()));
+}
+
+/// Digests of the images of the frames in the folder; fewer where an earlier version wrote them.
+std::vector<ImageKeys> kept_keys(const fs::path& folder, std::size_t frames) {
+  constexpr std::uintmax_t most_bytes = std::uintmax_t(1) << 30;
+  std::vector<ImageKeys> keys;
+  const auto text = read_file(folder / "frames.jsonl", most_bytes);
+  for (std::size_t at = text ? text->find('\n') : std::string::npos;
+       at != std::string::npos && keys.size() < frames;) {
+    const std::size_t end = text->find('\n', at + 1);
+    if (end == std::string::npos) break;
+    const auto json = parse_json(std::string_view(*text).substr(at + 1, end - at - 1), "frames.jsonl");
+    if (!json || !json->is_object() || !json->contains("images") || !(*json)["images"].is_array()) break;
+    ImageKeys& of_frame = keys.emplace_back();
+    for (const Json& key : (*json)["images"])
+      of_frame.push_back(key.is_string() ? key.get<std::string>() : "");
+    at = end;
+  }
+  return keys;
+}
+
 FramePose pose_of(const Registration& model) { return {model.world_from_model, model.covariance}; }
 
 bool has_pose(const Registration& model) { return !model.failure && model.is_determined(); }
@@ -102,7 +127,7 @@ struct ModelTables {
         bodies(folder / "bodies.csv", bodies_header()) {}
 
   void add(const RegisteredFrame& frame, const RegisteredFrame& first,
-           const std::vector<Eigen::Vector3d>& centres) {
+           const std::vector<Eigen::Vector3d>& centres, const ImageKeys& keys) {
     std::string rows;
     for (std::size_t i = 0; i < frame.models.size(); ++i) {
       const Registration& model = frame.models[i];
@@ -113,7 +138,7 @@ struct ModelTables {
     }
     bodies.add(rows);
     poses.add(case_registration::poses_rows(frame));
-    frames.add(frame_line(frame));
+    frames.add(line_with_keys(frame, keys));
   }
 };
 
@@ -160,9 +185,13 @@ Expected<ModelSequence> follow_models(const pipeline::Case& given, const case_re
     const std::vector<Eigen::Vector3d> centres = follower.centres();
     const std::string identity = identity_of(given, range, options, follower);
     std::vector<RegisteredFrame> kept;
+    std::vector<ImageKeys> keys;
+    std::vector<std::string> view_names;
+    for (const pipeline::CaseView& view : given.base.views) view_names.push_back(view.name);
     std::optional<ModelTables> tables;
     if (follow.out) {
       if (follow.resume) kept = kept_frames(*follow.out, identity, sequence.names, sequence.frames);
+      if (!kept.empty()) keys = kept_keys(*follow.out, kept.size());
       std::error_code ignored;
       fs::create_directories(*follow.out, ignored);
       tables.emplace(*follow.out, identity);
@@ -171,18 +200,26 @@ Expected<ModelSequence> follow_models(const pipeline::Case& given, const case_re
     // The next frame's images are read while this one's are registered.
     std::future<Expected<std::vector<xray::XrayImage>>> ahead;
     for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
+      const auto now = value_or_throw(ahead.valid() ? ahead.get() : images.at(sequence.frames[i]));
+      if (i + 1 < sequence.frames.size())
+        ahead = std::async(std::launch::async,
+                           [&images, next = sequence.frames[i + 1]] { return images.at(next); });
+      const ImageKeys now_keys = keys_of(now);
+      const std::string changed = i >= kept.size()
+                                      ? ""
+                                      : changed_image(sequence.frames[i], view_names,
+                                                      i < keys.size() ? keys[i] : ImageKeys{}, now_keys);
+      if (!changed.empty()) {
+        kept.resize(i);
+        if (follow.on_note) follow.on_note(changed);
+      }
       if (i < kept.size()) {
         follower.take(kept[i]);
         sequence.registered.push_back(std::move(kept[i]));
       } else {
-        auto now = ahead.valid() ? ahead.get() : images.at(sequence.frames[i]);
-        if (i + 1 < sequence.frames.size())
-          ahead = std::async(std::launch::async,
-                             [&images, next = sequence.frames[i + 1]] { return images.at(next); });
-        sequence.registered.push_back(
-            value_or_throw(follower.next(sequence.frames[i], value_or_throw(std::move(now)))));
+        sequence.registered.push_back(value_or_throw(follower.next(sequence.frames[i], now)));
       }
-      if (tables) tables->add(sequence.registered.back(), sequence.registered.front(), centres);
+      if (tables) tables->add(sequence.registered.back(), sequence.registered.front(), centres, now_keys);
       if (on_frame) on_frame(double(i + 1) / double(sequence.frames.size()));
     }
     estimate_motion(sequence, centres);

@@ -33,14 +33,18 @@ void estimate_motion(ModelSequence& sequence, const std::vector<Eigen::Vector3d>
 struct FollowOptions {
   std::optional<std::filesystem::path> out;  ///< folder for rows as they are computed; nothing: none are kept
   bool resume = false;                       ///< goes on after the frames in `out`
+  /// Told why frames of an interrupted run are computed again.
+  std::function<void(const std::string&)> on_note = {};
 };
 
 /// Follows a case's models through a sequence; the first frame calibrates the views and is registered from
 /// the models' starts. Rows are written to `out` frame by frame: frames.jsonl, registration.csv and
-/// bodies.csv. With `resume` the frames in frames.jsonl are not registered again, and the result is that of a
-/// run without an interruption; bad_value where they are of another case. `on_frame`: after each frame, with
-/// the share done. Fails as `SequenceImages` and `CaseFollower`; refusals are in the result.
-Expected<ModelSequence> follow_models(const pipeline::Case& given, const case_registration::FrameRange& range,
+/// bodies.csv. With `resume` the frames in frames.jsonl are not registered again, up to one whose image has
+/// changed, and the result is that of a run without an interruption; bad_value where they are of another
+/// case. `on_frame`: after each frame, with the share done. Fails as `SequenceImages` and `CaseFollower`;
+/// refusals are in the result.
+Expected<ModelSequence> follow_models(const pipeline::Case& given,
+                                      const case_registration::FrameRange& range,
                                       const case_registration::RegisterOptions& options,
                                       const FollowOptions& follow,
                                       const std::function<void(double share)>& on_frame,

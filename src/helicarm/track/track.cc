@@ -10,6 +10,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/track/growing_table.h"
+#include "helicarm/track/image_keys.h"
 #include "helicarm/track/rows.h"
 #include "helicarm/track/sequence_images.h"
 #include "helicarm/xray/digest.h"
@@ -41,16 +42,23 @@ std::string identity_of(const TrackCase& given, const case_registration::FrameRa
   return xray::digest(text);
 }
 
+std::vector<std::string> names_of_views(const TrackCase& given) {
+  std::vector<std::string> names;
+  for (const TrackView& view : given.views) names.push_back(view.images.name);
+  return names;
+}
+
 /// Rows of the frames so far; those of the whole sequence replace them at its end.
 struct GrowingTables {
-  GrowingTable sights, markers, bodies;
+  GrowingTable images, sights, markers, bodies;
 
   explicit GrowingTables(const fs::path& folder)
-      : sights(folder / "sights.csv", sights_header()),
+      : images(folder / "images.csv", image_keys_header()),
+        sights(folder / "sights.csv", sights_header()),
         markers(folder / "markers.csv", markers_header()),
         bodies(folder / "bodies.csv", bodies_header()) {}
 
-  void add(const FrameSights& seen, const Tracker& tracker, const TrackCase& given) {
+  void add(const FrameSights& seen, const ImageKeys& keys, const Tracker& tracker, const TrackCase& given) {
     std::string marker_rows, body_rows;
     const Tracker::Snapshot now = tracker.snapshot(seen);
     for (std::size_t m = 0; m < given.markers.size(); ++m)
@@ -59,6 +67,7 @@ struct GrowingTables {
       body_rows += body_row(seen.frame, csv_field(given.bodies[b].name), now.bodies[b]);
     markers.add(marker_rows);
     bodies.add(body_rows);
+    images.add(image_keys_rows(seen.frame, names_of_views(given), keys));
     sights.add(sights_rows(seen, given));
   }
 };
@@ -82,6 +91,13 @@ std::vector<FrameSights> kept_frames(const fs::path& folder, const TrackCase& gi
   return sights_from(value_or_throw(read_file(folder / "sights.csv", most_bytes)), given, numbers);
 }
 
+/// Of the images that these frames were seen in; empty where an earlier version wrote them.
+std::vector<ImageKeys> kept_keys(const fs::path& folder, const TrackCase& given,
+                                 const std::vector<int>& numbers) {
+  const auto text = read_file(folder / "images.csv", most_bytes);
+  return text ? image_keys_from(*text, names_of_views(given), numbers) : std::vector<ImageKeys>{};
+}
+
 }  // namespace
 
 Expected<Sequence> run_track(const TrackCase& given, const case_registration::FrameRange& frames,
@@ -93,8 +109,21 @@ Expected<Sequence> run_track(const TrackCase& given, const case_registration::Fr
     const std::string identity = identity_of(given, frames);
     std::vector<FrameSights> kept;
     if (options.out && options.resume) kept = kept_frames(*options.out, given, identity, numbers);
-    Tracker tracker =
-        value_or_throw(Tracker::begin(given, numbers.front(), value_or_throw(images.at(numbers.front()))));
+    const auto first = value_or_throw(images.at(numbers.front()));
+    std::vector<ImageKeys> keys;
+    if (!kept.empty()) keys = kept_keys(*options.out, given, numbers);
+    // An image that changed since then makes its frame, and those after it, another sequence.
+    const auto keep_unchanged = [&](std::size_t i, const ImageKeys& now) {
+      if (i >= kept.size()) return;
+      const std::string changed =
+          changed_image(numbers[i], names_of_views(given), i < keys.size() ? keys[i] : ImageKeys{}, now);
+      if (changed.empty()) return;
+      kept.resize(i);
+      if (options.on_note) options.on_note(changed);
+    };
+    ImageKeys now_keys = keys_of(first);
+    keep_unchanged(0, now_keys);
+    Tracker tracker = value_or_throw(Tracker::begin(given, numbers.front(), first));
     std::optional<GrowingTables> tables;
     if (options.out) {
       std::error_code ignored;
@@ -104,21 +133,22 @@ Expected<Sequence> run_track(const TrackCase& given, const case_registration::Fr
     }
     std::vector<FrameSights> sights{tracker.first()};
     const auto done = [&] {
-      if (tables) tables->add(sights.back(), tracker, given);
+      if (tables) tables->add(sights.back(), now_keys, tracker, given);
       if (on_frame) on_frame(int(sights.size()));
     };
     done();
     // The next frame's images are read while this one's are searched.
     std::future<Expected<std::vector<xray::XrayImage>>> ahead;
     for (std::size_t i = 1; i < numbers.size(); ++i) {
+      const auto now = value_or_throw(ahead.valid() ? ahead.get() : images.at(numbers[i]));
+      if (i + 1 < numbers.size())
+        ahead = std::async(std::launch::async, [&images, next = numbers[i + 1]] { return images.at(next); });
+      now_keys = keys_of(now);
+      keep_unchanged(i, now_keys);
       if (i < kept.size()) {
         sights.push_back(kept[i]);
       } else {
-        auto now = ahead.valid() ? ahead.get() : images.at(numbers[i]);
-        if (i + 1 < numbers.size())
-          ahead =
-              std::async(std::launch::async, [&images, next = numbers[i + 1]] { return images.at(next); });
-        sights.push_back(tracker.look(numbers[i], value_or_throw(std::move(now))));
+        sights.push_back(tracker.look(numbers[i], now));
       }
       tracker.absorb(sights.back());
       done();

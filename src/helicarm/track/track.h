@@ -13,6 +13,8 @@ namespace helicarm::track {
 struct TrackOptions {
   std::optional<std::filesystem::path> out;  ///< folder for rows as they are computed; nothing: none are kept
   bool resume = false;                       ///< goes on after the rows in `out`
+  /// Told why rows of an interrupted run are computed again.
+  std::function<void(const std::string&)> on_note = {};
 };
 
 /// Called after each frame, with the number of frames done.
@@ -20,8 +22,9 @@ using OnFrame = std::function<void(int done)>;
 
 /// Follows the markers of a case through its frames and estimates bodies and smooth motion. Rows are written
 /// to `out` frame by frame: sights.csv, markers.csv and bodies.csv as far as they are known until then. With
-/// `resume` the frames in sights.csv are not looked at again, and the result is that of a run without an
-/// interruption; bad_value where they are of another case. Fails as `SequenceImages` and `Tracker::begin`.
+/// `resume` the frames in sights.csv are not looked at again, up to one whose image has changed, and the
+/// result is that of a run without an interruption; bad_value where they are of another case. Fails as
+/// `SequenceImages` and `Tracker::begin`.
 Expected<Sequence> run_track(const TrackCase& given, const case_registration::FrameRange& frames,
                              const TrackOptions& options = {}, const OnFrame& on_frame = {});
 

@@ -74,8 +74,9 @@ std::vector<std::string> names_of(const TrackCase& given) {
   return bodies;
 }
 
-constexpr std::array names{"markers.csv",  "bodies.csv",   "smoothed.csv", "relative.csv", "track.json",
-                           "points2d.csv", "points3d.csv", "report.html",  "sights.csv",   "sights.id"};
+constexpr std::array names{"markers.csv", "bodies.csv",   "smoothed.csv", "relative.csv",
+                           "track.json",  "points2d.csv", "points3d.csv", "report.html",
+                           "sights.csv",  "sights.id",    "images.csv"};
 
 }  // namespace
 
