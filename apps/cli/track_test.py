@@ -7,12 +7,14 @@ import json
 import math
 import pathlib
 import shutil
+import signal
 import struct
+import subprocess
 import tempfile
 import unittest
 import zlib
 
-from program import run
+from program import PROGRAM, run
 
 SIZE, FOCUS, DISTANCE, RADIUS, FRAMES = 160, 1600, 800, 1.0, 12
 # Rows: camera axes in the world.
@@ -170,6 +172,63 @@ class Track(unittest.TestCase):
         self.assertEqual(done.returncode, 2)
         self.assertIn("another sequence", done.stderr)
 
+    def test_resumed_after_a_change_of_an_image_begins_there(self):
+        folder = self.changed("changed-image", lambda case, folder: None)
+        self.assertEqual(self.track(folder, "changed-out").returncode, 0)
+        shutil.copyfile(folder / "A_0009.png", folder / "A_0008.png")
+        done = self.track(folder, "changed-out", f"1-{FRAMES}", "--resume")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("frame 8: the image of A is another than in the interrupted run", done.stderr)
+        self.assertEqual(self.track(folder, "fresh-out").returncode, 0)
+        for name in ("sights.csv", "markers.csv", "bodies.csv"):
+            self.assertEqual((self.root / "changed-out" / name).read_bytes(), (self.root / "fresh-out" / name).read_bytes())
+
+    def test_interruption_says_what_is_kept(self):
+        out = self.root / "stopped"
+        process = subprocess.Popen([PROGRAM, "track", self.root / "case", "--frames", f"1-{FRAMES}", "--out", out],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        while process.poll() is None and not (out / "sights.csv").exists():
+            pass
+        process.send_signal(signal.SIGINT)
+        _, stderr = process.communicate()
+        if process.returncode == 0:
+            return  # it was done before the signal
+        self.assertEqual(process.returncode, -signal.SIGINT, stderr)
+        self.assertIn(f"of {FRAMES} frames are kept in {out}", stderr)
+        self.assertIn(f"--frames 1-{FRAMES} --out {out} --resume", stderr)
+        done = self.track(self.root / "case", "stopped", f"1-{FRAMES}", "--resume")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual((out / "markers.csv").read_bytes(), (self.root / "out/markers.csv").read_bytes())
+
+    def test_markers_are_found_without_picks(self):
+        def without(case, folder):
+            del case["picks"], case["bodies"]
+        done = self.track(self.changed("no-picks", without), "found", f"1-{FRAMES}", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        names = [marker["name"] for marker in json.loads(done.stdout)["markers"]]
+        self.assertEqual(names, [f"M{i + 1}" for i in range(7)])
+        truth = {(body, name): xyz for body, markers in BODIES.items() for name, xyz in markers.items()}
+        order = sorted(truth, key=lambda key: project(CAMERAS["A"], place(key[0], truth[key], 1)))
+        for row in table(self.root / "found/markers.csv"):
+            body, name = order[int(row["name"][1:]) - 1]
+            if row["status"] == "tracked":
+                off = math.dist([float(row[f"{axis}_mm"]) for axis in "xyz"], place(body, truth[body, name], int(row["frame"])))
+                self.assertLess(off, 0.15, row)
+
+    def test_marker_picked_in_one_view_is_completed(self):
+        def one_view(case, folder):
+            case["picks"] = [p for p in case["picks"] if (p["name"], p["view"]) != ("J2", "B")]
+        done = self.track(self.changed("one-pick", one_view), "one-pick-out")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.check_places(self.root / "one-pick-out")
+
+    def test_wrong_diameter_is_named_with_both_numbers(self):
+        def larger(case, folder):
+            case["markers"]["diameter_mm"] = 1.5 * 2 * RADIUS
+        done = self.track(self.changed("diameter", larger), "diameter-out")
+        self.assertIn("scale_disagrees", done.stderr)
+        self.assertIn('"diameter_mm" is 3, the markers\' images are those of', done.stderr)
+
     def test_swap_in_mid_sequence_is_repaired_and_named(self):
         out = self.root / "swapped"
         shutil.copytree(self.root / "out", out)
@@ -233,7 +292,7 @@ class Track(unittest.TestCase):
 
         def no_size(case, folder):
             del case["markers"]
-        for name, change, word in (("gap", remove, "1 of 24 images do not exist, the first: B_0107.png"),
+        for name, change, word in (("gap", remove, "1 of 24 images do not exist, the first: B_0107.png; the numbers B: 107"),
                                    ("size", shrink, "image 9 has 80 x 80 pixels"), ("name", unknown, '"J9" has no pick'),
                                    ("no-size", no_size, '"markers" is missing')):
             done = self.track(self.changed(name, change), "wrong")

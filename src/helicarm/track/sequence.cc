@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -169,12 +170,17 @@ void warn_of_lost_markers(const SequenceData& work, Sequence& sequence) {
     std::vector<int> lost;
     for (std::size_t f = 0; f < work.frames; ++f)
       if (sequence.markers[f][m].status == MarkerStatus::lost) lost.push_back(sequence.frames[f]);
+    std::set<std::size_t> picked;
+    for (const MarkerPick& pick : work.given.picks)
+      if (pick.marker == m) picked.insert(pick.view);
+    const bool never_placed = picked.size() == 1 && lost.size() == work.frames;
     if (!lost.empty())
       sequence.warnings.push_back(
           {Reason::marker_lost,
-           fmt::format("\"{}\" is lost in {} of {} frames, first in frame {}: hidden in both "
-                       "views for too long, or outside the images",
-                       work.given.markers[m], lost.size(), work.frames, lost.front()),
+           fmt::format("\"{}\" is lost in {} of {} frames, first in frame {}: {}", work.given.markers[m],
+                       lost.size(), work.frames, lost.front(),
+                       never_placed ? "it is picked in one view only, which places nothing"
+                                    : "hidden in both views for too long, or outside the images"),
            {},
            {{"frames", double(lost.size())}, {"first", double(lost.front())}}});
   }

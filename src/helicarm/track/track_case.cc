@@ -13,6 +13,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/exchange/import_matrix.h"
 #include "helicarm/pipeline/case_frames.h"
+#include "helicarm/track/first_markers.h"
 
 namespace helicarm::track {
 namespace {
@@ -177,15 +178,12 @@ Expected<TrackCase> read_track_case(const fs::path& path, const case_registratio
       read.picks.push_back(
           {marker_named(read, pick.name), std::size_t(view - base.views.begin()), pick.uv_raw});
     }
-    if (read.picks.empty())
-      throw BadInput(
-          Reason::bad_value,
-          fmt::format("{}: \"picks\" is missing: each marker is picked in the first frame", origin));
-    read_bodies(read, base.bodies, origin);
     if (pipeline::brings_cameras(base))
       read_cameras(read, base, origin);
     else
       calibrate(read, base, frames);
+    complete_picks(read, frames);
+    read_bodies(read, base.bodies, origin);
     return read;
   });
 }
