@@ -11,9 +11,72 @@
 
 namespace helicarm::track {
 
+namespace {
+
+/// What one appearance makes of the picked markers of a view.
+struct TriedAppearance {
+  double misfit, size;  ///< medians; size: logarithm of the fitted over the stated radius
+  double sigma;         ///< of the median size
+  std::size_t markers;
+};
+
+/// Logarithms of the sizes that fit about as well as the best: a blurred small disc looks like a sharp large
+/// one.
+struct SizeRange {
+  double low = 0, high = 0, sigma = 0;
+  std::size_t markers = 0;
+};
+
+SizeRange size_range(const std::vector<TriedAppearance>& all) {
+  constexpr double as_good = 1.1;  // of the least misfit
+  SizeRange range;
+  double least = 1e9;
+  for (const TriedAppearance& tried : all) range.markers = std::max(range.markers, tried.markers);
+  for (const TriedAppearance& tried : all)
+    if (tried.markers == range.markers) least = std::min(least, tried.misfit);
+  range.low = 1e9, range.high = -1e9;
+  for (const TriedAppearance& tried : all)
+    if (tried.markers == range.markers && tried.misfit <= as_good * least) {
+      range.low = std::min(range.low, tried.size);
+      range.high = std::max(range.high, tried.size);
+      range.sigma = std::max(range.sigma, tried.sigma);
+    }
+  return range;
+}
+
+/// Nothing where a view's discs agree with the stated size, or are too few.
+std::optional<Warning> size_contradiction(const std::vector<SizeRange>& views, double diameter_mm) {
+  constexpr std::size_t fewest = 3;
+  constexpr double model = 0.12;  // what profiles that fit alike leave open beyond the range
+  double low = -1e9, high = 1e9;
+  std::size_t used = 0;
+  for (const SizeRange& range : views) {
+    if (range.markers < fewest) continue;
+    const double bound = model + 2 * range.sigma;
+    low = std::max(low, range.low - bound);
+    high = std::min(high, range.high + bound);
+    if (range.low - bound <= 0 && range.high + bound >= 0) return std::nullopt;
+    ++used;
+  }
+  if (used == 0 || low > high || (low <= 0 && high >= 0)) return std::nullopt;
+  return Warning{
+      Reason::scale_disagrees,
+      fmt::format("\"diameter_mm\" is {:g}, the markers' images are those of {:.2f} to {:.2f} mm: measure "
+                  "a marker and correct it; sizes and contrasts are judged by it",
+                  diameter_mm, diameter_mm * std::exp(low), diameter_mm * std::exp(high)),
+      {},
+      {{"stated_mm", diameter_mm},
+       {"low_mm", diameter_mm * std::exp(low)},
+       {"high_mm", diameter_mm * std::exp(high)}}};
+}
+
+}  // namespace
+
 void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
   constexpr double click_px = 6;
+  std::vector<SizeRange> sizes_of_views;
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
+    std::vector<TriedAppearance> all;
     MarkerAppearance best;
     double least = 1e9;
     std::size_t most = 0;
@@ -33,7 +96,13 @@ void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
               sizes.push_back(std::log(found->image.radius_px / radius));
             }
           }
-          if (misfits.empty() || misfits.size() + 1 < most) continue;
+          if (misfits.empty()) continue;
+          const double middle = median(sizes);
+          double squares = 0;
+          for (const double size : sizes) squares += (size - middle) * (size - middle);
+          all.push_back(
+              {median(misfits), middle, 1.25 * std::sqrt(squares) / double(sizes.size()), sizes.size()});
+          if (misfits.size() + 1 < most) continue;
           // A blurred small disc looks like a sharp large one: of what fits, the stated size decides.
           const double misfit = (median(misfits) + 0.1 * std::abs(median(sizes))) / double(misfits.size());
           if (misfits.size() > most + 1 || misfit < least) {
@@ -45,7 +114,10 @@ void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
         }
     if (most == 0) best.options = detection::fit_options_for(images[k]);
     appearance_.push_back(best);
+    sizes_of_views.push_back(size_range(all));
   }
+  if (const auto contradiction = size_contradiction(sizes_of_views, given_->diameter_mm))
+    warnings_.push_back(*contradiction);
 }
 
 void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) {
