@@ -103,7 +103,7 @@ TEST_F(MeasureCase, EveryOptionReachesTheModels) {
   calibration::CArmHistory learned;
   const pipeline::Result acquired = pipeline::measure(given_, fresh).value();
   for (int i = 0; i < 3; ++i)
-    for (calibration::HistoryEntry entry : acquired.entries) {
+    for (calibration::HistoryEntry entry : acquired.calibration->entries) {
       entry.image += std::to_string(i);
       learned.entries.push_back(entry);
     }

@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using case_registration::FrameRange;
 
-pipeline::CaseView at_number(const pipeline::CaseView& view, int number) {
+pipeline::CaseView numbered(const pipeline::CaseView& view, int number) {
   return value_or_throw(pipeline::at_number(view, number));
 }
 
@@ -31,7 +31,7 @@ std::vector<int> numbers_of_files(const pipeline::CaseView& view) {
     const std::size_t last = std::min(name.find_first_not_of("0123456789", prefix), name.size());
     if (last == prefix || last - prefix > 6) continue;
     const int number = std::stoi(name.substr(prefix, last - prefix));
-    if (at_number(view, number).image.filename() == name) numbers.push_back(number);
+    if (numbered(view, number).image.filename() == name) numbers.push_back(number);
   }
   if (numbers.empty())
     throw BadInput(Reason::missing_file, fmt::format("{}: no file \"{}\" in {}", view.name, pattern,
@@ -88,7 +88,7 @@ void add_frames(SweepCase& read, pipeline::CaseView view) {
     throw BadInput(Reason::bad_value,
                    fmt::format("{}: more than {} images in the case", view.name, pipeline::most_frames));
   for (const int number : numbers) {
-    Frame frame{at_number(view, number), view.name, number};
+    Frame frame{numbered(view, number), view.name, number};
     frame.view.name = fmt::format("{}/{}", view.name, number);
     if (!fs::exists(frame.view.image)) {
       if (missing.empty()) first = frame.view.image.filename().string();

@@ -187,7 +187,7 @@ Expected<ModelSequence> follow_models(const pipeline::Case& given, const case_re
     std::vector<RegisteredFrame> kept;
     std::vector<ImageKeys> keys;
     std::vector<std::string> view_names;
-    for (const pipeline::CaseView& view : given.base.views) view_names.push_back(view.name);
+    for (const pipeline::CaseView& view : given.views) view_names.push_back(view.name);
     std::optional<ModelTables> tables;
     if (follow.out) {
       if (follow.resume) kept = kept_frames(*follow.out, identity, sequence.names, sequence.frames);
