@@ -210,7 +210,7 @@ class Replay {
     const auto measured = measure_case(*derived_, plan_, measurement_);
     if (!measured) return differ(origin, measured.error().message);
     measurement_ = *measured;
-    newest_ = measured->result;
+    newest_ = *measured;
     if (!verifies_) {
       registration_.reset(), is_confirmed_ = false;
       measured_ = derived_;
