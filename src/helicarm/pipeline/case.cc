@@ -155,8 +155,10 @@ Json case_schema() {
     description::describe_case(codec, read, Purpose::run);
   });
   // A tunnel is one of picks, or a line of a model's plan.
-  schema["properties"]["tunnels"]["items"]["anyOf"] =
-      Json::array({{{"required", {"start", "end"}}}, {{"required", {"model"}}}});
+  Json& tunnel = schema["properties"]["tunnels"]["items"];
+  tunnel.erase("required");
+  tunnel["anyOf"] =
+      Json::array({{{"required", {"name", "start", "end"}}}, {{"required", {"name", "model"}}}});
   return schema;
 }
 

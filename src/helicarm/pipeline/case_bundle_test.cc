@@ -69,14 +69,15 @@ TEST_F(BundleOfNamedCase, HoldsNoNameAndRuns) {
 
 TEST_F(BundleOfNamedCase, HoldsNothingOfItsModels) {
   Json json = *read_json(folder_.path() / "case.json");
-  json["models"] = {{{"name", "doe_femur"},
-                     {"volume", "doe_ct.nrrd"},
-                     {"mask", "doe_mask.nrrd"},
-                     {"start", {{"landmarks", "doe_points.csv"}}},
-                     {"plan", "doe_plan.mrk.json"}},
-                    {{"name", "doe_tibia"},
-                     {"surface", "doe_tibia.stl"},
-                     {"start", {{"world_from_model", Json::array({1234.5})}}}}};
+  json["models"] = {
+      {{"name", "doe_femur"},
+       {"volume", "doe_ct.nrrd"},
+       {"mask", "doe_mask.nrrd"},
+       {"start", {{"landmarks", "doe_points.csv"}}},
+       {"plan", "doe_plan.mrk.json"}},
+      {{"name", "doe_tibia"},
+       {"surface", "doe_tibia.stl"},
+       {"start", {{"world_from_model", {{1, 0, 0, 1234.5}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}}}}}};
   json["picks"][0]["bone"] = {{"name", "doe_bone"}, {"side", "left"}};
   ASSERT_TRUE(write_file(folder_.path() / "case.json", to_text(json)));
   BundleOptions with_result;
