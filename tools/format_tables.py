@@ -20,7 +20,7 @@ def limits(schema):
     if "enum" in schema:
         return ""
     if "minimum" in schema:
-        return f"{schema['minimum']:g} to {schema['maximum']:g}"
+        return f"{schema['minimum']:.10g} to {schema['maximum']:.10g}"
     if "string" in kinds and "minLength" in schema:
         return f"{schema['minLength']} to {schema['maxLength']} characters"
     if "string" in kinds and schema.get("maxLength", 0) > 1000:
