@@ -206,14 +206,17 @@ class Track(unittest.TestCase):
         done = self.track(self.changed("no-picks", without), "found", f"1-{FRAMES}", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
         names = [marker["name"] for marker in json.loads(done.stdout)["markers"]]
-        self.assertEqual(names, [f"M{i + 1}" for i in range(7)])
-        truth = {(body, name): xyz for body, markers in BODIES.items() for name, xyz in markers.items()}
-        order = sorted(truth, key=lambda key: project(CAMERAS["A"], place(key[0], truth[key], 1)))
+        self.assertEqual(names, [f"M{i + 1}" for i in range(len(names))])
+        self.assertGreaterEqual(len(names), 6)  # of 7: what is not certain is left out
+        beads = [(body, xyz) for body, markers in BODIES.items() for xyz in markers.values()]
+        is_of = {}
         for row in table(self.root / "found/markers.csv"):
-            body, name = order[int(row["name"][1:]) - 1]
             if row["status"] == "tracked":
-                off = math.dist([float(row[f"{axis}_mm"]) for axis in "xyz"], place(body, truth[body, name], int(row["frame"])))
-                self.assertLess(off, 0.15, row)
+                at, frame = [float(row[f"{axis}_mm"]) for axis in "xyz"], int(row["frame"])
+                bead = min(beads, key=lambda each: math.dist(at, place(*each, frame)))
+                self.assertLess(math.dist(at, place(*bead, frame)), 0.15, row)
+                self.assertEqual(is_of.setdefault(row["name"], bead), bead)
+        self.assertEqual(len(set(is_of.values())), len(names))
 
     def test_marker_picked_in_one_view_is_completed(self):
         def one_view(case, folder):
