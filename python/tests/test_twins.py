@@ -31,6 +31,7 @@ TWINS = {
     "c-arm": ["check_c_arm", "c_arm_report", "run_case"],
     "phantom": ["Calibrator", "measure_phantom", "verify_phantom"],
     "register": ["register", "register_sequence"],
+    "segment": ["segment"],
     "track": ["track"],
     "migration": ["migration"],
     "replay": ["Session.replay"],
@@ -164,9 +165,10 @@ def test_a_bundle_is_the_same(case, tmp_path):
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    """An operation with virtual devices."""
+    """An operation with virtual devices. On a busy machine late poses may stop it: then its record ends there."""
     folder = tmp_path_factory.mktemp("operate")
-    subprocess.run([PROGRAM, "operate", "--cases", "1", "--size", "512", "--out", folder, "--quiet"], capture_output=True, check=True)
+    done = subprocess.run([PROGRAM, "operate", "--cases", "1", "--size", "512", "--out", folder, "--quiet"], capture_output=True, text=True)
+    assert done.returncode in (0, 3), done.stderr
     return next(path.parent for path in folder.rglob("session.log"))
 
 
