@@ -145,8 +145,8 @@ void locate_ten_picks(benchmark::State& state) {
   pipeline::RunOptions options;
   options.threads = 1;
   pipeline::Case given = simulated_case();
-  const auto calibration = std::make_shared<const pipeline::CaseCalibration>(
-      pipeline::calibrate_case(given, options).value());
+  const auto calibration =
+      std::make_shared<const pipeline::CaseCalibration>(pipeline::calibrate_case(given, options).value());
   if (!calibration) return state.SkipWithError(calibration.error().failure.message.c_str());
   given.calibrator.targets.clear();
   given.picks.clear();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every page in every state: legible, reachable, and as pictures (tools/pictures.sh).
+// Every page in every state: legible, reachable, and as images (tools/page_images.sh).
 #include <QDoubleSpinBox>
 
 #include "gui/controller/case_with_model_test.h"
@@ -12,9 +12,9 @@ namespace {
 
 constexpr int large_text_px = 20;
 
-class WindowPictures : public Window {
+class WindowImages : public Window {
  protected:
-  ~WindowPictures() override { style::apply({}); }
+  ~WindowImages() override { style::apply({}); }
   void write_tunnels(const std::vector<std::string>& views = {}) {
     simulation::SimulationOptions options;
     options.kind = simulation::CaseKind::tunnels;
@@ -77,20 +77,20 @@ class WindowPictures : public Window {
   simulation::SimulatedCase simulated_;
 };
 
-TEST_F(WindowPictures, Empty) { inspect("empty"); }
+TEST_F(WindowImages, Empty) { inspect("empty"); }
 
-TEST_F(WindowPictures, NotOpened) {
+TEST_F(WindowImages, NotOpened) {
   window_->open_paths({folder_ / "a folder of a rather long name that does not exist" / "case"});
   ASSERT_TRUE(wait_idle());
   inspect("not-opened");
 }
 
-TEST_F(WindowPictures, Measured) {
+TEST_F(WindowImages, Measured) {
   ASSERT_NO_FATAL_FAILURE(open_tunnels());
   inspect("measured");
 }
 
-TEST_F(WindowPictures, PickFailed) {
+TEST_F(WindowImages, PickFailed) {
   ASSERT_NO_FATAL_FAILURE(open_tunnels());
   pipeline::Pick pick = *pick_of(state(), "FS", "AP");
   pick.uv_raw += Eigen::Vector2d(30, -30);
@@ -99,7 +99,7 @@ TEST_F(WindowPictures, PickFailed) {
   inspect("pick-failed");
 }
 
-TEST_F(WindowPictures, PicksContradict) {
+TEST_F(WindowImages, PicksContradict) {
   ASSERT_NO_FATAL_FAILURE(open_tunnels());
   pipeline::Pick pick = *pick_of(state(), "FS", "AP");
   pick.name = "FE";
@@ -108,7 +108,7 @@ TEST_F(WindowPictures, PicksContradict) {
   inspect("picks-contradict");
 }
 
-TEST_F(WindowPictures, OutOfDate) {
+TEST_F(WindowImages, OutOfDate) {
   ASSERT_NO_FATAL_FAILURE(open_tunnels());
   const fs::path plate = folder_ / "tunnels" / "plate.json";
   ASSERT_TRUE(write_file(plate, *read_file(plate, 1 << 20) + "\n"));
@@ -116,7 +116,7 @@ TEST_F(WindowPictures, OutOfDate) {
   inspect("out-of-date");
 }
 
-TEST_F(WindowPictures, Refused) {
+TEST_F(WindowImages, Refused) {
   ASSERT_NO_FATAL_FAILURE(write_tunnels());
   fs::copy_file(folder_ / "tunnels" / "AP.dcm", folder_ / "tunnels" / "LAT.dcm",
                 fs::copy_options::overwrite_existing);
@@ -124,32 +124,32 @@ TEST_F(WindowPictures, Refused) {
   inspect("refused");
 }
 
-TEST_F(WindowPictures, ThreeViewsAndALandmark) {
+TEST_F(WindowImages, ThreeViewsAndALandmark) {
   ASSERT_NO_FATAL_FAILURE(write_tunnels({"AP:2,1", "LAT:88,-2", "OBL:45,3"}));
   ASSERT_NO_FATAL_FAILURE(open("tunnels"));
   window_->controller().add_landmark("medial epicondyle", pipeline::BoneLabel{"femur", pipeline::Side::left});
   inspect("three-views");
 }
 
-TEST_F(WindowPictures, ModelBeforeRegistration) {
+TEST_F(WindowImages, ModelBeforeRegistration) {
   ASSERT_NO_FATAL_FAILURE(open_model());
   inspect("model-before");
 }
 
-TEST_F(WindowPictures, ModelRegistered) {
+TEST_F(WindowImages, ModelRegistered) {
   ASSERT_NO_FATAL_FAILURE(open_model());
   ASSERT_NO_FATAL_FAILURE(register_model());
   inspect("model-registered");
 }
 
-TEST_F(WindowPictures, ModelMovedByHand) {
+TEST_F(WindowImages, ModelMovedByHand) {
   ASSERT_NO_FATAL_FAILURE(open_model());
   ASSERT_NO_FATAL_FAILURE(register_model());
   find<QDoubleSpinBox>("shiftX")->setValue(4);
   inspect("model-moved");
 }
 
-TEST_F(WindowPictures, Exported) {
+TEST_F(WindowImages, Exported) {
   ASSERT_NO_FATAL_FAILURE(open_tunnels());
   window_->controller().erase_picks("FS");
   ASSERT_TRUE(wait_idle());
@@ -158,7 +158,7 @@ TEST_F(WindowPictures, Exported) {
   inspect("exported");
 }
 
-TEST_F(WindowPictures, Rehearsal) {
+TEST_F(WindowImages, Rehearsal) {
   open_rehearsal();
   inspect("rehearsal");
   ASSERT_NO_FATAL_FAILURE(register_in_rehearsal());
@@ -167,7 +167,7 @@ TEST_F(WindowPictures, Rehearsal) {
   inspect("rehearsal-planned");
 }
 
-TEST_F(WindowPictures, TextHasContrastInBothThemesAlsoInSelectedRows) {
+TEST_F(WindowImages, TextHasContrastInBothThemesAlsoInSelectedRows) {
   ASSERT_NO_FATAL_FAILURE(open_tunnels());
   pipeline::Pick pick = *pick_of(state(), "FS", "AP");
   pick.uv_raw += Eigen::Vector2d(30, -30);
@@ -196,7 +196,7 @@ TEST(Style, EveryColourOfTextHasContrastOnEveryGround) {
   }
 }
 
-TEST_F(WindowPictures, TabReachesEverythingOnEveryPage) {
+TEST_F(WindowImages, TabReachesEverythingOnEveryPage) {
   ASSERT_NO_FATAL_FAILURE(open_model());
   ASSERT_NO_FATAL_FAILURE(register_model());
   for (const Phase phase : phases) {
