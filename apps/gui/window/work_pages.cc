@@ -40,6 +40,7 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
   withdraw_ = add_hold(tr("5  With&draw the tool"), "withdraw", [this] { controller_.withdraw(); });
   for (HoldButton* button : {unlock_, register_, go_, withdraw_})
     connect(button, &HoldButton::released, this, &NavigatePage::tell);
+  tell_why_last();  // the buttons stay where they are
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
