@@ -57,19 +57,27 @@ class RegisteredModel(dict):
         return np.full((6, 6), np.nan) if self["covariance"] is None else np.array(self["covariance"])
 
 
-class RegistrationAnswer(dict):
-    """The content of registration.json."""
+class _ModelsAnswer(dict):
+    """A dict whose "models" are of the class `_Model`."""
+
+    _Model = dict
 
     def __init__(self, content):
-        super().__init__(content, models=[RegisteredModel(model) for model in content["models"]])
+        super().__init__(content, models=[self._Model(model) for model in content["models"]])
 
     def __reduce__(self):
         return type(self), (dict(self),)
 
     @property
     def models(self):
-        """{name: RegisteredModel}"""
+        """{name: model}"""
         return {model["name"]: model for model in self["models"]}
+
+
+class RegistrationAnswer(_ModelsAnswer):
+    """The content of registration.json."""
+
+    _Model = RegisteredModel
 
     def to_frame(self):
         """pandas.DataFrame, a row for each model: name, decision, pose (m00 .. m23), standard deviations at its centre."""
@@ -86,19 +94,10 @@ class ModelSequence(dict):
         return rotation_of(self["world_from_model"])
 
 
-class SequenceAnswer(dict):
+class SequenceAnswer(_ModelsAnswer):
     """The answer of register_sequence."""
 
-    def __init__(self, content):
-        super().__init__(content, models=[ModelSequence(model) for model in content["models"]])
-
-    def __reduce__(self):
-        return type(self), (dict(self),)
-
-    @property
-    def models(self):
-        """{name: ModelSequence}"""
-        return {model["name"]: model for model in self["models"]}
+    _Model = ModelSequence
 
     def to_frame(self):
         """pandas.DataFrame, a row for each frame and model, as registration.csv."""
