@@ -10,6 +10,7 @@
 #include "helicarm/core/statistics.h"
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/candidates.h"
+#include "helicarm/fiducials/centre_error.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/label.h"
 #include "helicarm/fiducials/paper_circles.h"
@@ -23,7 +24,6 @@ using Eigen::Vector2d;
 constexpr std::size_t max_candidates = 30;
 constexpr double paper_systematic = 2e-3;  // of the field radius: residual distortion of a quadratic map
 constexpr double shared_bias_sigma = 0.008;
-constexpr double sigma_floor_px = 0.02;
 constexpr double prediction_reach_px = 4;
 constexpr double tolerance_sigmas = 3.3;      // as for a labelled fiducial
 constexpr double printed_tolerance_mm = 0.3;  // of a printed phantom that has not been measured

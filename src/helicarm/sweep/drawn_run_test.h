@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
@@ -51,8 +52,20 @@ struct DrawnRun {
     return view;
   }
 
+  /// A pixel's neighbours share a quarter of its light on either side.
+  static void blur(Eigen::MatrixXd& beam) {
+    const auto along_columns = [](const Eigen::MatrixXd& of) {
+      Eigen::MatrixXd blurred = of;
+      const auto n = of.rows() - 2;
+      blurred.middleRows(1, n) = of.middleRows(1, n) / 2 + (of.topRows(n) + of.bottomRows(n)) / 4;
+      return blurred;
+    };
+    beam = along_columns(along_columns(beam).transpose().eval()).transpose().eval();
+  }
+
   image::Image<std::uint16_t> image(int frame) const {
     image::Image<std::uint16_t> drawn(size, size);
+    Eigen::MatrixXd beam(size, size);  // row, column
     const geometry::View at = view(frame);
     const Eigen::Vector3d source = at.source_in_world();
     const Eigen::Matrix3d back = at.camera_from_world.rotation.transpose() * at.intrinsics.matrix().inverse();
@@ -85,9 +98,13 @@ struct DrawnRun {
           }
           light += std::exp(-0.3 * chord) / (parts * parts);
         }
-        drawn(column, row) =
-            std::uint16_t(std::clamp(30000 * light + (is_blank ? 0 : 120 * random.normal()), 0.0, 65535.0));
+        beam(row, column) = light;
       }
+    blur(beam);
+    for (int row = 0; row < size; ++row)
+      for (int column = 0; column < size; ++column)
+        drawn(column, row) = std::uint16_t(
+            std::clamp(30000 * beam(row, column) + (is_blank ? 0 : 120 * random.normal()), 0.0, 65535.0));
     return drawn;
   }
 

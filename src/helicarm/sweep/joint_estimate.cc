@@ -10,9 +10,11 @@
 
 #include "helicarm/calibration/view_problem.h"
 #include "helicarm/core/statistics.h"
+#include "helicarm/fiducials/centre_error.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/dlt.h"
 #include "helicarm/pipeline/prior.h"
+#include "helicarm/sweep/run_noise.h"
 
 namespace helicarm::sweep {
 namespace {
@@ -42,21 +44,42 @@ std::vector<Eigen::Matrix3Xd> phantom_errors(const phantom::Calibrator& calibrat
   return errors;
 }
 
-FramePoints points_of(const FrameEstimate& estimate, const std::vector<Eigen::Matrix3Xd>& errors) {
+void whiten(FramePoints& points, const Eigen::VectorXd& of_centres_px2) {
+  Eigen::MatrixXd covariance_px2 = points.map_covariance_px2;
+  covariance_px2.diagonal() += of_centres_px2 + points.ball_variance_px2;
+  points.whitening = geometry::whitening(covariance_px2).value();
+}
+
+FramePoints points_of(const FrameEstimate& estimate, const std::vector<Eigen::Matrix3Xd>& errors,
+                      double noise_factor) {
   FramePoints points;
   const auto& balls = estimate.fiducials.fiducials;
+  std::vector<double> of_centres, of_balls;
   for (std::size_t k = 0; k < balls.size(); ++k) {
     if (balls[k].status != fiducials::FiducialStatus::used) continue;
     points.points.push_back(balls[k].centre_in_calibrator);
     points.pixels.push_back(balls[k].uv);
+    points.balls.push_back(k);
+    of_centres.push_back(balls[k].sigma_px * balls[k].sigma_px);
     // Weighted as if the ball's own error were independent; what it shares is added to the covariance.
     const double px_per_mm = std::abs(estimate.alone->view.intrinsics.fy) /
                              estimate.alone->view.depth(balls[k].centre_in_calibrator);
     const Eigen::Index own = errors[k].cols() - 1;
-    const double of_ball = std::sqrt(errors[k].leftCols(own).squaredNorm() / 3) * px_per_mm;
-    points.sigma_px.push_back(std::hypot(balls[k].sigma_px, of_ball) * std::sqrt(estimate.variance_scale));
-    points.balls.push_back(k);
+    of_balls.push_back(errors[k].leftCols(own).squaredNorm() / 3 * px_per_mm * px_per_mm);
   }
+  const auto n = std::ssize(points.points);
+  const Eigen::MatrixXd& of_map = estimate.fiducials.map_covariance_px2;
+  points.map_covariance_px2 = of_map.size() > 0 ? of_map : Eigen::MatrixXd::Zero(n, n);
+  points.ball_variance_px2 = Eigen::Map<const Eigen::VectorXd>(of_balls.data(), n);
+  // The variance of a fiducial is that of the image, a floor, and the map's, all times the factor.
+  constexpr double least_px2 = 1e-6;
+  const double floor_px2 = std::pow(noise_factor * fiducials::sigma_floor_px, 2);
+  const Eigen::VectorXd without_map =
+      (Eigen::Map<const Eigen::VectorXd>(of_centres.data(), n) - points.map_covariance_px2.diagonal())
+          .cwiseMax(floor_px2);
+  points.image_variance_px2 =
+      (without_map.array() - floor_px2).max(least_px2).matrix() / (noise_factor * noise_factor);
+  whiten(points, without_map);
   return points;
 }
 
@@ -90,25 +113,52 @@ struct Joint {
   std::vector<double> angles_deg;
 };
 
+/// Weights the fiducials by the noise that their residuals about the joint cameras show.
+void weigh(Joint& joint, const Detector& detector) {
+  std::vector<std::vector<NoiseSample>> samples(joint.points.size());
+  for (std::size_t i = 0; i < joint.points.size(); ++i) {
+    const FramePoints& frame = joint.points[i];
+    const geometry::View view = view_of(joint.at[i], detector);
+    const std::vector<double> shares =
+        free_shares(frame, joint.at[i], joint.smooth.points[i].camera_covariance,
+                    joint.fit.orbit.at(joint.angles_deg[i]), detector);
+    for (std::size_t k = 0; k < frame.points.size(); ++k) {
+      const auto row = Eigen::Index(k);
+      samples[i].push_back({frame.balls[k], frame.pixels[k] - view.project(frame.points[k]),
+                            frame.image_variance_px2[row],
+                            frame.map_covariance_px2(row, row) + frame.ball_variance_px2[row], shares[k]});
+    }
+  }
+  const RunNoise noise = noise_of(samples);
+  for (std::size_t i = 0; i < joint.points.size(); ++i) {
+    const std::vector<double>& variances = noise.variance_px2[i];
+    whiten(joint.points[i], Eigen::Map<const Eigen::VectorXd>(variances.data(), std::ssize(variances)));
+  }
+}
+
 Joint joint_of(const std::vector<FrameEstimate>& estimates, const std::vector<std::size_t>& accepted,
-               const Detector& detector, const Eigen::Vector3d& centre,
-               const std::vector<Eigen::Matrix3Xd>& errors, std::optional<double> source_detector_mm) {
+               const Detector& detector, const phantom::Calibrator& calibrator,
+               const std::vector<Eigen::Matrix3Xd>& errors, std::optional<double> source_detector_mm,
+               double noise_factor) {
   std::vector<PlacedCamera> alone;
   for (const std::size_t i : accepted) alone.push_back(placed(estimates[i].alone->view, detector));
   Joint joint;
-  joint.fit = fit_orbit(alone, centre);
+  joint.fit = fit_orbit(alone, phantom::middle_of(calibrator));
   std::vector<std::size_t> by_angle(accepted.size());
   std::iota(by_angle.begin(), by_angle.end(), std::size_t(0));
   std::ranges::stable_sort(by_angle, {}, [&](std::size_t i) { return joint.fit.angles_deg[i]; });
   for (const std::size_t i : by_angle) {
     joint.frames.push_back(accepted[i]);
     joint.angles_deg.push_back(joint.fit.angles_deg[i]);
-    joint.points.push_back(points_of(estimates[accepted[i]], errors));
+    joint.points.push_back(points_of(estimates[accepted[i]], errors, noise_factor));
     joint.at.push_back(alone[i]);
   }
   joint.prior = prior_of(joint.fit.orbit, source_detector_mm);
-  constexpr int choices = 2;  // of the stiffness; it does not change once the frames are near the path
+  // Of stiffness and noise: they do not change once the frames are near the path, and weights from weights
+  // would shrink the noise by what they leave out.
+  constexpr int choices = 2;
   for (int round = 0; round < relinearisations; ++round) {
+    if (round > 0 && round < choices) weigh(joint, detector);
     joint.observations.clear();
     for (std::size_t i = 0; i < joint.at.size(); ++i)
       joint.observations.push_back(
@@ -205,14 +255,11 @@ void set_best(SweepFrame& frame, const Joint& joint, std::size_t i, const Camera
   const auto by = parameters_by_deviation(joint.at[i], reference, detector);
   best.covariance = by * covariance * by.transpose();
   const FramePoints& points = joint.points[i];
-  double squares = 0;
-  best.chi2 = 0;
-  for (std::size_t k = 0; k < points.points.size(); ++k) {
-    const double off2 = (points.pixels[k] - best.view.project(points.points[k])).squaredNorm();
-    squares += off2;
-    best.chi2 += off2 / (points.sigma_px[k] * points.sigma_px[k]);
-  }
-  best.reprojection_rms_px = std::sqrt(squares / double(points.points.size()));
+  Eigen::MatrixX2d off(points.points.size(), 2);
+  for (std::size_t k = 0; k < points.points.size(); ++k)
+    off.row(Eigen::Index(k)) = points.pixels[k] - best.view.project(points.points[k]);
+  best.chi2 = (points.whitening * off).squaredNorm();
+  best.reprojection_rms_px = std::sqrt(off.squaredNorm() / double(points.points.size()));
   const double fitted = (joint.observations[i].information * point.camera_covariance).trace();
   best.dof = int(std::lround(2 * double(points.points.size()) - fitted));
   frame.best = std::move(best);
@@ -322,7 +369,8 @@ std::optional<Failure> estimate_path(Sweep& sweep, const pipeline::Case& base,
       for (SweepFrame& frame : sweep.frames) frame.best.reset();
       return contradiction(sweep, accepted.size(), estimated);
     }
-    const Joint joint = joint_of(estimates, accepted, sweep.detector, centre, errors, distance);
+    const Joint joint =
+        joint_of(estimates, accepted, sweep.detector, base.calibrator, errors, distance, sweep.noise_factor);
     const bool moved_here = refuse_moved(sweep, joint);
     moved = moved || moved_here;
     if (moved_here || refuse_off_path(sweep, joint)) continue;

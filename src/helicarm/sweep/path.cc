@@ -52,6 +52,33 @@ Vector3d normal_of_sources(const std::vector<PlacedCamera>& cameras, const Vecto
   return geometry::symmetric_eigen(spread).vectors.col(0);
 }
 
+/// Where the axis of the turn passes: cameras that turn about it, as their orientations say, fit sources and
+/// detectors best. Across the rays both are known well, along them hardly. `near`: on the axis, roughly.
+Vector3d centre_of_turn(const std::vector<PlacedCamera>& cameras, const Vector3d& axis,
+                        const Vector3d& near) {
+  constexpr double across_mm = 0.1, along_mm = 2, near_mm = 300;
+  const Vector3d weights(1 / across_mm, 1 / across_mm, 1 / along_mm);
+  // Unknown: the centre's shift, and source and detector at the first angle, from `near`.
+  Eigen::Matrix<double, 9, 9> information = Eigen::Matrix<double, 9, 9>::Zero();
+  Eigen::Matrix<double, 9, 1> gradient = Eigen::Matrix<double, 9, 1>::Zero();
+  information.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() / (near_mm * near_mm);
+  for (const PlacedCamera& camera : cameras) {
+    const double angle =
+        axis.dot(geometry::vector_from_rotation(camera.rotation.transpose() * cameras.front().rotation));
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+    const Eigen::Matrix3d weighted = weights.asDiagonal() * camera.rotation;
+    for (const bool is_source : {true, false}) {
+      Eigen::Matrix<double, 3, 9> by = Eigen::Matrix<double, 3, 9>::Zero();
+      by.leftCols<3>() = weighted * (Eigen::Matrix3d::Identity() - turn);
+      by.middleCols<3>(is_source ? 3 : 6) = weighted * turn;
+      information += by.transpose() * by;
+      gradient += by.transpose() * (weighted * ((is_source ? camera.source : camera.detector) - near));
+    }
+  }
+  const Vector3d shift = information.ldlt().solve(gradient).head<3>();
+  return near + shift - axis * axis.dot(shift);
+}
+
 /// The mean of the cameras turned back to the angle 0.
 PlacedCamera mean_camera(const std::vector<PlacedCamera>& cameras, const std::vector<double>& angles_deg,
                          const Orbit& orbit) {
@@ -67,6 +94,20 @@ PlacedCamera mean_camera(const std::vector<PlacedCamera>& cameras, const std::ve
   }
   mean.rotation = geometry::nearest_rotation(mean.rotation);
   return mean;
+}
+
+/// All u, then all v, of 2-vectors of the points, along axes of unit variance. `of_point`: 2 x m of point i.
+template <class OfPoint>
+Eigen::MatrixXd whitened(const FramePoints& frame, Eigen::Index columns, const OfPoint& of_point) {
+  const auto n = Eigen::Index(frame.points.size());
+  Eigen::MatrixXd u(n, columns), v(n, columns), both(2 * n, columns);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Matrix2Xd of = of_point(std::size_t(i));
+    u.row(i) = of.row(0);
+    v.row(i) = of.row(1);
+  }
+  both << frame.whitening * u, frame.whitening * v;
+  return both;
 }
 
 }  // namespace
@@ -102,12 +143,14 @@ OrbitFit fit_orbit(const std::vector<PlacedCamera>& cameras, const Vector3d& cen
                  direction(camera, centre).dot(direction(cameras[cameras.size() / 2], centre)), -1.0, 1.0)));
   const bool turns = turn > least_share * arc;
   const Vector3d axis = turns ? turn_axis : normal_of_sources(cameras, centre);
-  const Vector3d across =
-      (direction(cameras.front(), centre) - axis * axis.dot(direction(cameras.front(), centre))).normalized();
+  fit.orbit.centre = turns ? centre_of_turn(cameras, axis, centre) : centre;
+  const Vector3d across = (direction(cameras.front(), fit.orbit.centre) -
+                           axis * axis.dot(direction(cameras.front(), fit.orbit.centre)))
+                              .normalized();
   const Vector3d along = axis.cross(across);
   double earlier = 0;
   for (const PlacedCamera& camera : cameras) {
-    const Vector3d ray = direction(camera, centre);
+    const Vector3d ray = direction(camera, fit.orbit.centre);
     double angle = std::atan2(ray.dot(along), ray.dot(across)) / radian;
     angle += 360 * std::round((earlier - angle) / 360);
     fit.angles_deg.push_back(earlier = angle);
@@ -157,14 +200,14 @@ PathObservation observation_of(const FramePoints& frame, const PlacedCamera& at,
   const auto by_deviation = parameters_by_deviation(at, reference, detector);
   PathObservation made;
   made.angle_deg = angle_deg;
-  made.information.setZero();
-  CameraVector gradient = CameraVector::Zero();
-  for (std::size_t i = 0; i < frame.points.size(); ++i) {
-    const Eigen::Matrix<double, 2, camera_size> by =
-        calibration::pixel_by_parameters(view, frame.points[i]) * by_deviation / frame.sigma_px[i];
-    made.information += by.transpose() * by;
-    gradient += by.transpose() * (frame.pixels[i] - view.project(frame.points[i])) / frame.sigma_px[i];
-  }
+  const Eigen::MatrixXd by = whitened(frame, camera_size, [&](std::size_t i) -> Eigen::Matrix2Xd {
+    return calibration::pixel_by_parameters(view, frame.points[i]) * by_deviation;
+  });
+  const Eigen::VectorXd off = whitened(frame, 1, [&](std::size_t i) -> Eigen::Matrix2Xd {
+    return frame.pixels[i] - view.project(frame.points[i]);
+  });
+  made.information = by.transpose() * by;
+  const CameraVector gradient = by.transpose() * off;
   const CameraVector root = made.information.diagonal().cwiseSqrt().cwiseInverse();
   const CameraMatrix unit = root.asDiagonal() * made.information * root.asDiagonal();
   made.value =
@@ -183,21 +226,37 @@ PathObservation observation_of(const FramePoints& frame, const PlacedCamera& at,
   return made;
 }
 
+std::vector<double> free_shares(const FramePoints& frame, const PlacedCamera& at,
+                                const CameraMatrix& covariance, const PlacedCamera& reference,
+                                const Detector& detector) {
+  constexpr double least = 0.1;
+  const geometry::View view = view_of(at, detector);
+  const auto by_deviation = parameters_by_deviation(at, reference, detector);
+  const Eigen::MatrixXd by = whitened(frame, camera_size, [&](std::size_t i) -> Eigen::Matrix2Xd {
+    return calibration::pixel_by_parameters(view, frame.points[i]) * by_deviation;
+  });
+  const auto n = Eigen::Index(frame.points.size());
+  const auto taken = [&](Eigen::Index row) { return by.row(row).dot(by.row(row) * covariance); };
+  std::vector<double> shares;
+  for (Eigen::Index i = 0; i < n; ++i) shares.push_back(std::max(least, 1 - (taken(i) + taken(n + i)) / 2));
+  return shares;
+}
+
 Eigen::MatrixXd value_by_phantom(const FramePoints& frame, const PlacedCamera& at,
                                  const PathObservation& observation, const PlacedCamera& reference,
                                  const Detector& detector, const std::vector<Eigen::Matrix3Xd>& roots) {
   const geometry::View view = view_of(at, detector);
   const auto by_deviation = parameters_by_deviation(at, reference, detector);
-  Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(camera_size, roots.front().cols());
-  for (std::size_t i = 0; i < frame.points.size(); ++i) {
-    const Eigen::Matrix<double, 2, calibration::view_parameters> by_parameters =
-        calibration::pixel_by_parameters(view, frame.points[i]);
-    // A shift of the point acts as the opposite shift of the translation, turned into the camera.
-    const Eigen::Matrix<double, 2, 3> by_point =
-        by_parameters.middleCols<3>(7) * view.camera_from_world.rotation;
-    gradient -= (by_parameters * by_deviation).transpose() * by_point * roots[frame.balls[i]] /
-                (frame.sigma_px[i] * frame.sigma_px[i]);
-  }
+  const Eigen::MatrixXd by = whitened(frame, camera_size, [&](std::size_t i) -> Eigen::Matrix2Xd {
+    return calibration::pixel_by_parameters(view, frame.points[i]) * by_deviation;
+  });
+  const Eigen::MatrixXd by_roots =
+      whitened(frame, roots.front().cols(), [&](std::size_t i) -> Eigen::Matrix2Xd {
+        // A shift of the point acts as the opposite shift of the translation, turned into the camera.
+        return calibration::pixel_by_parameters(view, frame.points[i]).middleCols<3>(7) *
+               view.camera_from_world.rotation * roots[frame.balls[i]];
+      });
+  const Eigen::MatrixXd gradient = -by.transpose() * by_roots;
   const CameraVector root = observation.information.diagonal().cwiseSqrt().cwiseInverse();
   const CameraMatrix unit = root.asDiagonal() * observation.information * root.asDiagonal();
   return root.asDiagonal() * unit.ldlt().solve(root.asDiagonal() * gradient);

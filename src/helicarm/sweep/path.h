@@ -32,14 +32,15 @@ geometry::View view_of(const PlacedCamera& camera, const Detector& detector);
 /// The reference that the path deviates from: a camera that turns about an axis; or one that rests.
 struct Orbit {
   std::optional<Eigen::Vector3d> axis;  ///< unit vector; nothing: the camera does not turn
-  Eigen::Vector3d centre;               ///< of the fiducials, mm: on the axis of the reference
+  Eigen::Vector3d centre;               ///< on the axis, mm
   PlacedCamera first;                   ///< at the angle 0
 
   PlacedCamera at(double angle_deg) const;
 };
 
 /// The orbit of these cameras, and each one's angle: of its source about the centre, unwrapped in the order
-/// given; the first's is 0. Without a turn the angle is that of the source in its mean plane.
+/// given; the first's is 0. Without a turn the angle is that of the source in its mean plane about `centre`;
+/// with one, the axis passes where the cameras' turn shows it, and `centre` is a start.
 struct OrbitFit {
   Orbit orbit;
   std::vector<double> angles_deg;
@@ -57,13 +58,22 @@ Eigen::Matrix<double, calibration::view_parameters, camera_size> parameters_by_d
 struct FramePoints {
   std::vector<Eigen::Vector3d> points;  ///< mm, calibrator frame
   std::vector<Eigen::Vector2d> pixels;  ///< rectified
-  std::vector<double> sigma_px;         ///< per axis, of image and map, with the run's common factor
   std::vector<std::size_t> balls;       ///< index of each in the calibrator
+  Eigen::VectorXd image_variance_px2;   ///< of each pixel along each axis, as the detection states it
+  Eigen::VectorXd ball_variance_px2;    ///< by the ball's own error, as if it were independent
+  Eigen::MatrixXd map_covariance_px2;   ///< n x n, the same along each axis
+  Eigen::MatrixXd whitening;            ///< L^-1 of the pixels' covariance
 };
 
 /// The frame's information on its camera, linearised there.
 PathObservation observation_of(const FramePoints& frame, const PlacedCamera& at, double angle_deg,
                                const Orbit& orbit, const Detector& detector);
+
+/// Of each pixel, the share of its variance that a camera with this covariance, fitted to it, leaves in the
+/// residual.
+std::vector<double> free_shares(const FramePoints& frame, const PlacedCamera& at,
+                                const CameraMatrix& covariance, const PlacedCamera& reference,
+                                const Detector& detector);
 
 /// Change of the frame's value by independent unit errors of the phantom (`roots`: of each ball, mm).
 Eigen::MatrixXd value_by_phantom(const FramePoints& frame, const PlacedCamera& at,

@@ -44,6 +44,16 @@ TEST(Orbit, FollowsCamerasThatTurn) {
     EXPECT_LT((fit.orbit.at(fit.angles_deg[i]).source - cameras[i].source).norm(), 3);
 }
 
+TEST(Orbit, PassesWhereTheCamerasTurnWhereverThePhantomIs) {
+  const DrawnRun run;
+  std::vector<PlacedCamera> cameras;
+  for (int i = 0; i < 40; ++i) cameras.push_back(placed(run.view(i), detector));
+  const OrbitFit fit = fit_orbit(cameras, {60, -45, 20});
+  EXPECT_LT((fit.orbit.centre - fit.orbit.axis->dot(fit.orbit.centre) * *fit.orbit.axis).norm(), 3);
+  for (std::size_t i = 0; i < cameras.size(); ++i)
+    EXPECT_LT((fit.orbit.at(fit.angles_deg[i]).source - cameras[i].source).norm(), 3);
+}
+
 TEST(Orbit, RestsWhereOnlyTheSourceMoves) {
   std::vector<PlacedCamera> cameras;
   for (int i = 0; i < 20; ++i) {
@@ -86,9 +96,10 @@ TEST(PathObservation, ExactPointsGiveTheCameraThatTookThem) {
   for (const Eigen::Vector3d& ball : DrawnRun::balls()) {
     points.points.push_back(ball);
     points.pixels.push_back(truth.project(ball));
-    points.sigma_px.push_back(0.02);
     points.balls.push_back(points.balls.size());
   }
+  const auto n = Eigen::Index(points.points.size());
+  points.whitening = Eigen::MatrixXd::Identity(n, n) / 0.02;
   const Orbit orbit{Eigen::Vector3d::UnitZ(), Eigen::Vector3d::Zero(), placed(DrawnRun{}.view(0), detector)};
   PlacedCamera at = placed(truth, detector);
   at.source += Eigen::Vector3d(0.5, -0.3, 0.2);

@@ -141,15 +141,23 @@ double log_likelihood(const std::vector<PathObservation>& frames, const PathPrio
   return problem.log_determinant - chi2 / 2;
 }
 
-/// Logarithms of bend and jitter, and what is known of them: flex of some mm over a turn (Daly et al. 2008,
-/// Fahrig and Holdsworth 2000), jitter of 0.02 to 0.25 mm.
+/// Logarithms of bend, of the source's jitter, of the detector's over the source's and of the rotation's, and
+/// what is known of them: flex of some mm over a turn (Daly et al. 2008, Fahrig and Holdsworth 2000), jitter
+/// of 0.02 to 0.25 mm, alike at both ends of one arm: along most directions the images show their sum alone.
 using LogStiffness = Eigen::Matrix<double, 6, 1>;
-const LogStiffness typical{std::log(4e-3), std::log(8e-3), std::log(3e-5),
-                           std::log(0.05), std::log(0.05), std::log(1e-4)};
-const LogStiffness spread{2, 2, 2, 1.5, 1.5, 1.5};
+const LogStiffness typical{std::log(4e-3), std::log(8e-3), std::log(3e-5), std::log(0.05), 0, std::log(1e-4)};
+const LogStiffness spread{2, 2, 2, 1.5, 0.5, 1.5};
 
 Stiffness stiffness_of(const LogStiffness& logs) {
-  return {logs.head<3>().array().exp(), logs.tail<3>().array().exp()};
+  const double of_source = std::exp(logs[3]);
+  return {logs.head<3>().array().exp(), {of_source, of_source * std::exp(logs[4]), std::exp(logs[5])}};
+}
+
+LogStiffness logs_of(const Stiffness& stiffness) {
+  LogStiffness logs;
+  logs << stiffness.bend.array().log(), stiffness.jitter.array().log();
+  logs[4] -= logs[3];
+  return logs;
 }
 
 double posterior_of(const std::vector<PathObservation>& frames, const PathPrior& prior,
@@ -168,7 +176,7 @@ Stiffness choose_stiffness(const std::vector<PathObservation>& frames, const Pat
   // Coordinate search with steps that grow where they gain and shrink where they do not.
   LogStiffness at = typical, step = LogStiffness::Constant(1);
   if (start) {
-    at << start->bend.array().log(), start->jitter.array().log();
+    at = logs_of(*start);
     step.setConstant(0.5);
   }
   double best = posterior_of(frames, prior, at);
@@ -266,12 +274,6 @@ std::optional<PhantomStep> best_step(const std::vector<PathObservation>& frames,
     if (std::isfinite(chi2) && (!best || chi2 > best->chi2)) best = PhantomStep{first, motion, chi2};
   }
   return best;
-}
-
-LogStiffness logs_of(const Stiffness& stiffness) {
-  LogStiffness logs;
-  logs << stiffness.bend.array().log(), stiffness.jitter.array().log();
-  return logs;
 }
 
 }  // namespace
