@@ -63,6 +63,7 @@ void estimate_from(FrameEstimate& estimate, const Frame& frame, xray::XrayImage 
   const auto& map = rectified.front().rectification.map;
   if (map.rectified_plane == rectification::RectifiedPlane::detector || map.is_identity())
     estimate.pixel_mm = map.rectified_pixel_mm;
+  if (!map.is_identity()) estimate.map = map;
   const pipeline::LabelledView labelled =
       expected ? labelled_near(std::move(rectified.front()), *expected, one, options)
                : passed(pipeline::label_views(std::move(rectified), one, options)).front();

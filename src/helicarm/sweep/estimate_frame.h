@@ -7,6 +7,7 @@
 
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/pipeline/result.h"
+#include "helicarm/rectification/distortion_map.h"
 #include "helicarm/sweep/sweep_case.h"
 #include "helicarm/xray/image_file.h"
 
@@ -20,6 +21,7 @@ struct FrameEstimate {
   std::optional<double> primary_angle_deg, secondary_angle_deg;  ///< as the file states
   std::optional<double> source_detector_mm;                      ///< likewise
   std::string image;                                             ///< digest of the pixels
+  std::optional<rectification::DistortionMap> map;               ///< of a plate in the image
   calibration::ViewFiducials fiducials;  ///< labelled by the evidence of this image; outliers are `rejected`
   std::optional<calibration::CalibratedView> alone;
   double variance_scale = 1;  ///< of the residuals over the noise model, where inconsistent

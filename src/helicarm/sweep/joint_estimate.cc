@@ -230,19 +230,73 @@ std::vector<std::size_t> accepted_in(const Sweep& sweep) {
   return accepted;
 }
 
-/// The covariance of each camera, with what all frames share: the phantom's errors.
+/// The error of a plate's map between its dots is the same in all images of a run: the pixels of frames as
+/// unit errors of its modes over the field.
+class SharedMap {
+ public:
+  SharedMap(const rectification::DistortionMap& map, double noise_factor) : map_(map), factor_(noise_factor) {
+    constexpr int side = 9;
+    for (int row = 0; row < side; ++row)
+      for (int column = 0; column < side; ++column) {
+        const Eigen::Vector2d share((column + 0.5) / side, (row + 0.5) / side);
+        const Eigen::Vector2d place = map.hull_low + share.cwiseProduct(map.hull_high - map.hull_low);
+        if (rectification::raw_in_image(map, place)) grid_.push_back(place);
+      }
+    constexpr double least_share = 1e-3;
+    const auto [values, vectors] = geometry::symmetric_eigen(map.covariance_px2(grid_));
+    const auto n = values.size();
+    const auto kept = (values.array() > least_share * values[n - 1]).count();
+    modes_ = vectors.rightCols(kept) * values.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+  }
+
+  /// Pixels x modes.
+  Eigen::MatrixXd errors_at(const std::vector<Eigen::Vector2d>& pixels) const {
+    std::vector<Eigen::Vector2d> places = pixels;
+    places.insert(places.end(), grid_.begin(), grid_.end());
+    const auto n = std::ssize(pixels), grid = std::ssize(grid_);
+    return factor_ * map_.covariance_px2(places).topRightCorner(n, grid) * modes_;
+  }
+
+ private:
+  const rectification::DistortionMap& map_;
+  double factor_;
+  std::vector<Eigen::Vector2d> grid_;
+  Eigen::MatrixXd modes_;
+};
+
+/// The covariance of each camera, with what all frames share: errors of the phantom and of a plate's map.
 std::vector<CameraMatrix> covariances_of(const Joint& joint, const Detector& detector,
-                                         const std::vector<Eigen::Matrix3Xd>& errors) {
+                                         const std::vector<Eigen::Matrix3Xd>& errors,
+                                         const std::optional<SharedMap>& map) {
   std::vector<CameraMatrix> covariances;
   for (const PathPoint& point : joint.smooth.points) covariances.push_back(point.camera_covariance);
-  if (std::ranges::all_of(errors, [](const auto& error) { return error.isZero(0); })) return covariances;
-  std::vector<Eigen::MatrixXd> values;
-  for (std::size_t i = 0; i < joint.at.size(); ++i)
-    values.push_back(value_by_phantom(joint.points[i], joint.at[i], joint.observations[i],
-                                      joint.fit.orbit.at(joint.angles_deg[i]), detector, errors));
-  const auto shared = response(joint.observations, joint.prior, joint.smooth.stiffness, values);
-  for (std::size_t i = 0; i < covariances.size(); ++i) covariances[i] += shared[i] * shared[i].transpose();
+  const auto add = [&](auto value_of) {
+    std::vector<Eigen::MatrixXd> values;
+    for (std::size_t i = 0; i < joint.at.size(); ++i)
+      values.push_back(value_of(i, joint.fit.orbit.at(joint.angles_deg[i])));
+    const auto shared = response(joint.observations, joint.prior, joint.smooth.stiffness, values);
+    for (std::size_t i = 0; i < covariances.size(); ++i) covariances[i] += shared[i] * shared[i].transpose();
+  };
+  if (!std::ranges::all_of(errors, [](const auto& error) { return error.isZero(0); }))
+    add([&](std::size_t i, const PlacedCamera& reference) {
+      return value_by_phantom(joint.points[i], joint.at[i], joint.observations[i], reference, detector,
+                              errors);
+    });
+  if (map)
+    add([&](std::size_t i, const PlacedCamera& reference) {
+      return value_by_pixels(joint.points[i], joint.at[i], joint.observations[i], reference, detector,
+                             map->errors_at(joint.points[i].pixels));
+    });
   return covariances;
+}
+
+/// Of the frame in the middle of those that have one.
+std::optional<SharedMap> shared_map_of(const std::vector<FrameEstimate>& estimates, double noise_factor) {
+  std::vector<const rectification::DistortionMap*> maps;
+  for (const FrameEstimate& estimate : estimates)
+    if (!estimate.failure && estimate.map) maps.push_back(&*estimate.map);
+  if (maps.empty()) return {};
+  return SharedMap(*maps[maps.size() / 2], noise_factor);
 }
 
 void set_best(SweepFrame& frame, const Joint& joint, std::size_t i, const CameraMatrix& covariance,
@@ -374,7 +428,8 @@ std::optional<Failure> estimate_path(Sweep& sweep, const pipeline::Case& base,
     const bool moved_here = refuse_moved(sweep, joint);
     moved = moved || moved_here;
     if (moved_here || refuse_off_path(sweep, joint)) continue;
-    const auto covariances = covariances_of(joint, sweep.detector, errors);
+    const auto covariances =
+        covariances_of(joint, sweep.detector, errors, shared_map_of(estimates, sweep.noise_factor));
     for (std::size_t i = 0; i < joint.frames.size(); ++i)
       set_best(sweep.frames[joint.frames[i]], joint, i, covariances[i], sweep.detector);
     SweepPath path;

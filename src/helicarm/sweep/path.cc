@@ -110,6 +110,23 @@ Eigen::MatrixXd whitened(const FramePoints& frame, Eigen::Index columns, const O
   return both;
 }
 
+/// Change of the frame's value by errors of its pixels, 2 x `columns` of each.
+template <class Errors>
+Eigen::MatrixXd value_by_errors(const FramePoints& frame, const PlacedCamera& at,
+                                const PathObservation& observation, const PlacedCamera& reference,
+                                const Detector& detector, Eigen::Index columns, const Errors& errors) {
+  const geometry::View view = view_of(at, detector);
+  const auto by_deviation = parameters_by_deviation(at, reference, detector);
+  const Eigen::MatrixXd by = whitened(frame, camera_size, [&](std::size_t i) -> Eigen::Matrix2Xd {
+    return calibration::pixel_by_parameters(view, frame.points[i]) * by_deviation;
+  });
+  const Eigen::MatrixXd gradient =
+      by.transpose() * whitened(frame, columns, [&](std::size_t i) { return errors(view, i); });
+  const CameraVector root = observation.information.diagonal().cwiseSqrt().cwiseInverse();
+  const CameraMatrix unit = root.asDiagonal() * observation.information * root.asDiagonal();
+  return root.asDiagonal() * unit.ldlt().solve(root.asDiagonal() * gradient);
+}
+
 }  // namespace
 
 PlacedCamera placed(const geometry::View& view, const Detector& detector) {
@@ -242,24 +259,27 @@ std::vector<double> free_shares(const FramePoints& frame, const PlacedCamera& at
   return shares;
 }
 
+Eigen::MatrixXd value_by_pixels(const FramePoints& frame, const PlacedCamera& at,
+                                const PathObservation& observation, const PlacedCamera& reference,
+                                const Detector& detector, const Eigen::MatrixXd& roots) {
+  return value_by_errors(frame, at, observation, reference, detector, 2 * roots.cols(),
+                         [&](const auto&, std::size_t i) {
+                           Eigen::Matrix2Xd errors = Eigen::Matrix2Xd::Zero(2, 2 * roots.cols());
+                           errors.row(0).head(roots.cols()) = roots.row(Eigen::Index(i));
+                           errors.row(1).tail(roots.cols()) = roots.row(Eigen::Index(i));
+                           return errors;
+                         });
+}
+
 Eigen::MatrixXd value_by_phantom(const FramePoints& frame, const PlacedCamera& at,
                                  const PathObservation& observation, const PlacedCamera& reference,
                                  const Detector& detector, const std::vector<Eigen::Matrix3Xd>& roots) {
-  const geometry::View view = view_of(at, detector);
-  const auto by_deviation = parameters_by_deviation(at, reference, detector);
-  const Eigen::MatrixXd by = whitened(frame, camera_size, [&](std::size_t i) -> Eigen::Matrix2Xd {
-    return calibration::pixel_by_parameters(view, frame.points[i]) * by_deviation;
-  });
-  const Eigen::MatrixXd by_roots =
-      whitened(frame, roots.front().cols(), [&](std::size_t i) -> Eigen::Matrix2Xd {
-        // A shift of the point acts as the opposite shift of the translation, turned into the camera.
-        return calibration::pixel_by_parameters(view, frame.points[i]).middleCols<3>(7) *
-               view.camera_from_world.rotation * roots[frame.balls[i]];
-      });
-  const Eigen::MatrixXd gradient = -by.transpose() * by_roots;
-  const CameraVector root = observation.information.diagonal().cwiseSqrt().cwiseInverse();
-  const CameraMatrix unit = root.asDiagonal() * observation.information * root.asDiagonal();
-  return root.asDiagonal() * unit.ldlt().solve(root.asDiagonal() * gradient);
+  return value_by_errors(frame, at, observation, reference, detector, roots.front().cols(),
+                         [&](const geometry::View& view, std::size_t i) -> Eigen::Matrix2Xd {
+                           // A shift of the point acts as the opposite shift of its pixel.
+                           return -(calibration::pixel_by_parameters(view, frame.points[i]).middleCols<3>(7) *
+                                    view.camera_from_world.rotation * roots[frame.balls[i]]);
+                         });
 }
 
 }  // namespace helicarm::sweep

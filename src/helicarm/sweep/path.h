@@ -75,6 +75,12 @@ std::vector<double> free_shares(const FramePoints& frame, const PlacedCamera& at
                                 const CameraMatrix& covariance, const PlacedCamera& reference,
                                 const Detector& detector);
 
+/// Change of the frame's value by errors of its pixels: of each pixel, a row of unit errors along u, and the
+/// same along v.
+Eigen::MatrixXd value_by_pixels(const FramePoints& frame, const PlacedCamera& at,
+                                const PathObservation& observation, const PlacedCamera& reference,
+                                const Detector& detector, const Eigen::MatrixXd& roots);
+
 /// Change of the frame's value by independent unit errors of the phantom (`roots`: of each ball, mm).
 Eigen::MatrixXd value_by_phantom(const FramePoints& frame, const PlacedCamera& at,
                                  const PathObservation& observation, const PlacedCamera& reference,
