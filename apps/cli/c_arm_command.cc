@@ -7,7 +7,6 @@
 
 #include "command_line.h"
 #include "findings.h"
-#include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/pipeline/c_arm.h"
 #include "helicarm/report/c_arm_report.h"
 
@@ -41,7 +40,7 @@ CommandResult c_arm_add_command(const CArmAddArguments& arguments, Console& cons
     Json added = Json::array();
     for (const std::filesystem::path& folder : arguments.cases) {
       const auto growth =
-          value_or_throw(calibration::add_to_history(arguments.record, acquisitions_of(folder, console)));
+          value_or_throw(pipeline::add_to_record(arguments.record, acquisitions_of(folder, console)));
       added.push_back({{"case", folder.string()}, {"earlier", growth.earlier}, {"added", growth.added}});
       if (!console.json)
         console.out << fmt::format("{}: {} acquisitions added to {}\n", folder.string(), growth.added,
@@ -102,7 +101,7 @@ void add_c_arm(CLI::App& app, Action& action) {
                   "check ends with exit code 3 and c_arm_changed "
                   "where a case lies beyond\n"
                   "what the record predicts for its positions (99.9 %) and beyond the record's "
-                  "\"tolerances\".");
+                  "\"tolerances\"; `add` refuses\nsuch a case: after a service begin a new record.");
   command->require_subcommand(1);
   auto* add =
       command->add_subcommand("add", "Add the acquisitions of cases, results and runs of images, each once");

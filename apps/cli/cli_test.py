@@ -54,6 +54,13 @@ class CommandLine(SimulatedCase):
         done = run("c-arm", "check", record, self.root / "case", "--json")
         self.assertEqual(done.returncode, 3, done.stderr)
         self.assertEqual(json.loads(done.stdout)["failure"]["code"], "c_arm_changed")
+        text = record.read_text()
+        done = run("c-arm", "add", record, self.root / "case", "--json")
+        self.assertEqual((done.returncode, json.loads(done.stdout)["failure"]["code"]), (3, "c_arm_changed"))
+        done = run("run", self.root / "case", "--machine", record, "--out", self.root / "measured", "--no-report", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("c_arm_changed", [warning["code"] for warning in json.loads(done.stdout)["warnings"]])
+        self.assertEqual(record.read_text(), text)
         moved["tolerances"] = {"focal_mm": 100, "principal_mm": 100}
         record.write_text(json.dumps(moved))
         self.assertEqual(run("c-arm", "check", record, self.root / "case").returncode, 0)

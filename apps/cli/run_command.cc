@@ -7,6 +7,7 @@
 
 #include "findings.h"
 #include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/pipeline/c_arm.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/map_cache.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -22,7 +23,7 @@ using case_registration::Measurement;
 /// Adds each image once; nothing if the residuals are inconsistent with the noise model.
 Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pipeline::Result& result,
                                     Console& console) {
-  const auto growth = calibration::add_to_history(path, result.calibration->entries);
+  const auto growth = pipeline::add_to_record(path, result);
   if (!growth) return tl::unexpected<Failure>(growth.error());
   if (!console.quiet)
     console.progress << (result.calibration->variance_scale > 1

@@ -22,6 +22,17 @@ py::object check_c_arm(const std::filesystem::path& record, const std::filesyste
   return answer;
 }
 
+std::size_t add_to_c_arm(const std::filesystem::path& record, const std::filesystem::path& folder,
+                         unsigned threads) {
+  return value_or_raise(without_gil([&] {
+    return guarded([&] {
+      value_or_throw(calibration::check_history_file(record));
+      const auto acquired = value_or_throw(pipeline::c_arm_acquisitions(folder, threads)).entries;
+      return value_or_throw(pipeline::add_to_record(record, acquired)).added;
+    });
+  }));
+}
+
 py::object c_arm_report(const std::filesystem::path& record,
                         const std::optional<std::filesystem::path>& out) {
   const calibration::CArmModel model =
@@ -43,6 +54,13 @@ void add_c_arm(py::module_& module) {
 record: the file of run_case's history. folder: holds case.json; or a result.json or sweep.json. Returns chi2 of all acquisitions, its 99.9 % limit, and for
 each acquisition estimate_mm, predicted_mm, sigma_mm (source distance, principal point) and chi2. Raises InputError;
 RefusedError, with c_arm_changed and the same figures in .result where the C-arm has changed.)");
+  module.def(
+      "add_to_c_arm", &add_to_c_arm, py::arg("record"), py::arg("folder"), py::kw_only(),
+      py::arg("threads") = 0u,
+      R"(Adds the acquisitions of a case to a C-arm's record, each once, as `helicarm c-arm add` does; returns how many.
+
+record: a file, made where there is none. folder: holds case.json; or a result.json or sweep.json. Raises InputError;
+RefusedError, with c_arm_changed where they lie beyond what the record predicts: nothing is added.)");
   module.def(
       "c_arm_report", &c_arm_report, py::arg("record"), py::kw_only(), py::arg("out") = py::none(),
       R"(Sag and repeatability of a C-arm by its record, and each acquisition beside the prediction by all others.

@@ -7,6 +7,7 @@
 #include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/case_registration/measure_case.h"
 #include "helicarm/core/files.h"
+#include "helicarm/pipeline/c_arm.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/report/rectified_image.h"
@@ -45,7 +46,7 @@ case_registration::Measurement run(const std::filesystem::path& folder, const st
     });
   }));
   if (measured.result.failure) raise(*measured.result.failure, py::cast(measured));
-  if (history) value_or_raise(calibration::add_to_history(*history, measured.result.calibration->entries));
+  if (history) value_or_raise(pipeline::add_to_record(*history, measured.result));
   return measured;
 }
 

@@ -23,7 +23,7 @@ void add_measures(py::module_& module);
 void add_cases(py::module_& module);
 /// register, register_sequence.
 void add_registration(py::module_& module);
-/// check_c_arm, c_arm_report.
+/// add_to_c_arm, check_c_arm, c_arm_report.
 void add_c_arm(py::module_& module);
 /// Volume, read_volume, drr.
 void add_volume(py::module_& module);

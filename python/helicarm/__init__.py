@@ -8,7 +8,7 @@ Failures are InputError and RefusedError.
 from ._helicarm import (  # noqa: F401
     CArmPrior, Calibration, Calibrator, Camera, DistortionMap, IntrinsicsPrior, LocatedPoint, MeasuredPhantom, Plate,
     Rectification, Result, ResultPoint, Surface, Sweep, Track, ViewPoints, Volume, XrayImage, __version__, bundle,
-    c_arm_report, calibrate, check_c_arm, detect, import_camera, import_transform, label, measure, measure_phantom, new_case,
+    add_to_c_arm, c_arm_report, calibrate, check_c_arm, detect, import_camera, import_transform, label, measure, measure_phantom, new_case,
     read_image, read_surface, read_volume, rectify, run_case, schema, segment, simulate_case, verify_phantom)
 from .arrays import as_camera, as_image, as_surface, as_volume  # noqa: F401
 from .cameras import solve  # noqa: F401
@@ -23,7 +23,7 @@ __all__ = [
     "CArmPrior", "Calibration", "Calibrator", "Camera", "DistortionMap", "HelicarmError", "InputError", "IntrinsicsPrior",
     "LocatedPoint", "MeasuredPhantom", "Plate", "Record", "Rectification", "RefusedError", "Result", "ResultPoint", "Session",
     "Surface", "Sweep", "Track", "ViewPoints", "Volume", "XrayImage", "as_camera", "as_image", "as_surface", "as_volume",
-    "bundle", "c_arm_report", "calibrate", "check_c_arm", "detect", "drr", "figures", "import_camera", "import_transform",
+    "add_to_c_arm", "bundle", "c_arm_report", "calibrate", "check_c_arm", "detect", "drr", "figures", "import_camera", "import_transform",
     "label", "measure", "measure_phantom", "migration", "new_case", "read_image", "read_surface", "read_volume", "rectify",
     "register", "register_sequence", "run_case", "schema", "segment", "simulate_case", "solve", "sweep", "track", "verify_phantom"]
 

@@ -231,6 +231,10 @@ def test_c_arm_that_has_changed_is_refused(case, tmp_path):
         helicarm.check_c_arm(moved, case[0])
     assert error.value.code == "c_arm_changed"
     assert error.value.result["chi2"] > error.value.result["limit"]
+    with pytest.raises(helicarm.RefusedError):
+        helicarm.add_to_c_arm(moved, case[0])
+    assert helicarm.add_to_c_arm(record, case[0]) == 2
+    assert helicarm.add_to_c_arm(record, case[0]) == 0
 
 
 def test_motion_enlarges_the_covariance(tmp_path):

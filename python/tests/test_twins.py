@@ -28,7 +28,7 @@ TWINS = {
     "import": ["import_camera", "import_transform"],
     "export": ["Result.export"],
     "sweep": ["sweep"],
-    "c-arm": ["check_c_arm", "c_arm_report", "run_case"],
+    "c-arm": ["add_to_c_arm", "check_c_arm", "c_arm_report", "run_case"],
     "phantom": ["Calibrator", "measure_phantom", "verify_phantom"],
     "register": ["register", "register_sequence"],
     "segment": ["segment"],

@@ -167,6 +167,19 @@ IntrinsicsPrediction predict_intrinsics(const CArmModel& model, std::span<const 
   return predicted;
 }
 
+namespace {
+
+/// Of a change, the acquisitions that are significant alone; none is: the one that says most.
+void mark_those_that_tell(CArmCheck& check) {
+  if (!check.changed) return;
+  const auto worst = std::ranges::max_element(
+      check.acquisitions, {}, [](const AcquisitionCheck& one) { return one.is_changed ? one.chi2 : -1; });
+  const double limit = std::min(worst->chi2, chi2_quantile(3, normal_at_999));
+  for (AcquisitionCheck& one : check.acquisitions) one.is_changed &= one.chi2 >= limit;
+}
+
+}  // namespace
+
 CArmCheck check_c_arm(const CArmModel& model, std::span<const HistoryEntry> acquired,
                       const CArmTolerances& tolerances) {
   CArmCheck check;
@@ -186,6 +199,7 @@ CArmCheck check_c_arm(const CArmModel& model, std::span<const HistoryEntry> acqu
     one.is_changed = check.chi2 > check.limit && is_beyond(one, tolerances);
     check.changed |= one.is_changed;
   }
+  mark_those_that_tell(check);
   return check;
 }
 

@@ -44,7 +44,8 @@ struct AcquisitionCheck {
   Eigen::Vector3d predicted_mm;
   Eigen::Vector3d sigma_mm;  ///< of the difference entry - prediction
   double chi2 = 0;           ///< of the difference, 3 degrees of freedom
-  bool is_changed = false;   ///< beyond the tolerances, where all together are significant
+  /// Where all together are significant: beyond the tolerances, and significant alone or the most so.
+  bool is_changed = false;
 };
 
 /// New acquisitions of one case beside a history that does not hold them.

@@ -108,6 +108,16 @@ TEST(CArmModel, ReceiverMovedByTwoMillimetresIsAChange) {
   EXPECT_GE(alarms, 18);
 }
 
+TEST(CArmModel, OnlyTheAcquisitionsThatShowTheChangeAreMarked) {
+  SaggingArm arm(5);
+  const CArmModel model = c_arm_model(arm.history(24), arm_nominal_mm, unknown_arm);
+  const std::vector next{arm.acquisition(0), arm.acquisition(88, {0, 20, 20})};
+  const CArmCheck check = check_c_arm(model, next, {});
+  ASSERT_TRUE(check.changed);
+  EXPECT_FALSE(check.acquisitions[0].is_changed);
+  EXPECT_TRUE(check.acquisitions[1].is_changed);
+}
+
 TEST(CArmModel, ChangeWithinTheToleranceIsNone) {
   SaggingArm arm(3);
   const CArmModel model = c_arm_model(arm.history(24), arm_nominal_mm, unknown_arm);

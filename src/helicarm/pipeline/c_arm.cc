@@ -29,6 +29,16 @@ Expected<CArmAcquisitions> measured_acquisitions(const Case& given, unsigned thr
   });
 }
 
+bool is_among(const std::vector<calibration::HistoryEntry>& acquired,
+              const calibration::HistoryEntry& entry) {
+  return std::ranges::find(acquired, entry.image, &calibration::HistoryEntry::image) != acquired.end();
+}
+
+bool holds_others(const calibration::CArmHistory& record,
+                  const std::vector<calibration::HistoryEntry>& acquired) {
+  return !std::ranges::all_of(record.entries, [&](const auto& entry) { return is_among(acquired, entry); });
+}
+
 }  // namespace
 
 Expected<CArmAcquisitions> c_arm_acquisitions(const std::filesystem::path& from, unsigned threads) {
@@ -62,12 +72,30 @@ Expected<calibration::CArmModel> model_of_record(const calibration::CArmHistory&
 Expected<calibration::CArmCheck> check_against_record(std::vector<calibration::HistoryEntry> acquired,
                                                       calibration::CArmHistory record,
                                                       const std::string& origin) {
-  std::erase_if(record.entries, [&](const calibration::HistoryEntry& entry) {
-    return std::ranges::find(acquired, entry.image, &calibration::HistoryEntry::image) != acquired.end();
-  });
+  std::erase_if(record.entries,
+                [&](const calibration::HistoryEntry& entry) { return is_among(acquired, entry); });
   return model_of_record(record, origin).map([&](const calibration::CArmModel& model) {
     return calibration::check_c_arm(model, acquired, record.tolerances);
   });
+}
+
+Expected<calibration::HistoryGrowth> add_to_record(const std::filesystem::path& record,
+                                                   const std::vector<calibration::HistoryEntry>& acquired) {
+  return guarded([&] {
+    const calibration::CArmHistory earlier = value_or_throw(calibration::history_at(record));
+    if (holds_others(earlier, acquired)) {
+      const auto check = value_or_throw(check_against_record(acquired, earlier, record.string()));
+      if (const auto change = c_arm_change(check)) throw BadInput(*change);
+    }
+    return value_or_throw(calibration::add_to_history(record, acquired));
+  });
+}
+
+Expected<calibration::HistoryGrowth> add_to_record(const std::filesystem::path& record,
+                                                   const Result& measured) {
+  const bool is_told = measured.calibration && !measured.calibration->is_record_contradicted;
+  return calibration::add_to_history(
+      record, is_told ? measured.calibration->entries : std::vector<calibration::HistoryEntry>());
 }
 
 std::optional<Failure> c_arm_change(const calibration::CArmCheck& check) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/calibration/c_arm_model.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/result.h"
@@ -29,6 +30,17 @@ Expected<calibration::CArmModel> model_of_record(const calibration::CArmHistory&
 Expected<calibration::CArmCheck> check_against_record(std::vector<calibration::HistoryEntry> acquired,
                                                       calibration::CArmHistory record,
                                                       const std::string& origin);
+
+/// Adds acquisitions to a record, which is made where there is none. Fails with c_arm_changed, and adds
+/// nothing, where they lie beyond what the record predicts and its tolerances; else as
+/// `calibration::add_to_history`.
+Expected<calibration::HistoryGrowth> add_to_record(const std::filesystem::path& record,
+                                                   const std::vector<calibration::HistoryEntry>& acquired);
+
+/// Adds a measurement's acquisitions to the record that it was made with; none where the measurement found
+/// the C-arm changed.
+Expected<calibration::HistoryGrowth> add_to_record(const std::filesystem::path& record,
+                                                   const Result& measured);
 
 /// c_arm_changed, with the worst acquisition's figures; nothing if it has not.
 std::optional<Failure> c_arm_change(const calibration::CArmCheck& check);

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "helicarm/core/temporary_folder.h"
+
 namespace helicarm::pipeline {
 namespace {
 
@@ -38,6 +40,20 @@ TEST(CArm, ChangeNamesTheWorstAcquisition) {
   EXPECT_EQ(change->reason, Reason::c_arm_changed);
   EXPECT_EQ(change->view, "LAT");
   EXPECT_NEAR(change->figures.at("u0_mm"), 40, 3);
+}
+
+TEST(CArm, AcquisitionsOfAnotherArmAreNotAdded) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder.path() / "arm.json";
+  calibration::CArmHistory record = record_of(10);
+  ASSERT_EQ(add_to_record(file, record.entries)->added, 10u);
+  calibration::HistoryEntry other = record.entries[5], same = record.entries[4];
+  other.image = "other";
+  other.estimate_mm.x() += 100;
+  EXPECT_EQ(add_to_record(file, std::vector{other}).error().reason, Reason::c_arm_changed);
+  EXPECT_EQ(calibration::read_history(file)->entries.size(), 10u);
+  same.image = "same";
+  EXPECT_EQ(add_to_record(file, std::vector{same, record.entries[0]})->added, 1u);
 }
 
 TEST(CArm, UnchangedArmIsNoFailure) {

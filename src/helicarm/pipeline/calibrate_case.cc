@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "helicarm/pipeline/c_arm.h"
 #include "helicarm/pipeline/diagnosis/calibrator_checks.h"
 #include "helicarm/pipeline/diagnosis/causes.h"
 #include "helicarm/pipeline/diagnosis/residuals.h"
@@ -33,23 +34,44 @@ Expected<calibration::LearnedIntrinsics> prior_from_history(const LabelledViews&
   return calibration::learn_intrinsics(earlier, {*nominal.focal_px / nominal.unit_px, 0, 0}, unknown_c_arm());
 }
 
-/// Entries of these views for the C-arm history; none if their residuals are inconsistent with the noise
-/// model.
-std::vector<calibration::HistoryEntry> new_entries(const CaseCalibration& calibration,
-                                                   const calibration::CommonPrior& common) {
+/// What each view says of the C-arm alone, for a history; views that determine nothing alone are left out.
+std::vector<calibration::HistoryEntry> entries_of(const LabelledViews& views,
+                                                  const std::vector<calibration::ViewFiducials>& fiducials,
+                                                  const calibration::CommonPrior& common) {
   std::vector<calibration::HistoryEntry> entries;
-  if (calibration.variance_scale != 1) return entries;
-  for (std::size_t i = 0; i < calibration.images.size(); ++i) {
-    calibration::ViewFiducials view = fiducials_of(calibration.images[i]);
-    view.fiducials = calibration.fiducials[i];
-    const xray::Acquisition& acquisition = calibration.images[i].xray_image->acquisition;
-    if (auto entry = calibration::history_entry_of(view, acquisition.instance_key, common)) {
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const xray::Acquisition& acquisition = views[i].xray_image->acquisition;
+    if (auto entry = calibration::history_entry_of(fiducials[i], acquisition.instance_key, common)) {
       entry->primary_deg = acquisition.primary_angle_deg;
       entry->secondary_deg = acquisition.secondary_angle_deg;
       entries.push_back(*std::move(entry));
     }
   }
   return entries;
+}
+
+/// Entries of these views for the C-arm history; none if their residuals are inconsistent with the noise
+/// model.
+std::vector<calibration::HistoryEntry> new_entries(const CaseCalibration& calibration,
+                                                   const calibration::CommonPrior& common) {
+  if (calibration.variance_scale != 1) return {};
+  std::vector<calibration::ViewFiducials> fiducials;
+  for (std::size_t i = 0; i < calibration.images.size(); ++i) {
+    fiducials.push_back(fiducials_of(calibration.images[i]));
+    fiducials.back().fiducials = calibration.fiducials[i];
+  }
+  return entries_of(calibration.images, fiducials, common);
+}
+
+/// c_arm_changed as a warning where the views alone contradict the history; nothing where they say nothing.
+std::optional<Warning> contradiction_of(const LabelledViews& views,
+                                        const std::vector<calibration::ViewFiducials>& fiducials,
+                                        const calibration::CArmHistory& history,
+                                        const calibration::CommonPrior& common) {
+  const auto check = check_against_record(entries_of(views, fiducials, common), history, "--machine");
+  auto change = check ? c_arm_change(*check) : std::nullopt;
+  if (change) change->message += ". The record is neither used nor added to";
+  return change;
 }
 
 /// Mean position of the used fiducials over all views.
@@ -85,16 +107,18 @@ Expected<void> check_apart(const calibration::CalibrationResult& calibration, co
 
 Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& given,
                                      const RunOptions& options) {
-  std::optional<calibration::LearnedIntrinsics> history;
-  if (options.history) {
-    const auto prior = prior_from_history(views, *options.history);
-    if (!prior) return tl::unexpected<Failure>(prior.error());
-    history = *prior;
-  }
   std::vector<calibration::ViewFiducials> fiducials;
   for (const LabelledView& view : views) fiducials.push_back(fiducials_of(view));
   calibration::CalibrationOptions how;
   how.common = common_prior(given.calibrator);
+  std::optional<calibration::LearnedIntrinsics> history;
+  std::optional<Warning> change;
+  if (options.history) {
+    const auto prior = prior_from_history(views, *options.history);
+    if (!prior) return tl::unexpected<Failure>(prior.error());
+    change = contradiction_of(views, fiducials, *options.history, how.common);
+    if (!change) history = *prior;
+  }
   if (history) {
     how.common.c_arm = history->prior;
     for (std::size_t i = 0; i < views.size(); ++i)
@@ -105,7 +129,12 @@ Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& giv
                                                          : calibration::calibrate(fiducials, how))
       .and_then([&](calibration::CalibrationResult result) {
         return check_apart(result, given).map([&] {
-          return CaseCalibration{std::move(result), {}, history, {}, {}};
+          CaseCalibration made{std::move(result), {}, history, {}, {}};
+          if (change) {
+            made.is_record_contradicted = true;
+            made.warnings.push_back(*change);
+          }
+          return made;
         });
       });
 }

@@ -17,6 +17,7 @@ struct CaseCalibration : calibration::CalibrationResult {
   std::optional<calibration::LearnedIntrinsics> history;  ///< from the C-arm history, if given
   std::vector<calibration::HistoryEntry> entries;         ///< of these views, for the C-arm history
   Timing timing_ms;
+  bool is_record_contradicted = false;  ///< the views alone contradict the C-arm history, which was not used
 };
 
 /// From image files to calibrated views (2.1, 2.2, 2.3.4; Eq. 1-7). Refuses `views_too_close` unless two of

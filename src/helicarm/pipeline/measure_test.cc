@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "helicarm/core/temporary_folder.h"
+#include "helicarm/pipeline/c_arm.h"
 #include "helicarm/pipeline/diagnosis/causes.h"
 #include "helicarm/pipeline/locate_case.h"
 #include "helicarm/pipeline/outcome.h"
@@ -72,6 +74,25 @@ TEST_F(SimulatedNavigation, TunnelsAreMeasuredWithinTheirConfidenceRegions) {
 const Finding* find_reason(const std::vector<Finding>& warnings, Reason reason) {
   const auto found = std::ranges::find(warnings, reason, &Warning::reason);
   return found == warnings.end() ? nullptr : &*found;
+}
+
+TEST_F(SimulatedNavigation, RecordOfAChangedCArmIsNotUsed) {
+  const Result alone = result_of(given_, {}).value();
+  RunOptions options;
+  options.history.emplace();
+  for (int day = 0; day < 5; ++day)
+    for (calibration::HistoryEntry entry : alone.calibration->entries) {
+      entry.image += std::to_string(day);
+      entry.estimate_mm += Eigen::Vector3d(40, 30, 0);  // as if the receiver had been moved since
+      options.history->entries.push_back(entry);
+    }
+  const Result result = result_of(given_, options).value();
+  ASSERT_FALSE(result.failure) << result.failure->message;
+  EXPECT_TRUE(find_reason(result.warnings, Reason::c_arm_changed));
+  for (std::size_t i = 0; i < alone.points.size(); ++i)
+    EXPECT_EQ(result.points[i].place->in_calibrator, alone.points[i].place->in_calibrator);
+  const TemporaryFolder folder;
+  EXPECT_EQ(add_to_record(folder.path() / "arm.json", result)->added, 0u);
 }
 
 TEST_F(SimulatedNavigation, MirroredCalibratorFileIsRefused) {
