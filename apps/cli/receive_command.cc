@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -41,6 +42,12 @@ class ReceptionLog {
             [this](const Failure& why) { notify("interrupted", why); }};
   }
 
+  /// Whether `count` images have arrived.
+  bool is_complete() {
+    const std::lock_guard lock(mutex_);
+    return left_ == 0;
+  }
+
  private:
   void notify(const receiver::Arrival& arrival) {
     const std::lock_guard lock(mutex_);
@@ -58,7 +65,7 @@ class ReceptionLog {
       for (const Warning& warning : arrival.warnings)
         console_.progress << code(warning.reason) << ": " << warning.message << std::endl;
     }
-    if (left_ && --*left_ == 0) stop_.raise();
+    if (left_ && *left_ > 0 && --*left_ == 0) stop_.raise();
   }
   void notify(const char* what, const Failure& failure) {
     const std::lock_guard lock(mutex_);
@@ -115,7 +122,9 @@ CommandResult receive_command(const ReceiveArguments& arguments, Console& consol
       source = value_or_throw(receiver::open_images(
           receiver::FolderOptions{.folder = arguments.watch, .most = arguments.count}, *inbox, tale.hooks()));
     }
-    stop.wait(arguments.seconds);
+    const bool is_stopped = stop.wait(arguments.seconds);
+    constexpr std::chrono::seconds to_release{5};  // an association whose last image was counted
+    if (is_stopped && tale.is_complete()) source->await_idle(to_release);
   });
 }
 

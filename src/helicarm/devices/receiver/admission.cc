@@ -68,6 +68,11 @@ void Admission::image_ends(Id id, Clock::time_point now) {
   }
 }
 
+std::size_t Admission::connected() {
+  const std::lock_guard lock(mutex_);
+  return peers_.size();
+}
+
 void Admission::leave(Id id) {
   const std::lock_guard lock(mutex_);
   peers_.erase(id);

@@ -38,6 +38,8 @@ class Admission {
   void image_ends(Id id, Clock::time_point now);
   /// No effect after an eviction.
   void leave(Id id);
+  /// Connections that neither left nor were evicted.
+  std::size_t connected();
 
  private:
   struct Peer {

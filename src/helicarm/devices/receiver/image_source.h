@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -29,6 +30,9 @@ class ImageSource {
   virtual std::uint16_t port() const = 0;
   /// Connections lost and requests rejected since the start.
   virtual std::uint64_t broken() const = 0;
+  /// Waits until no peer is connected: a peer that sent its last image then ends its association in order.
+  /// False if one still is after this time.
+  virtual bool await_idle([[maybe_unused]] std::chrono::milliseconds longest) { return true; }
 };
 
 /// Whether this file was stored, for sources of files. Files over 256 MiB are refused (bad_size).

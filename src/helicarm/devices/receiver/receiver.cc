@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/receiver/receiver.h"
 
+#include <chrono>
+#include <thread>
+
 #include <asio/co_spawn.hpp>
 #include <asio/detached.hpp>
 #include <asio/redirect_error.hpp>
@@ -140,6 +143,15 @@ std::uint16_t DicomReceiver::port() const { return engine_->acceptor.local_endpo
 std::uint64_t DicomReceiver::broken() const {
   const ReceiverCounters& counters = engine_->shared.counters;
   return counters.rejected + counters.aborted + counters.timed_out;
+}
+bool DicomReceiver::await_idle(std::chrono::milliseconds longest) {
+  constexpr std::chrono::milliseconds step{5};
+  const auto end = std::chrono::steady_clock::now() + longest;
+  while (engine_->shared.admission.connected() > 0) {
+    if (std::chrono::steady_clock::now() >= end) return false;
+    std::this_thread::sleep_for(step);
+  }
+  return true;
 }
 const ReceiverCounters& DicomReceiver::counters() const { return engine_->shared.counters; }
 

@@ -71,6 +71,7 @@ class DicomReceiver : public ImageSource {
 
   std::uint16_t port() const override;
   std::uint64_t broken() const override;
+  bool await_idle(std::chrono::milliseconds longest) override;
   const ReceiverCounters& counters() const;
 
  private:

@@ -29,6 +29,18 @@ TEST_F(Receiver, AnswersEchoAndReleases) {
   EXPECT_EQ(receiver_->counters().echoed, 1u);
 }
 
+TEST_F(Receiver, IsIdleOnceThePeersHaveReleased) {
+  using std::chrono::milliseconds;
+  RawClient client = associated();
+  EXPECT_FALSE(receiver_->await_idle(milliseconds(1)));
+  std::thread release([&] {
+    client.send(peer::release());
+    EXPECT_EQ(client.receive_type(), released);
+  });
+  EXPECT_TRUE(receiver_->await_idle(milliseconds(30000)));
+  release.join();
+}
+
 TEST_F(Receiver, ImageIsOnDiskWhenItIsAcknowledged) {
   RawClient client = associated();
   client.send(peer::store(xray::DicomBuilder()));
