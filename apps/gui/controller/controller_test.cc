@@ -148,6 +148,8 @@ TEST(Steps, VerifyShowsTheImagesFiguresWithoutARobot) {
   state.result = result;
   EXPECT_EQ(card_of(steps_of(state), Phase::verify).figure, "0.90 mm, 2 ends");
   EXPECT_EQ(card_of(steps_of(state), Phase::verify).status, StepStatus::good);
+  result->verifications[0].end->distance_mm = 12;
+  EXPECT_EQ(card_of(steps_of(state), Phase::verify).status, StepStatus::warning);
 }
 
 TEST(Picks, NextOneGoesThroughViewsThenEnds) {

@@ -148,6 +148,12 @@ void navigate(StepCard& card, const ApplicationState& state) {
   if (state.outcomes.size() == state.tunnels.size()) settle(card, {});
 }
 
+void warn_off_plan(StepCard& card, double distance_mm) {
+  if (distance_mm <= guidance::most_off_plan_mm) return;
+  card.status = StepStatus::warning;
+  card.why = tr("more than %1 mm off the plan").arg(guidance::most_off_plan_mm);
+}
+
 /// The tool lines of a case, compared with their tunnels in the images alone.
 void verify_images(StepCard& card, const pipeline::Result& result) {
   double worst = 0;
@@ -167,6 +173,7 @@ void verify_images(StepCard& card, const pipeline::Result& result) {
     card.status = StepStatus::warning;
     card.why = tr("an end is not located");
   }
+  warn_off_plan(card, worst);
 }
 
 void verify(StepCard& card, const ApplicationState& state) {
@@ -191,6 +198,7 @@ void verify(StepCard& card, const ApplicationState& state) {
       if (end.distance_mm() >= worst) worst = end.distance_mm(), expected = end.predicted_mm();
   card.figure = tr("%1 mm (predicted %2)").arg(worst, 0, 'f', 2).arg(expected, 0, 'f', 2);
   if (state.outcomes.size() == state.tunnels.size()) settle(card, {});
+  warn_off_plan(card, worst);
 }
 
 void registered(StepCard& card, const ApplicationState& state) {

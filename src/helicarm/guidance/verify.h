@@ -34,6 +34,9 @@ struct LineError {
   double distance_mm = 0;  ///< in 3-D
 };
 
+/// Farthest that the axis of a drilled tunnel may pass a planned end, mm (Guo et al. 2019, section 4).
+inline constexpr double most_off_plan_mm = 2;
+
 /// A tool line compared with its tunnel; an end that is not located is absent.
 struct Verification {
   std::string name;

@@ -121,6 +121,7 @@ Expected<Result> locate_case(const Case& given, std::shared_ptr<const CaseCalibr
                           return verify_tool_lines(given, calibration.views, result);  // Eq. 17
                         })
                         .and_then([&](std::vector<guidance::Verification> verifications) {
+                          append(result.warnings, lines_off_plan(verifications), Stage::locate);
                           result.verifications = std::move(verifications);
                           return check_certain(result.points, options.max_error_mm, given.calibrator);
                         })

@@ -95,6 +95,27 @@ Expected<std::vector<guidance::Verification>> verify_tool_lines(
   });
 }
 
+std::vector<Warning> lines_off_plan(const std::vector<guidance::Verification>& verifications) {
+  std::vector<Warning> warnings;
+  for (const guidance::Verification& line : verifications) {
+    const auto distance_mm = [](const std::optional<guidance::LineError>& end) {
+      return end ? end->distance_mm : 0;
+    };
+    const double off_mm = std::max(distance_mm(line.start), distance_mm(line.end));
+    if (off_mm <= guidance::most_off_plan_mm) continue;
+    warnings.push_back(
+        {Reason::off_target,
+         fmt::format(
+             "tool line \"{}\" passes the {} of its tunnel at {:.2f} mm, limit {:g} mm: the tunnel is "
+             "not where it was planned",
+             line.name, off_mm == distance_mm(line.start) ? "start" : "end", off_mm,
+             guidance::most_off_plan_mm),
+         {},
+         {{"distance_mm", off_mm}, {"limit_mm", guidance::most_off_plan_mm}}});
+  }
+  return warnings;
+}
+
 Expected<void> check_picks_agree(const std::vector<PointResult>& points,
                                  const calibration::CalibrationResult& calibration) {
   constexpr std::size_t least_picks = 2;

@@ -26,6 +26,9 @@ Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& given, const Re
 Expected<std::vector<guidance::Verification>> verify_tool_lines(
     const Case& given, const std::vector<calibration::CalibratedView>& views, const Result& result);
 
+/// Tool lines that pass an end of their tunnel at more than `most_off_plan_mm` (off_target).
+std::vector<Warning> lines_off_plan(const std::vector<guidance::Verification>& verifications);
+
 /// 95 % error (mm) of a tunnel's start or end in the tool's frame; nothing if it is not known there.
 std::optional<double> tunnel_end_error_in_tool(const Result& result, const std::string& tunnel, bool start);
 

@@ -39,6 +39,17 @@ TEST(CheckPicksAgree, ContradictingPicksAloneMayBeMotion) {
   EXPECT_TRUE(check_picks_agree({point("a", 3.6, true)}, contradicted()));
 }
 
+TEST(LinesOffPlan, OnlyALineFarFromAnEndIsNamed) {
+  guidance::LineError near, far;
+  near.distance_mm = 1.9;
+  far.distance_mm = 12;
+  const auto warnings = lines_off_plan({{"femur", near, {}}, {"tibia", near, far}, {"free", {}, {}}});
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].reason, Reason::off_target);
+  EXPECT_NE(warnings[0].message.find("\"tibia\" passes the end of its tunnel at 12.00 mm"),
+            std::string::npos);
+}
+
 TEST(CheckCertain, LimitHoldsInTheToolsFrameToo) {
   std::vector<PointResult> points = {point("a", 0, false)};
   EXPECT_TRUE(check_certain(points, 0.5, {}));
