@@ -9,7 +9,7 @@
 #include "helicarm/detection/drawn_image_test.h"
 
 namespace helicarm::detection {
-namespace {
+namespace ball_profile_test {
 
 constexpr double pi = std::numbers::pi;
 
@@ -69,5 +69,5 @@ TEST(BallProfile, AgreesWithARenderedBall) {
   }
 }
 
-}  // namespace
+}  // namespace ball_profile_test
 }  // namespace helicarm::detection

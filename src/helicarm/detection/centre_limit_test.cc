@@ -9,7 +9,7 @@
 #include "helicarm/detection/find_dots.h"
 
 namespace helicarm::detection {
-namespace {
+namespace centre_limit_test {
 
 using Eigen::Vector2d;
 
@@ -229,5 +229,5 @@ TEST_P(OverlapLimit, OverlapOfHalfARadiusHasLittleEffect) {
 
 INSTANTIATE_TEST_SUITE_P(Balls, OverlapLimit, testing::Values(Situation{5.5, 0}, Situation{13, 0}));
 
-}  // namespace
+}  // namespace centre_limit_test
 }  // namespace helicarm::detection

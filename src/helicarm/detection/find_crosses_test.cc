@@ -9,7 +9,7 @@
 #include "helicarm/detection/drawn_image_test.h"
 
 namespace helicarm::detection {
-namespace {
+namespace find_crosses_test {
 
 using Eigen::Vector2d;
 
@@ -106,5 +106,5 @@ TEST(FitCross, NothingWithoutACrossing) {
   EXPECT_FALSE(fit_cross(noisy(drawn::Shade(128, 128)), start, 0, std::numbers::pi / 2, {}));
 }
 
-}  // namespace
+}  // namespace find_crosses_test
 }  // namespace helicarm::detection

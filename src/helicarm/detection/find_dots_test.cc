@@ -9,7 +9,7 @@
 #include "helicarm/detection/drawn_image_test.h"
 
 namespace helicarm::detection {
-namespace {
+namespace find_dots_test {
 
 using Eigen::Vector2d;
 
@@ -145,5 +145,5 @@ TEST(FindBlobs, StrongestFirstAndAtMostTheRequestedNumber) {
                              [](const Dot& a, const Dot& b) { return a.contrast > b.contrast; }));
 }
 
-}  // namespace
+}  // namespace find_dots_test
 }  // namespace helicarm::detection

@@ -6,7 +6,7 @@
 #include "helicarm/detection/drawn_image_test.h"
 
 namespace helicarm::detection {
-namespace {
+namespace find_marks_test {
 
 const Eigen::Vector2d centre(60.3, 40.7);
 
@@ -42,5 +42,5 @@ TEST(FindMarks, UnknownKindIsUsage) {
   EXPECT_EQ(mark_kind("cats").error().reason, Reason::usage);
 }
 
-}  // namespace
+}  // namespace find_marks_test
 }  // namespace helicarm::detection

@@ -9,7 +9,7 @@
 #include "helicarm/detection/drawn_image_test.h"
 
 namespace helicarm::detection {
-namespace {
+namespace fit_dot_test {
 
 using Eigen::Vector2d;
 using Background = std::function<double(double, double)>;
@@ -209,5 +209,5 @@ TEST(FitDot, OneSidedDisturbanceRaisesTheError) {
   EXPECT_GT(pulled->error_px(), 0.4 * error(pulled, middle));
 }
 
-}  // namespace
+}  // namespace fit_dot_test
 }  // namespace helicarm::detection

@@ -9,7 +9,7 @@
 #include "helicarm/detection/drawn_image_test.h"
 
 namespace helicarm::detection {
-namespace {
+namespace image_dots_test {
 
 /// Balls with radii of 2.8 and 9 px, and a hole.
 xray::XrayImage dark_and_bright() {
@@ -46,5 +46,5 @@ TEST(ImageDots, FromALargerRadiusThereAreThoseThatASearchFromItFinds) {
   EXPECT_LT((of_all[0].centre_px - searched[0].centre_px).norm(), 0.01);
 }
 
-}  // namespace
+}  // namespace image_dots_test
 }  // namespace helicarm::detection

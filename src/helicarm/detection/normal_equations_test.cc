@@ -8,7 +8,7 @@
 #include "helicarm/core/random.h"
 
 namespace helicarm::detection {
-namespace {
+namespace normal_equations_test {
 
 class WeightedProducts : public testing::TestWithParam<std::pair<int, int>> {};
 
@@ -37,5 +37,5 @@ TEST(WeightedProducts, PixelsOfZeroWeightAreIgnored) {
   EXPECT_EQ(weighted_products(rows, weights)(1, 0), 72);
 }
 
-}  // namespace
+}  // namespace normal_equations_test
 }  // namespace helicarm::detection

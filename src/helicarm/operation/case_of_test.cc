@@ -8,7 +8,7 @@
 #include "helicarm/core/temporary_folder.h"
 
 namespace helicarm::operation {
-namespace {
+namespace case_of_test {
 
 namespace fs = std::filesystem;
 
@@ -93,5 +93,5 @@ TEST_F(CaseOfOperation, FilesOfThePlanAreFoundAgainInTheCasesFolder) {
   EXPECT_EQ(again.plate_name, "plate48");
 }
 
-}  // namespace
+}  // namespace case_of_test
 }  // namespace helicarm::operation

@@ -8,7 +8,7 @@
 #include "helicarm/geometry/view_json.h"
 
 namespace helicarm::operation {
-namespace {
+namespace freehand_test {
 
 using Eigen::Vector3d;
 using geometry::RigidTransform;
@@ -162,5 +162,5 @@ TEST(FreehandGuide, PlanWithARobotIsRefused) {
             Reason::usage);
 }
 
-}  // namespace
+}  // namespace freehand_test
 }  // namespace helicarm::operation

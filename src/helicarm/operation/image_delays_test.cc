@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace helicarm::operation {
-namespace {
+namespace image_delays_test {
 
 /// Reading of the C-arm's clock at our time 0: an offset of years, as between clocks of different epochs.
 constexpr double c_arm_s = 1.7e9;
@@ -45,5 +45,5 @@ TEST(ImageDelays, TimesOfOtherElementsAreNotCompared) {
   EXPECT_EQ(delays.held_s(acquired_at(0, "Content Date and Time"), 110), 0);
 }
 
-}  // namespace
+}  // namespace image_delays_test
 }  // namespace helicarm::operation

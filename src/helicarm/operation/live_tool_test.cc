@@ -7,7 +7,7 @@
 #include "helicarm/operation/hand_eye_test.h"
 
 namespace helicarm::operation {
-namespace {
+namespace live_tool_test {
 
 using Eigen::Vector3d;
 
@@ -118,5 +118,5 @@ TEST(LiveTool, WithoutAPoseIsRefused) {
   EXPECT_EQ(live.overlay(tracker::PoseBoard(), "femur").error().reason, Reason::no_pose);
 }
 
-}  // namespace
+}  // namespace live_tool_test
 }  // namespace helicarm::operation

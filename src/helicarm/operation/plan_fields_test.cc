@@ -7,7 +7,7 @@
 #include "helicarm/pipeline/run_fields.h"
 
 namespace helicarm::operation {
-namespace {
+namespace plan_fields_test {
 
 template <class Options, std::size_t count>
 void expect_sound(const std::array<Field<Options>, count>& fields) {
@@ -32,5 +32,5 @@ TEST(Fields, DefaultsLieWithinTheLimits) {
   expect_sound(receiver::receiver_fields);
 }
 
-}  // namespace
+}  // namespace plan_fields_test
 }  // namespace helicarm::operation

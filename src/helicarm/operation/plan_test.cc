@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace helicarm::operation {
-namespace {
+namespace plan_test {
 
 OperationPlan plan() {
   OperationPlan plan;
@@ -240,5 +240,5 @@ TEST(Plan, FacetThatIsNotARigidMotionIsRefused) {
   EXPECT_FALSE(plan_from(json, "plan.json"));
 }
 
-}  // namespace
+}  // namespace plan_test
 }  // namespace helicarm::operation

@@ -14,7 +14,7 @@
 #include "helicarm/virtual_devices/robot/virtual_controller.h"
 
 namespace helicarm::operation {
-namespace {
+namespace plan_watch_test {
 
 using Eigen::Vector3d;
 using testing::HasSubstr;
@@ -379,5 +379,5 @@ TEST(PlanWatch, KinematicErrorWidensTheBaseLimitsWithTravel) {
   EXPECT_FALSE(check_motion("robot base or tool", {0, 1.51}, travelled));
 }
 
-}  // namespace
+}  // namespace plan_watch_test
 }  // namespace helicarm::operation

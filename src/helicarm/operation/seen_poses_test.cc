@@ -7,7 +7,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::operation {
-namespace {
+namespace seen_poses_test {
 
 const geometry::RigidTransform at_rest{geometry::rotation_from_euler(0.3, -0.2, 1.1), {100, -50, 900}};
 
@@ -98,5 +98,5 @@ TEST(SeenPoses, WindowIsRecordedToTheLastBit) {
     }
 }
 
-}  // namespace
+}  // namespace seen_poses_test
 }  // namespace helicarm::operation

@@ -15,7 +15,7 @@
 #include "helicarm/core/temporary_folder.h"
 
 namespace helicarm::operation {
-namespace {
+namespace session_log_test {
 
 namespace fs = std::filesystem;
 
@@ -240,5 +240,5 @@ TEST_F(Session, FolderThatCannotBeCreatedIsReported) {
   EXPECT_EQ(SessionLog::open("/dev/null/session.log").error().reason, Reason::cannot_write);
 }
 
-}  // namespace
+}  // namespace session_log_test
 }  // namespace helicarm::operation

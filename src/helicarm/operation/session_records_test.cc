@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace helicarm::operation {
-namespace {
+namespace session_records_test {
 
 using testing::HasSubstr;
 
@@ -143,5 +143,5 @@ TEST(SessionRecords, TheSchemaHoldsEveryKind) {
   EXPECT_TRUE(kinds["guided"]["properties"].contains("guidance"));
 }
 
-}  // namespace
+}  // namespace session_records_test
 }  // namespace helicarm::operation

@@ -10,7 +10,7 @@
 #include "helicarm/operation/outcome_table.h"
 
 namespace helicarm::operation {
-namespace {
+namespace tool_line_test {
 
 using Eigen::Vector3d;
 
@@ -123,5 +123,5 @@ TEST(OutcomeTable, StatisticsAreThoseOfTheErrors) {
 
 TEST(OutcomeTable, EmptyInputIsMisuse) { EXPECT_THROW(figures_of({}), std::invalid_argument); }
 
-}  // namespace
+}  // namespace tool_line_test
 }  // namespace helicarm::operation

@@ -17,7 +17,7 @@ constexpr double normal = std::numeric_limits<double>::infinity();
 
 /// Logarithms of the image's factor and of the variance of the floor, and what is known of them.
 using Logs = std::array<double, 2>;
-const Logs typical{0, 2 * std::log(0.01)}, spread{1.5, 3};
+const Logs usual{0, 2 * std::log(0.01)}, usual_spread{1.5, 3};
 
 struct Sample {
   double square, image, other;  ///< px^2
@@ -44,7 +44,8 @@ double log_posterior(const std::vector<Sample>& samples, double freedom, const L
     sum -= std::log(variance) +
            (std::isinf(freedom) ? square / 2 : (freedom + axes) / 2 * std::log1p(square / freedom));
   }
-  for (std::size_t k = 0; k < logs.size(); ++k) sum -= std::pow((logs[k] - typical[k]) / spread[k], 2) / 2;
+  for (std::size_t k = 0; k < logs.size(); ++k)
+    sum -= std::pow((logs[k] - usual[k]) / usual_spread[k], 2) / 2;
   return sum;
 }
 
@@ -57,7 +58,7 @@ struct Fit {
 Fit fit_of(const std::vector<Sample>& samples, double freedom) {
   constexpr double least_step = 0.02;
   Logs step{1, 1};
-  Fit fit{freedom, log_posterior(samples, freedom, typical), typical};
+  Fit fit{freedom, log_posterior(samples, freedom, usual), usual};
   while (std::ranges::max(step) > least_step)
     for (std::size_t k = 0; k < step.size(); ++k) {
       bool gained = false;
@@ -124,7 +125,7 @@ RunNoise noise_of(const Frames& frames) {
   std::vector<Sample> samples;
   for (const auto& frame : frames)
     for (const NoiseSample& sample : frame) samples.push_back(sample_of(sample));
-  Fit best{normal, -normal, typical};
+  Fit best{normal, -normal, usual};
   for (const double freedom : candidates)
     if (const Fit fit = fit_of(samples, freedom); fit.log_posterior > best.log_posterior) best = fit;
   std::vector<std::vector<double>> weights(frames.size()), roots(frames.size());

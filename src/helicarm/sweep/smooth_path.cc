@@ -145,8 +145,9 @@ double log_likelihood(const std::vector<PathObservation>& frames, const PathPrio
 /// what is known of them: flex of some mm over a turn (Daly et al. 2008, Fahrig and Holdsworth 2000), jitter
 /// of 0.02 to 0.25 mm, alike at both ends of one arm: along most directions the images show their sum alone.
 using LogStiffness = Eigen::Matrix<double, 6, 1>;
-const LogStiffness typical{std::log(4e-3), std::log(8e-3), std::log(3e-5), std::log(0.05), 0, std::log(1e-4)};
-const LogStiffness spread{2, 2, 2, 1.5, 0.5, 1.5};
+const LogStiffness typical_logs{std::log(4e-3), std::log(8e-3), std::log(3e-5), std::log(0.05), 0,
+                                std::log(1e-4)};
+const LogStiffness spread_of_logs{2, 2, 2, 1.5, 0.5, 1.5};
 
 Stiffness stiffness_of(const LogStiffness& logs) {
   const double of_source = std::exp(logs[3]);
@@ -164,8 +165,8 @@ double posterior_of(const std::vector<PathObservation>& frames, const PathPrior&
                     const LogStiffness& logs) {
   const Problem problem = problem_of(frames, prior, stiffness_of(logs));
   const auto path = path_for(problem, values_of(frames), &prior.gradient);
-  const double value =
-      log_likelihood(frames, prior, problem, path) - (logs - typical).cwiseQuotient(spread).squaredNorm() / 2;
+  const double value = log_likelihood(frames, prior, problem, path) -
+                       (logs - typical_logs).cwiseQuotient(spread_of_logs).squaredNorm() / 2;
   return std::isfinite(value) ? value : -1e300;
 }
 
@@ -174,7 +175,7 @@ double posterior_of(const std::vector<PathObservation>& frames, const PathPrior&
 Stiffness choose_stiffness(const std::vector<PathObservation>& frames, const PathPrior& prior,
                            const std::optional<Stiffness>& start) {
   // Coordinate search with steps that grow where they gain and shrink where they do not.
-  LogStiffness at = typical, step = LogStiffness::Constant(1);
+  LogStiffness at = typical_logs, step = LogStiffness::Constant(1);
   if (start) {
     at = logs_of(*start);
     step.setConstant(0.5);

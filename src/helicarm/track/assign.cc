@@ -18,9 +18,9 @@ constexpr double log_density = -6.9;     // of discs that are no marker's: one i
 constexpr double detected = 0.95;        // chance that a marker is found in a view
 constexpr double least_sigma_px = 0.15;  // texture behind a marker displaces its fit
 constexpr double sigma_factor = 2;
-constexpr double vaguest = 0.15;       // standard deviation of a disc over its radius: texture beyond
-constexpr double usual_spread = 0.35;  // of a contrast's logarithm, between frames
-constexpr double gate = 25;            // chi2 of one disc
+constexpr double vaguest_disc = 0.15;     // standard deviation of a disc over its radius: texture beyond
+constexpr double contrast_spread = 0.35;  // of a contrast's logarithm, between frames
+constexpr double gate = 25;               // chi2 of one disc
 constexpr std::size_t most_per_view = 6, beam = 100;
 constexpr double hopeless = 30;  // beyond what later markers could win back
 
@@ -41,7 +41,7 @@ double appearance_cost(const MarkerImage& image, const ExpectedImage& expected) 
   if (expected.contrast.is_known) {
     const double spread = std::hypot(expected.contrast.spread, contrast_sigma(image));
     const double off = std::log(std::abs(image.contrast) / expected.contrast.at(image.background)) / spread;
-    cost += 0.5 * off * off + std::log(spread / usual_spread);
+    cost += 0.5 * off * off + std::log(spread / contrast_spread);
   }
   return cost;
 }
@@ -66,7 +66,7 @@ std::vector<Hypothesis> hypotheses_of(std::span<const geometry::View> views, con
     for (std::size_t c = 0; c < discs[k].size(); ++c) {
       const Candidate& disc = discs[k][c];
       if (!has_marker_size(disc.image, marker.images[k].radius_px) ||
-          disc.image.sigma_px > vaguest * marker.images[k].radius_px)
+          disc.image.sigma_px > vaguest_disc * marker.images[k].radius_px)
         continue;
       Eigen::Matrix2d covariance = spread;
       covariance.diagonal().array() += variance_of(disc.image, marker.images[k]);

@@ -8,7 +8,7 @@
 #include "helicarm/track/two_cameras_test.h"
 
 namespace helicarm::track {
-namespace {
+namespace assign_test {
 
 ExpectedMarker expected_at(const Eigen::Vector3d& place, double sigma_mm) {
   ExpectedMarker marker;
@@ -58,5 +58,5 @@ TEST(Assign, DiscOffTheOtherViewsRayIsNotTaken) {
   EXPECT_EQ(std::ranges::count(assigned[0], not_seen), 1);
 }
 
-}  // namespace
+}  // namespace assign_test
 }  // namespace helicarm::track

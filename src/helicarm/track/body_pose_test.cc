@@ -9,7 +9,7 @@
 #include "helicarm/track/two_cameras_test.h"
 
 namespace helicarm::track {
-namespace {
+namespace body_pose_test {
 
 const std::vector<Eigen::Vector3d> body{{10, 0, 3}, {-8, 7, -4}, {2, -9, 8}, {-5, -6, -9}};
 const geometry::RigidTransform truth{geometry::rotation_from_vector({0.2, -0.1, 0.3}), {4, -3, 6}};
@@ -82,5 +82,5 @@ TEST(BodyPose, CollinearMarkersHaveNoSecondExtent) {
   EXPECT_GT(extents(body)[1], 5);
 }
 
-}  // namespace
+}  // namespace body_pose_test
 }  // namespace helicarm::track

@@ -4,7 +4,7 @@
 #include "helicarm/track/first_markers.h"
 
 namespace helicarm::track {
-namespace {
+namespace certain_pairs_test {
 
 using Indices = std::vector<std::size_t>;
 
@@ -29,5 +29,5 @@ TEST(CertainPairs, ExchangedPairsAreAmbiguous) {
   EXPECT_EQ(certain_pairs({{0, 0, -5}, {0, 1, -4.5}, {1, 0, -4.5}, {1, 1, -5}}, 3), Indices{});
 }
 
-}  // namespace
+}  // namespace certain_pairs_test
 }  // namespace helicarm::track

@@ -12,7 +12,7 @@
 #include "helicarm/track/two_cameras_test.h"
 
 namespace helicarm::track {
-namespace {
+namespace first_markers_test {
 
 namespace fs = std::filesystem;
 
@@ -142,5 +142,5 @@ TEST_F(FirstMarkers, PickInOneViewWithoutAPartnerIsSaid) {
   EXPECT_NE(given_.warnings[0].message.find("\"J2\" is picked in A only"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace first_markers_test
 }  // namespace helicarm::track

@@ -10,7 +10,7 @@
 namespace helicarm::track {
 namespace {
 
-constexpr double median_of_chi2 = 0.4549;  // one degree of freedom
+constexpr double median_of_chi2_1 = 0.4549;  // one degree of freedom
 
 /// Squares of ray gaps in image units, beside the variances that the fits state.
 struct Gap {
@@ -99,7 +99,7 @@ std::vector<double> sigma_factors(SequenceData& work) {
       }
   // Between the median, which outliers do not reach, and the mean, which holds the bands' coverage.
   const auto variance = [](std::vector<double> values) {
-    const double robust = median(values) / median_of_chi2;
+    const double robust = median(values) / median_of_chi2_1;
     double sum = 0;
     for (const double value : values) sum += std::min(value, 12 * robust);
     return std::max(robust, sum / double(values.size()));

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace helicarm::track {
-namespace {
+namespace image_keys_test {
 
 const std::vector<std::string> views{"cam1", "side, left"};
 
@@ -23,5 +23,5 @@ TEST(ImageKeys, ChangedImageIsNamed) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace image_keys_test
 }  // namespace helicarm::track

@@ -9,7 +9,7 @@
 #include "helicarm/track/contrast_model.h"
 
 namespace helicarm::track {
-namespace {
+namespace marker_fit_test {
 
 constexpr double radius = 2, share = 0.6, scatter = 25;
 
@@ -94,5 +94,5 @@ TEST(ContrastModel, LineOverBackgroundIsLearnt) {
   EXPECT_NEAR(model.at(150), share * 125, 1);
 }
 
-}  // namespace
+}  // namespace marker_fit_test
 }  // namespace helicarm::track

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 namespace helicarm::track {
-namespace {
+namespace marker_image_test {
 
 /// Discs by the share of each pixel that they cover, apart from the profile that is fitted.
 xray::XrayImage drawn(std::span<const Eigen::Vector2d> centres, double radius, double contrast, double noise,
@@ -74,5 +74,5 @@ TEST(MarkerImage, PickTakesTheNearestDisc) {
   EXPECT_LT((found->image.uv_raw - centres[1]).norm(), 0.15);
 }
 
-}  // namespace
+}  // namespace marker_image_test
 }  // namespace helicarm::track

@@ -30,7 +30,7 @@ report::Chart residual_chart(const ModelSequence& sequence, std::size_t model) {
   return chart;
 }
 
-struct Row {
+struct ModelRow {
   std::string model;
   std::string decision;
   std::string code;
@@ -39,13 +39,13 @@ struct Row {
 
 /// Frames of each model by decision and code.
 std::string decision_table(const ModelSequence& sequence) {
-  std::vector<Row> rows;
+  std::vector<ModelRow> rows;
   for (std::size_t i = 0; i < sequence.names.size(); ++i)
     for (std::size_t f = 0; f < sequence.frames.size(); ++f) {
       const TrackedBody& frame = sequence.bodies[i].frames[f];
       const std::string decision(decision_words[std::size_t(frame.decision)]),
           why(frame.reason ? code(*frame.reason) : "");
-      const auto found = std::ranges::find_if(rows, [&](const Row& row) {
+      const auto found = std::ranges::find_if(rows, [&](const ModelRow& row) {
         return row.model == sequence.names[i] && row.decision == decision && row.code == why;
       });
       if (found != rows.end())
@@ -53,16 +53,18 @@ std::string decision_table(const ModelSequence& sequence) {
       else
         rows.push_back({sequence.names[i], decision, why, 1, sequence.frames[f]});
     }
-  return html_of(report::table_of<Row>(
+  return html_of(report::table_of<ModelRow>(
       "Decisions",
-      {{{"Model", "Name"}, [](const Row& row) { return report::Cell{row.model}; }},
+      {{{"Model", "Name"}, [](const ModelRow& row) { return report::Cell{row.model}; }},
        {{"Decision", "Of the frame alone; the smooth motion fills refused frames"},
-        [](const Row& row) {
+        [](const ModelRow& row) {
           return report::Cell{row.decision, row.decision == "refuse"};
         }},
-       {{"Code", "First reason"}, [](const Row& row) { return report::Cell{row.code}; }},
-       {{"Frames", "Number", true}, [](const Row& row) { return report::Cell{std::to_string(row.frames)}; }},
-       {{"First", "Frame", true}, [](const Row& row) { return report::Cell{std::to_string(row.first)}; }}},
+       {{"Code", "First reason"}, [](const ModelRow& row) { return report::Cell{row.code}; }},
+       {{"Frames", "Number", true},
+        [](const ModelRow& row) { return report::Cell{std::to_string(row.frames)}; }},
+       {{"First", "Frame", true},
+        [](const ModelRow& row) { return report::Cell{std::to_string(row.first)}; }}},
       rows));
 }
 

@@ -9,7 +9,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::track {
-namespace {
+namespace model_sequence_test {
 
 using case_registration::RegisteredFrame;
 using registration::Registration;
@@ -114,5 +114,5 @@ TEST(ModelSequence, FramesUpToAnIncompleteLineAreRead) {
   EXPECT_TRUE(frames_from("{}\n", sequence.names, sequence.frames).empty());
 }
 
-}  // namespace
+}  // namespace model_sequence_test
 }  // namespace helicarm::track

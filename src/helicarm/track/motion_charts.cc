@@ -15,7 +15,7 @@ namespace helicarm::track {
 namespace {
 
 constexpr double degrees = 180 / EIGEN_PI, width_of_95 = 1.959964;
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
 
 /// Three curves with their 95 % bands over the frames.
 report::Chart pose_chart(const std::vector<int>& numbers, const std::vector<TrackedBody>& frames,
@@ -32,8 +32,8 @@ report::Chart pose_chart(const std::vector<int>& numbers, const std::vector<Trac
     for (std::size_t f = 0; f < frames.size(); ++f) {
       const auto& pose = frames[f].pose;
       if (!pose) {
-        curve.points.push_back({double(numbers[f]), nothing});
-        curve.ranges.push_back({nothing, nothing});
+        curve.points.push_back({double(numbers[f]), no_number});
+        curve.ranges.push_back({no_number, no_number});
         continue;
       }
       const double value = turns ? degrees * geometry::vector_from_rotation(pose->pose.rotation)[axis]

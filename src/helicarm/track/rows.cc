@@ -11,7 +11,7 @@
 namespace helicarm::track {
 namespace {
 
-constexpr double degrees = 180 / EIGEN_PI;
+constexpr double degrees_of_rad = 180 / EIGEN_PI;
 
 std::optional<double> number_from(std::string_view text) {
   double value = 0;
@@ -69,8 +69,8 @@ std::string body_row(int frame, const std::string& names, const TrackedBody& bod
     const Eigen::Matrix4d matrix = body.pose->pose.matrix();
     for (int i = 0; i < 16; ++i) row += fmt::format(",{:.12g}", matrix(i / 4, i % 4));
     for (int i = 0; i < 6; ++i)
-      row += fmt::format(",{:.6g}",
-                         (i < 3 ? degrees : 1) * std::sqrt(std::max(0.0, body.pose->covariance(i, i))));
+      row += fmt::format(
+          ",{:.6g}", (i < 3 ? degrees_of_rad : 1) * std::sqrt(std::max(0.0, body.pose->covariance(i, i))));
   } else {
     row += std::string(22, ',');
   }

@@ -11,7 +11,7 @@
 #include "helicarm/track/two_cameras_test.h"
 
 namespace helicarm::track {
-namespace {
+namespace sequence_test {
 
 constexpr double noise_px = 0.05;
 constexpr int frames = 40;
@@ -204,5 +204,5 @@ TEST(Sequence, WhereNoBodyHasAPoseNothingWasFollowed) {
   EXPECT_EQ(sequence.failure->reason, Reason::marker_lost);
 }
 
-}  // namespace
+}  // namespace sequence_test
 }  // namespace helicarm::track

@@ -12,9 +12,9 @@ namespace helicarm::track {
 namespace {
 
 using geometry::RigidTransform;
-constexpr int n = 18;  // errors: rotation, centre, their rates, their second derivatives
-using Vector = Eigen::Matrix<double, n, 1>;
-using Matrix = Eigen::Matrix<double, n, n>;
+constexpr int state_size = 18;  // errors: rotation, centre, their rates, their second derivatives
+using StateVector = Eigen::Matrix<double, state_size, 1>;
+using StateMatrix = Eigen::Matrix<double, state_size, state_size>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
@@ -24,13 +24,13 @@ struct State {
   Eigen::Matrix<double, 12, 1> rates = Eigen::Matrix<double, 12, 1>::Zero();  // turn, shift; twice
 };
 
-State moved(const State& state, const Vector& step) {
+State moved(const State& state, const StateVector& step) {
   return {geometry::rotation_from_vector(step.head<3>()) * state.rotation, state.centre + step.segment<3>(3),
           state.rates + step.tail<12>()};
 }
 
-Vector between(const State& from, const State& to) {
-  Vector step;
+StateVector between(const State& from, const State& to) {
+  StateVector step;
   step.head<3>() = geometry::vector_from_rotation(to.rotation * from.rotation.transpose());
   step.segment<3>(3) = to.centre - from.centre;
   step.tail<12>() = to.rates - from.rates;
@@ -49,8 +49,8 @@ State predicted(const State& state, double dt) {
   return next;
 }
 
-Matrix transition(const State& state, double dt) {
-  Matrix f = Matrix::Identity();
+StateMatrix transition(const State& state, double dt) {
+  StateMatrix f = StateMatrix::Identity();
   f.block<6, 6>(0, 6).diagonal().setConstant(dt);
   f.block<6, 6>(0, 12).diagonal().setConstant(dt * dt / 2);
   f.block<6, 6>(6, 12).diagonal().setConstant(dt);
@@ -59,11 +59,11 @@ Matrix transition(const State& state, double dt) {
 }
 
 /// Of white jerk.
-Matrix process(const MotionPrior& prior, double dt) {
+StateMatrix process(const MotionPrior& prior, double dt) {
   const double powers[3][3] = {{std::pow(dt, 5) / 20, std::pow(dt, 4) / 8, std::pow(dt, 3) / 6},
                                {std::pow(dt, 4) / 8, std::pow(dt, 3) / 3, dt * dt / 2},
                                {std::pow(dt, 3) / 6, dt * dt / 2, dt}};
-  Matrix q = Matrix::Zero();
+  StateMatrix q = StateMatrix::Zero();
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k)
       for (int axis = 0; axis < 6; ++axis)
@@ -73,7 +73,7 @@ Matrix process(const MotionPrior& prior, double dt) {
 
 struct Step {
   State predicted, filtered;
-  Matrix predicted_covariance, covariance, transition;
+  StateMatrix predicted_covariance, covariance, transition;
 };
 
 struct Filtered {
@@ -105,7 +105,7 @@ Filtered filter(std::span<const double> times, std::span<const std::optional<Mea
   Filtered result;
   const auto first = std::ranges::find_if(measured, [](const auto& each) { return each.has_value(); });
   State state = (*first)->at;
-  Matrix covariance = Matrix::Zero();
+  StateMatrix covariance = StateMatrix::Zero();
   // Before the first measured frame the pose is that frame's, with the width of the rates until then.
   const double before = times[std::size_t(first - measured.begin())] - times.front();
   for (int axis = 0; axis < 6; ++axis) {
@@ -129,7 +129,7 @@ Filtered filter(std::span<const double> times, std::span<const std::optional<Mea
       const Matrix6 spread = covariance.topLeftCorner<6, 6>() + measured[i]->covariance;
       const Eigen::LLT<Matrix6> factor(spread);
       const Vector6 weighted = factor.solve(off);
-      const Eigen::Matrix<double, n, 6> gain = factor.solve(covariance.topRows<6>()).transpose();
+      const Eigen::Matrix<double, state_size, 6> gain = factor.solve(covariance.topRows<6>()).transpose();
       const Matrix6 triangle = factor.matrixL();
       result.squares += off.dot(weighted);
       result.log_widths += triangle.diagonal().array().log().sum();
@@ -181,11 +181,12 @@ std::vector<Smoothed> smoothed(const Filtered& filtered) {
   const std::size_t count = filtered.steps.size();
   std::vector<Smoothed> result(count);
   State state = filtered.steps.back().filtered;
-  Matrix covariance = filtered.steps.back().covariance;
+  StateMatrix covariance = filtered.steps.back().covariance;
   result.back() = {state, covariance.topLeftCorner<6, 6>()};
   for (std::size_t i = count - 1; i-- > 0;) {
     const Step &here = filtered.steps[i], &next = filtered.steps[i + 1];
-    const Matrix gain = next.predicted_covariance.ldlt().solve(next.transition * here.covariance).transpose();
+    const StateMatrix gain =
+        next.predicted_covariance.ldlt().solve(next.transition * here.covariance).transpose();
     state = moved(here.filtered, gain * between(next.predicted, state));
     covariance = here.covariance + gain * (covariance - next.predicted_covariance) * gain.transpose();
     covariance = (0.5 * (covariance + covariance.transpose())).eval();

@@ -9,7 +9,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::track {
-namespace {
+namespace smooth_test {
 
 const Eigen::Vector3d centre(20, -10, 5);
 
@@ -132,5 +132,5 @@ TEST(Smooth, PlacesOfAPointAreSmoothedToo) {
   EXPECT_LT(std::sqrt(squares / 60), 0.075);
 }
 
-}  // namespace
+}  // namespace smooth_test
 }  // namespace helicarm::track

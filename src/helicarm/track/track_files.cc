@@ -74,9 +74,9 @@ std::vector<std::string> names_of(const TrackCase& given) {
   return bodies;
 }
 
-constexpr std::array names{"markers.csv", "bodies.csv",   "smoothed.csv", "relative.csv",
-                           "track.json",  "points2d.csv", "points3d.csv", "report.html",
-                           "sights.csv",  "sights.id",    "images.csv"};
+constexpr std::array file_names{"markers.csv", "bodies.csv",   "smoothed.csv", "relative.csv",
+                                "track.json",  "points2d.csv", "points3d.csv", "report.html",
+                                "sights.csv",  "sights.id",    "images.csv"};
 
 }  // namespace
 
@@ -211,7 +211,7 @@ std::string tra_of(const BodySequence& body) {
 }
 
 void forget_track(const std::filesystem::path& folder) {
-  std::vector<std::string> files(names.begin(), names.end());
+  std::vector<std::string> files(file_names.begin(), file_names.end());
   std::error_code ignored;
   // Bodies of an earlier run may have other names.
   if (std::filesystem::exists(folder / "track.json", ignored))

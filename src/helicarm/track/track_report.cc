@@ -14,7 +14,7 @@
 namespace helicarm::track {
 namespace {
 
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
 std::string body_charts(const Sequence& sequence, const TrackCase& given) {
   std::vector<std::string> names;
@@ -25,7 +25,7 @@ std::string body_charts(const Sequence& sequence, const TrackCase& given) {
     report::ChartSeries residual{""};
     for (std::size_t f = 0; f < sequence.frames.size(); ++f)
       residual.points.push_back(
-          {double(sequence.frames[f]), sequence.bodies[b].frames[f].rms_mm.value_or(nothing)});
+          {double(sequence.frames[f]), sequence.bodies[b].frames[f].rms_mm.value_or(no_value)});
     rms.series.push_back(std::move(residual));
     rms.y_from_zero = true;
     residuals.push_back(std::move(rms));

@@ -11,7 +11,7 @@
 namespace helicarm::track {
 namespace {
 
-constexpr double sight_floor_px = 0.05;  // of a fit, by the texture behind a marker
+constexpr double texture_floor_px = 0.05;  // of a fit, by the texture behind a marker
 
 }  // namespace
 
@@ -22,7 +22,7 @@ std::vector<Sight> Tracker::sights_of(std::size_t marker, const FrameSights& sig
     const auto& image = sights.of[marker][k];
     if (!image) continue;
     Eigen::Vector2d uv = rectified(k, image->uv_raw);
-    double sigma = std::hypot(image->sigma_px, sight_floor_px);
+    double sigma = std::hypot(image->sigma_px, texture_floor_px);
     if (k > 0 && cameras_[k].depth(place) > 1) {
       const Eigen::Vector2d speed = geometry::projection_jacobian(cameras_[k], place) * velocity;
       uv -= delays_[k].mean() * speed;

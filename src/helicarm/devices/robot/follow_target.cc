@@ -10,7 +10,7 @@
 namespace helicarm::robot {
 namespace {
 
-tl::unexpected<Failure> refuse(Reason reason, const std::string& why, const std::vector<Miss>& misses) {
+tl::unexpected<Failure> refusal(Reason reason, const std::string& why, const std::vector<Miss>& misses) {
   const Miss& last = misses.back();
   return fail(reason,
               fmt::format("the tool is {:.2f} mm and {:.2f} degrees off after {} corrections: {}",
@@ -43,15 +43,15 @@ Expected<std::vector<Miss>> follow_target(const Corrections& corrections, const 
     misses.push_back(*miss);
     const Miss& now = misses.back();
     if (2 * now.sigma_mm > corrections.tolerance_mm)
-      return refuse(Reason::uncertain, "the tracker's uncertainty exceeds the tolerance", misses);
+      return refusal(Reason::uncertain, "the tracker's uncertainty exceeds the tolerance", misses);
     if (now.distance_mm <= corrections.tolerance_mm && now.turn_deg <= corrections.tolerance_deg)
       return misses;
     if (static_cast<int>(misses.size()) > corrections.most)
-      return refuse(Reason::off_target, "iteration limit reached", misses);
+      return refusal(Reason::off_target, "iteration limit reached", misses);
     if (now.distance_mm > corrections.longest_mm || now.turn_deg > corrections.widest_deg)
-      return refuse(Reason::off_target, "the next correction exceeds its limit", misses);
+      return refusal(Reason::off_target, "the next correction exceeds its limit", misses);
     if (misses.size() > 1 && now.distance_mm > misses[misses.size() - 2].distance_mm + 2 * now.sigma_mm)
-      return refuse(Reason::off_target, "the last correction increased the error", misses);
+      return refusal(Reason::off_target, "the last correction increased the error", misses);
     if (const auto moved = move(seen->tracker_from_tcp.inverse() * seen->tracker_from_target); !moved)
       return tl::unexpected<Failure>(moved.error());
   }

@@ -24,7 +24,7 @@ constexpr Milliseconds held_up{50};
 /// After a stall, waiting states and poses are read from the sockets first.
 constexpr Milliseconds catch_up{20};
 
-std::chrono::steady_clock::duration duration_of(double s) {
+std::chrono::steady_clock::duration clock_duration(double s) {
   return std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(s));
 }
 
@@ -108,7 +108,7 @@ Expected<void> RobotLink::unlock(const std::string& who) {
   if (present->safety_mode == SafetyMode::protective_stop) {
     if (auto released = driver_->release_protective_stop(); !released) return released;
     std::unique_lock lock(guard_);
-    news_.wait_for(lock, duration_of(config_.start_s),
+    news_.wait_for(lock, clock_duration(config_.start_s),
                    [&] { return machine_.state() && !why_stopped(*machine_.state()); });
   }
   const std::lock_guard lock(guard_);

@@ -8,14 +8,14 @@ namespace {
 
 /// Longer than a pose's maximum age of 0.1 s, and enough states to include one without delay.
 constexpr double kept_s = 2;
-constexpr double clock_leap_s = 1;
+constexpr double reading_leap_s = 1;
 
 }  // namespace
 
 void ToolTrack::take(double robot_s, const geometry::RigidTransform& base_from_tcp, double arrival_s) {
   const std::lock_guard lock(mutex_);
   if (!entries_.empty() &&
-      (robot_s < entries_.back().robot_s || robot_s > entries_.back().robot_s + clock_leap_s))
+      (robot_s < entries_.back().robot_s || robot_s > entries_.back().robot_s + reading_leap_s))
     entries_.clear();
   entries_.push_back({robot_s, arrival_s - robot_s, base_from_tcp});
   while (entries_.front().robot_s < robot_s - kept_s) entries_.pop_front();

@@ -6,7 +6,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace check_point_test {
 
 const CheckPoint check{{10, 20, 30}};
 const geometry::RigidTransform tracker_from_bone{geometry::rotation_from_vector({0.3, 1, -0.2}),
@@ -27,5 +27,5 @@ TEST(CheckPoint, MovedMarkerIsRefused) {
   EXPECT_GT(off.error().figures.at("off_mm"), 1);
 }
 
-}  // namespace
+}  // namespace check_point_test
 }  // namespace helicarm::tracker

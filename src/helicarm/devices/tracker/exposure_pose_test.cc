@@ -10,7 +10,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace exposure_pose_test {
 
 const geometry::RigidTransform truth{geometry::rotation_from_vector({1, -0.4, 0.7}), {120, 40, 800}};
 
@@ -139,5 +139,5 @@ TEST(PoseBuffer, KeepsTheNewestPoses) {
   EXPECT_THROW(buffer.push({12, 0, 0, {}}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace exposure_pose_test
 }  // namespace helicarm::tracker

@@ -10,7 +10,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace facets_test {
 
 constexpr double pi = std::numbers::pi;
 constexpr double sigma_mm = 0.1;
@@ -125,5 +125,5 @@ TEST(Facets, NoUnknownOrDuplicateFacetIsAccepted) {
   EXPECT_EQ(fuse_facets(four_facets(), std::vector{pose, pose}).error().reason, Reason::name_clash);
 }
 
-}  // namespace
+}  // namespace facets_test
 }  // namespace helicarm::tracker

@@ -11,7 +11,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace hand_eye_test {
 
 constexpr double radians = std::numbers::pi / 180;
 const geometry::RigidTransform true_x{geometry::rotation_from_vector({0.5, 2, -0.7}), {30, -12, 65}};
@@ -98,5 +98,5 @@ TEST(HandEye, WronglyPairedPosesAreRefused) {
   EXPECT_EQ(calibrate_hand_eye(pairs).error().reason, Reason::residual_too_large);
 }
 
-}  // namespace
+}  // namespace hand_eye_test
 }  // namespace helicarm::tracker

@@ -6,7 +6,7 @@
 #include "helicarm/devices/tracker/igtl_samples_test.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace igtl_client_test {
 
 using asio::ip::tcp;
 
@@ -105,5 +105,5 @@ TEST(IgtlSockets, DamagedMessageBetweenValidOnesIsCounted) {
   ASSERT_TRUE(eventually([&] { return count_of(listener.client->status().counters, "wrong_crc") == 1; }));
 }
 
-}  // namespace
+}  // namespace igtl_client_test
 }  // namespace helicarm::tracker

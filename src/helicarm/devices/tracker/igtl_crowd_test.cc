@@ -7,7 +7,7 @@
 #include "helicarm/devices/tracker/igtl_samples_test.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace igtl_crowd_test {
 
 using asio::ip::tcp;
 
@@ -182,5 +182,5 @@ TEST(IgtlSockets, ClientIdleForLongestIsReplacedOnAFullServer) {
   EXPECT_EQ(count_of(server->status().counters, "evicted"), 1u);
 }
 
-}  // namespace
+}  // namespace igtl_crowd_test
 }  // namespace helicarm::tracker

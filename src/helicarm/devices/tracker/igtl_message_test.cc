@@ -10,7 +10,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace igtl_message_test {
 
 /// The library's sample TRANSFORM body (protocol 1), which is not a rotation.
 constexpr std::string_view sample_body_hex =
@@ -195,5 +195,5 @@ TEST(IgtlMessage, TimeStampIsABinaryFractionOfSeconds) {
   EXPECT_EQ(stamp_from_seconds(std::nan("")), 0u);
 }
 
-}  // namespace
+}  // namespace igtl_message_test
 }  // namespace helicarm::tracker

@@ -5,7 +5,7 @@
 #include "helicarm/devices/tracker/igtl_samples_test.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace igtl_sockets_test {
 
 TEST(IgtlSockets, EveryKindOfMessageArrives) {
   IgtlServerOptions options;
@@ -111,5 +111,5 @@ TEST(IgtlSockets, StopsInEveryState) {
   EXPECT_FALSE(waiting.client->status().trouble.empty());
 }
 
-}  // namespace
+}  // namespace igtl_sockets_test
 }  // namespace helicarm::tracker

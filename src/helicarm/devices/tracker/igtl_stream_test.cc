@@ -7,7 +7,7 @@
 #include "helicarm/devices/tracker/igtl_samples_test.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace igtl_stream_test {
 
 std::string all_samples() {
   std::string bytes;
@@ -112,5 +112,5 @@ TEST(IgtlStream, AnyBytesAreAcceptedOrRefused) {
   }
 }
 
-}  // namespace
+}  // namespace igtl_stream_test
 }  // namespace helicarm::tracker

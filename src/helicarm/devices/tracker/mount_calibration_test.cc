@@ -10,7 +10,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace mount_calibration_test {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -280,5 +280,5 @@ TEST(MountCalibration, UnknownPlaceIsRefused) {
   EXPECT_EQ(calibrate_mount(places(), observations, with_exact_tip()).error().reason, Reason::bad_value);
 }
 
-}  // namespace
+}  // namespace mount_calibration_test
 }  // namespace helicarm::tracker

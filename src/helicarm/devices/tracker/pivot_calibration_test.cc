@@ -11,7 +11,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace pivot_calibration_test {
 
 constexpr double radians = std::numbers::pi / 180;
 const Eigen::Vector3d tip{5, -3, 120};
@@ -106,5 +106,5 @@ TEST(PivotCalibration, TooLittleRotationIsRefused) {
   EXPECT_EQ(reason({.poses = 0}), Reason::poses_too_alike);
 }
 
-}  // namespace
+}  // namespace pivot_calibration_test
 }  // namespace helicarm::tracker

@@ -7,7 +7,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace pose_board_test {
 
 Eigen::Matrix4d pose_at(double x, double turn = 0) {
   return geometry::RigidTransform{geometry::rotation_from_vector({0.2, 0.1, turn}), {x, 0, 800}}.matrix();
@@ -169,5 +169,5 @@ TEST(PoseBoard, DeviceStatusIsKept) {
   EXPECT_EQ(board.status()->code, 18);
 }
 
-}  // namespace
+}  // namespace pose_board_test
 }  // namespace helicarm::tracker

@@ -9,7 +9,7 @@
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace pose_gate_test {
 
 /// A marker at rest, measured at 50 Hz with the jitter of a tracker.
 class Scene {
@@ -206,5 +206,5 @@ TEST(DeviceClock, TimesIncreaseWhenTheDelayShrinks) {
   }
 }
 
-}  // namespace
+}  // namespace pose_gate_test
 }  // namespace helicarm::tracker

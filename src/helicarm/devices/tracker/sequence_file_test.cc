@@ -9,7 +9,7 @@
 #include "helicarm/core/files.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace sequence_file_test {
 
 class SequenceFile : public testing::Test {
  protected:
@@ -100,5 +100,5 @@ TEST_F(SequenceFile, InvalidNameIsRefused) {
   EXPECT_EQ(write_sequence(path_, {frame}).error().reason, Reason::bad_value);
 }
 
-}  // namespace
+}  // namespace sequence_file_test
 }  // namespace helicarm::tracker

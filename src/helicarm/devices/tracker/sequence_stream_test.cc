@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace helicarm::tracker {
-namespace {
+namespace sequence_stream_test {
 
 SequenceFrame frame_at(double time_s) {
   SequenceFrame frame;
@@ -82,5 +82,5 @@ TEST(SequenceStream, HiddenAndMissingPosesAreRejected) {
 
 TEST(SequenceStream, NothingToReplayEndsImmediately) { replay({}, false, {}, {}); }
 
-}  // namespace
+}  // namespace sequence_stream_test
 }  // namespace helicarm::tracker

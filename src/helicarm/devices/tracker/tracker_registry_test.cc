@@ -8,7 +8,7 @@
 #include "helicarm/devices/tracker/sequence_file.h"
 
 namespace helicarm::tracker {
-namespace {
+namespace tracker_registry_test {
 
 /// Three frames of a tool that moves 0.1 mm in each.
 std::vector<SequenceFrame> moving_tool() {
@@ -72,5 +72,5 @@ TEST(TrackerRegistry, HostNameIsRefused) {
   EXPECT_EQ(source.error().reason, Reason::bad_value);
 }
 
-}  // namespace
+}  // namespace tracker_registry_test
 }  // namespace helicarm::tracker
