@@ -117,7 +117,7 @@ def main():
         sys.exit(__doc__)
     program, kind, out = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
     pages = tree(program)
-    version = subprocess.run([program, "--version"], capture_output=True, text=True).stdout.split()[-1]
+    version = subprocess.run([program, "--version"], capture_output=True, text=True).stdout.split()[1]
     if kind == "man":
         out.mkdir(parents=True, exist_ok=True)
         for words, page in pages:

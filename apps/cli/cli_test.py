@@ -184,6 +184,11 @@ class CommandLine(SimulatedCase):
         done = run("phantom", "export", "--svg", drawing, "--json")
         self.assertEqual(json.loads(done.stdout), {"written": [str(drawing)]})
 
+    def test_version_names_the_commit(self):
+        done = run("--version")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stdout, r"^helicarm \d+\.\d+\.\d+( \([0-9a-f]{7,}(, changed)?\))?\n$")
+
     def test_help_lists_the_commands_by_subject(self):
         text = run("--help").stdout
         headings = [line[:-1] for line in text.splitlines() if line.endswith(":") and not line.startswith(" ")]

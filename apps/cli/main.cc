@@ -12,6 +12,9 @@
 #include "helicarm/core/text.h"
 #include "helicarm/pipeline/result.h"
 
+/// " (5da20f9512)", or empty; written at each build by cmake/commit.cmake.
+extern const char* const commit_in_brackets;
+
 namespace helicarm::cli {
 namespace {
 
@@ -37,7 +40,7 @@ int run(int argc, char** argv) {
       "Research instrument, not a medical device.",
       "helicarm");
   app.footer("Begin with:\n  helicarm demo\nHelp for a command: helicarm COMMAND --help");
-  app.set_version_flag("--version", "helicarm " HELICARM_VERSION);
+  app.set_version_flag("--version", std::string("helicarm " HELICARM_VERSION) + commit_in_brackets);
   app.fallthrough();
   app.require_subcommand(1);
   app.add_flag("--json", console.json, "Print the answer as JSON");
