@@ -5,6 +5,12 @@ Points are (u, v) in pixels, (0, 0) the centre of the top-left pixel; images are
 degrees. A matrix named a_from_b maps points of b into a. Volumes are indexed [i, j, k]; patients' frames are L, P, S.
 Failures are InputError and RefusedError.
 """
+import os as _os
+
+# Where the package brings DCMTK's data dictionary along (wheel, archive), DCMTK does not find it by itself.
+if _os.path.exists(_dictionary := _os.path.join(_os.path.dirname(__file__), "dicom.dic")):
+    _os.environ.setdefault("DCMDICTPATH", _dictionary)
+
 from ._helicarm import (  # noqa: F401
     CArmPrior, Calibration, Calibrator, Camera, DistortionMap, IntrinsicsPrior, LocatedPoint, MeasuredPhantom, Plate,
     Rectification, Result, ResultPoint, Surface, Sweep, Track, ViewPoints, Volume, XrayImage, __version__, bundle,
