@@ -9,10 +9,10 @@ tools/install_packages.sh build python docs
 tools/build.sh -DHELICARM_PYTHON=ON helicarm helicarm_python
 rm -rf build/docs build/site
 cp -r docs build/docs
-cp CONTRIBUTING.md CHANGELOG.md build/docs
+cp CONTRIBUTING.md CHANGELOG.md SECURITY.md build/docs
 cp README.md build/docs/overview.md
 # Beside each other here, one above the other in the repository.
-sed -i 's#(\.\./README\.md#(overview.md#g; s#(\.\./#(#g; s#(docs/#(#g' build/docs/*.md
+sed -i 's#(\(\.\./\)\?README\.md#(overview.md#g; s#(\.\./#(#g; s#(docs/#(#g' build/docs/*.md
 tools/cli_reference.py build/bin/helicarm markdown build/docs/commands.md
 PYTHONPATH=build/python /usr/bin/python3 tools/api_reference.py python build/docs/python_api.md
 /usr/bin/python3 tools/api_reference.py cpp build/docs/cpp_api.md
