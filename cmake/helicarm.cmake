@@ -78,13 +78,13 @@ function(helicarm_public target scope)
   target_compile_features(${target} ${scope} cxx_std_20)
 endfunction()
 
-# helicarm_module(NAME [APART] [TESTS_APART] [PRIVATE] SOURCES a.cc ... USES module ... LIBRARIES target ... TESTS a_test.cc ...
+# helicarm_module(NAME [APART] [PRIVATE] SOURCES a.cc ... USES module ... LIBRARIES target ... TESTS a_test.cc ...
 #                 TESTS_TOGETHER Suite ...)
-# A module's files are compiled as one unit, and its tests in groups; APART, TESTS_APART: file by file, as they use one
+# A module's files are compiled as one unit, and its tests in groups; APART: file by file, as they use one
 # name for several things. PRIVATE: no part of the installed library. TESTS_TOGETHER: suites that share what is dear to
 # make, each one test of ctest.
 function(helicarm_module name)
-  cmake_parse_arguments(ARG "APART;TESTS_APART;PRIVATE" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES;TESTS_TOGETHER" ${ARGN})
+  cmake_parse_arguments(ARG "APART;PRIVATE" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES;TESTS_TOGETHER" ${ARGN})
   list(TRANSFORM ARG_USES PREPEND helicarm_)
   list(TRANSFORM ARG_TEST_USES PREPEND helicarm_)
   if(ARG_SOURCES)
@@ -110,7 +110,7 @@ function(helicarm_module name)
     target_link_libraries(${name}_test PRIVATE helicarm_${name} ${ARG_TEST_USES} GTest::gmock GTest::gtest_main)
     target_compile_options(${name}_test PRIVATE ${helicarm_test_options})
     target_precompile_headers(${name}_test REUSE_FROM helicarm_precompiled_tests)
-    if(HELICARM_UNITY AND NOT ARG_TESTS_APART)
+    if(HELICARM_UNITY)
       set_target_properties(${name}_test PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
     endif()
     # GCC 12 sees string literals overrun where std::string moves them (GCC bug 105329).
