@@ -72,8 +72,12 @@ CommandResult c_arm_check_command(const CArmCheckArguments& arguments, Console& 
     const calibration::CArmCheck check = value_or_throw(pipeline::check_against_record(
         acquisitions_of(arguments.folder, console), record, arguments.record.string()));
     const std::optional<Failure> change = pipeline::c_arm_change(check);
+    const std::vector<Warning> limits = pipeline::limits_of(check);
+    print_warnings(limits, console);
     if (console.json) {
       Json answer = report::to_json(check);
+      answer["warnings"] = Json::array();
+      for (const Warning& limit : limits) answer["warnings"].push_back(pipeline::to_json(limit));
       answer["status"] = change ? "refused" : "ok";
       answer["failure"] = change ? pipeline::to_json(*change) : Json();
       console.out << to_text(answer) << '\n';

@@ -107,6 +107,17 @@ std::vector<PoseNumbers> poses_of_table(const CameraKeys& file, const std::strin
   return poses;
 }
 
+/// Rodrigues' vector is in radian; one in degrees is mostly longer than a turn.
+void check_rotation_vector(const Eigen::Vector3d& rvec, const std::string& where) {
+  constexpr double longest_rad = 2 * EIGEN_PI;
+  if (rvec.norm() > longest_rad)
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("{}: length {:.4g}, a rotation vector is in radian and at most {:.4g} long: are "
+                    "these degrees?",
+                    where, rvec.norm(), longest_rad));
+}
+
 PoseNumbers pose_of(const CameraKeys& file) {
   const auto t = file.key_of({"tvec", "tvecs", "translationvector", "translation", "t"});
   const auto rvec = file.key_of({"rvec", "rvecs", "rotationvector"});
@@ -120,6 +131,7 @@ PoseNumbers pose_of(const CameraKeys& file) {
                    fmt::format("{}: three numbers may be a rotation vector or angles: name a rotation vector "
                                "rvec, or give the 9 numbers of the matrix",
                                file.where(r)));
+  if (!rvec.empty()) check_rotation_vector(Eigen::Vector3d(file.numbers(rvec, 3).data()), file.where(rvec));
   const auto by_vector =
       rvec.empty() ? std::vector<double>() : rows_of_rotation(Eigen::Vector3d(file.numbers(rvec, 3).data()));
   if (r.empty()) return {by_vector, file.numbers(t, 3)};

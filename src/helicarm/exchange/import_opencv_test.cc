@@ -123,6 +123,17 @@ TEST(ImportOpenCv, BrokenFilesAreNamed) {
   }
 }
 
+TEST(ImportOpenCv, RotationVectorInDegreesIsRefused) {
+  const auto at = opencv_yaml.find("rvec:"), data = opencv_yaml.find("data: [", at),
+             end = opencv_yaml.find(']', data);
+  std::string text = opencv_yaml;
+  text.replace(data, end - data, "data: [ 10., -20., 30. ");
+  const auto refused = import_text(text);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::bad_value);
+  EXPECT_NE(refused.error().message.find("are these degrees?"), std::string::npos) << refused.error().message;
+}
+
 /// As PyYAML writes it, with OpenCV's numbers.
 const std::string py_yaml = R"(camera_name: left, upper
 calibrated: 2026-05-04 10:00:00

@@ -7,6 +7,7 @@
 
 #include "helicarm/exchange/import_formats.h"
 #include "helicarm/exchange/rtk_projection.h"
+#include "helicarm/exchange/run_geometry.h"
 
 namespace helicarm::exchange {
 namespace {
@@ -77,6 +78,25 @@ std::vector<RtkProjection> projections_of(std::string_view text, const std::stri
   return all;
 }
 
+/// The comment of `rtk_geometry`, after spacing and origin: "image W x H px; rows run upwards".
+struct StatedImage {
+  Eigen::Vector2i size;
+  bool rows_upwards;
+};
+std::optional<StatedImage> stated_image(std::string_view text, const std::string& origin) {
+  constexpr std::string_view image = " mm; image ", times = " x ", end = " px; rows ",
+                             upwards = "run upwards";
+  const std::size_t start = text.find(image), close = text.find("-->");
+  if (start == text.npos || start > close) return std::nullopt;
+  const std::size_t middle = text.find(times, start), last = text.find(end, start);
+  if (middle == text.npos || last == text.npos || middle > last) return std::nullopt;
+  const std::string where = origin + ": comment on the projection image";
+  auto numbers = numbers_in(text.substr(start + image.size(), middle - start - image.size()), where);
+  const auto height = numbers_in(text.substr(middle + times.size(), last - middle - times.size()), where);
+  numbers.insert(numbers.end(), height.begin(), height.end());
+  return StatedImage{image_size_from(numbers, where), text.substr(last + end.size()).starts_with(upwards)};
+}
+
 /// The comment of `rtk_geometry`: "Projection image: spacing A B mm, origin C D mm".
 std::optional<RtkPixels> stated_pixels(std::string_view text, const std::string& origin) {
   constexpr std::string_view spacing = "<!-- Projection image: spacing ", between = " mm, origin ",
@@ -125,11 +145,17 @@ bool is_rtk_geometry(std::string_view text) { return text.find("<RTKThreeDCircul
 
 Cameras parse_rtk_geometry(std::string_view text, const std::string& origin, const ImportOptions& options) {
   const Eigen::Matrix3d pixels = pixels_of(text, origin, options).pixels_from_mm();
+  const auto image = stated_image(text, origin);
   Cameras cameras;
   for (const RtkProjection& projection : projections_of(text, origin)) {
     const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = pixels * projection.matrix();
-    cameras.push_back(imported({rows.data(), rows.data() + rows.size()}, origin));
-    cameras.back().in_mm = true;
+    ImportedMatrix& camera = cameras.emplace_back(imported({rows.data(), rows.data() + rows.size()}, origin));
+    camera.in_mm = true;
+    if (!image) continue;
+    camera.image_size = image->size;
+    // Where the option states it too, it is done with the other options.
+    if (image->rows_upwards && !options.rows_upwards)
+      camera.view = with_rows_reversed(camera.view, image->size.y());
   }
   return cameras;
 }

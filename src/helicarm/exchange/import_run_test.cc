@@ -51,7 +51,8 @@ TEST_P(ImportedRuns, AreTheViewsThatWereWritten) {
   expect_read_back(cameras_in(ompl_matrices(run)), run, "ompl");
   expect_read_back(cameras_in(matrices_csv(run)), run, "csv");
   expect_read_back(cameras_in(matrices_npy(run)), run, "npy");
-  // RTK's rows run upwards where the image is not mirrored.
+  // RTK's rows run upwards where the image is not mirrored; the comment states it, and the option may.
+  expect_read_back(cameras_in(*rtk_geometry(run)), run, "rtk");
   expect_read_back(cameras_in(*rtk_geometry(run), {.image_size = run.size, .rows_upwards = !GetParam()}), run,
                    "rtk");
 }

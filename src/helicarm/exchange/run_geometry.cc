@@ -95,9 +95,9 @@ Expected<std::string> rtk_geometry(const RunGeometry& run) {
             "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<!-- Projection image: spacing {} {} mm, "
             "origin {} "
             "{} mm; "
-            "rows {} -->\n<RTKThreeDCircularGeometry version=\"3\">\n",
+            "image {} x {} px; rows {} -->\n<RTKThreeDCircularGeometry version=\"3\">\n",
             rtk.pixels.spacing_mm.x(), rtk.pixels.spacing_mm.y(), rtk.pixels.origin_mm.x(),
-            rtk.pixels.origin_mm.y(),
+            rtk.pixels.origin_mm.y(), run.size.x(), run.size.y(),
             rtk.rows_upwards ? "run upwards: flip the rectified image upside down"
                              : "as in the rectified image");
       const RtkProjection& p = rtk.projection;

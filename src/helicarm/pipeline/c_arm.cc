@@ -79,6 +79,24 @@ Expected<calibration::CArmCheck> check_against_record(std::vector<calibration::H
   });
 }
 
+std::vector<Warning> limits_of(const calibration::CArmCheck& check) {
+  std::vector<double> sigmas_mm;
+  for (const calibration::AcquisitionCheck& one : check.acquisitions)
+    if (!one.entry.primary_deg) sigmas_mm.push_back(one.sigma_mm.tail<2>().maxCoeff());
+  if (sigmas_mm.empty()) return {};
+  const auto count = sigmas_mm.size();
+  const double sigma_mm = median(std::move(sigmas_mm));
+  return {
+      {Reason::intrinsics_weak,
+       fmt::format(
+           "{} of {} acquisitions state no positioner angles: each counts as a position of its own, and "
+           "its principal point is predicted with a standard deviation of {:.1f} mm; smaller changes, and "
+           "another C-arm that is alike, are not seen",
+           count, check.acquisitions.size(), sigma_mm),
+       {},
+       {{"acquisitions", double(count)}, {"sigma_mm", sigma_mm}}}};
+}
+
 Expected<calibration::HistoryGrowth> add_to_record(const std::filesystem::path& record,
                                                    const std::vector<calibration::HistoryEntry>& acquired) {
   return guarded([&] {

@@ -31,6 +31,10 @@ Expected<calibration::CArmCheck> check_against_record(std::vector<calibration::H
                                                       calibration::CArmHistory record,
                                                       const std::string& origin);
 
+/// What a check cannot see: acquisitions without positioner angles, each of which counts as a position of its
+/// own (intrinsics_weak, with the standard deviation of their prediction).
+std::vector<Warning> limits_of(const calibration::CArmCheck& check);
+
 /// Adds acquisitions to a record, which is made where there is none. Fails with c_arm_changed, and adds
 /// nothing, where they lie beyond what the record predicts and its tolerances; else as
 /// `calibration::add_to_history`.

@@ -56,6 +56,20 @@ TEST(CArm, AcquisitionsOfAnotherArmAreNotAdded) {
   EXPECT_EQ(add_to_record(file, std::vector{same, record.entries[0]})->added, 1u);
 }
 
+TEST(CArm, CheckWithoutAnglesSaysThatItSeesLittle) {
+  const calibration::CArmHistory record = record_of(10);
+  std::vector<calibration::HistoryEntry> acquired{record.entries[4], record.entries[5]};
+  acquired[0].image = "new a";
+  acquired[1].image = "new b";
+  EXPECT_TRUE(limits_of(*check_against_record(acquired, record, "arm.json")).empty());
+  acquired[1].primary_deg.reset();
+  const auto limits = limits_of(*check_against_record(acquired, record, "arm.json"));
+  ASSERT_EQ(limits.size(), 1u);
+  EXPECT_EQ(limits[0].reason, Reason::intrinsics_weak);
+  EXPECT_EQ(limits[0].figures.at("acquisitions"), 1);
+  EXPECT_GT(limits[0].figures.at("sigma_mm"), 1);
+}
+
 TEST(CArm, UnchangedArmIsNoFailure) {
   const calibration::CArmHistory record = record_of(10);
   std::vector<calibration::HistoryEntry> acquired{record.entries[4]};

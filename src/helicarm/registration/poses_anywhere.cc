@@ -24,9 +24,8 @@ using Eigen::Vector3d;
 using geometry::RigidTransform;
 using Gradients = cv::Mat2f;
 
-constexpr int orientations = 4608;   // about 15 degrees apart
-constexpr double farthest_mm = 150;  // from the views' middle, along each axis
-constexpr int patch_side = 8;        // side, pixels of the raster
+constexpr int orientations = 4608;  // about 15 degrees apart
+constexpr int patch_side = 8;       // side, pixels of the raster
 
 /// Number `i` of nearly uniform rotations (super-Fibonacci spirals, Alexa 2022).
 Eigen::Matrix3d orientation(int i) {
@@ -238,6 +237,13 @@ Vector3d middle_of(const std::vector<RegistrationView>& views) {
   return across.ldlt().solve(sum);
 }
 
+/// From the views' middle, along each axis: the places of a small model lie closer together, and their number
+/// grows with the third power.
+double farthest_mm(double spacing_mm) {
+  constexpr double least = 80, most = 150, places_per_axis = 55;
+  return std::clamp(places_per_axis * spacing_mm, least, most);
+}
+
 Level level_anywhere(const Model& model) { return {false, std::clamp(model.radius_mm / 8, 1.0, 6.0)}; }
 
 std::vector<RigidTransform> poses_anywhere(const Scene& scene, std::size_t count,
@@ -248,8 +254,8 @@ std::vector<RigidTransform> poses_anywhere(const Scene& scene, std::size_t count
   std::vector<ViewSearch> views;
   for (std::size_t i = 0; i < scene.views().size(); ++i)
     views.emplace_back(scene.raster(level, i), scene.views()[i].view, model, scene.density(level), middle);
-  const auto places =
-      places_about(views, middle, 2 * level.spacing_mm, int(farthest_mm / (2 * level.spacing_mm)));
+  const auto places = places_about(views, middle, 2 * level.spacing_mm,
+                                   int(farthest_mm(level.spacing_mm) / (2 * level.spacing_mm)));
   constexpr std::size_t each = 2;
   std::vector<Candidate> found(std::size_t(orientations) * each);
   parallel_for(orientations, scene.threads(), [&](std::size_t i) {

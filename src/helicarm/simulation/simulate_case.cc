@@ -101,13 +101,10 @@ Expected<void> check_rotation(const SimulationOptions& options, const Rotation& 
 }
 
 Expected<void> check(const SimulationOptions& options, const phantom::Calibrator& calibrator, bool is_run) {
-  if (is_run && options.size == 256) {
-    SimulationOptions larger = options;
-    larger.size = 512;
-    return check(larger, calibrator, is_run);
-  }
-  if (options.size != 512 && options.size != 1024)
-    return fail(Reason::bad_value, fmt::format("size: {}, must be 512 or 1024", options.size));
+  const bool is_small_run = is_run && options.size == 256;
+  if (!is_small_run && options.size != 512 && options.size != 1024)
+    return fail(Reason::bad_value,
+                fmt::format("size: {}, must be {}512 or 1024", options.size, is_run ? "256, " : ""));
   if (options.bits < 8 || options.bits > 16 || options.bits % 2 != 0)
     return fail(Reason::bad_value, fmt::format("bits: {}, must be 8, 10, 12, 14 or 16", options.bits));
   if (const auto checked = check_views(options); !checked) return checked;

@@ -352,6 +352,22 @@ void warn_of_unused_balls(Sweep& sweep, const std::vector<FrameEstimate>& estima
   }
 }
 
+/// Images that are used although their residuals are larger than the noise, or their camera is off the path.
+void warn_of_doubtful(Sweep& sweep) {
+  std::vector<int> numbers;
+  for (const SweepFrame& frame : sweep.frames)
+    if (!frame.failure && frame.decision == Decision::warn) numbers.push_back(frame.number);
+  if (numbers.empty()) return;
+  sweep.warnings.push_back(
+      {Reason::residual_too_large,
+       fmt::format("{} of {} images are doubtful: {}: residuals larger than the noise, or a camera off the "
+                   "path; they are "
+                   "used, and those with large residuals are no acquisitions of the C-arm's record",
+                   numbers.size(), sweep.frames.size(), fmt::join(numbers, ", ")),
+       {},
+       {{"doubtful", double(numbers.size())}, {"images", double(sweep.frames.size())}}});
+}
+
 void warn_of_refused(Sweep& sweep) {
   std::map<Reason, std::vector<int>> refused;
   for (const SweepFrame& frame : sweep.frames)
@@ -398,6 +414,7 @@ Sweep swept(const SweepCase& given, const SweepOptions& options,
   compare_angles(sweep);
   compare_distance(sweep, estimates);
   warn_of_refused(sweep);
+  warn_of_doubtful(sweep);
   return sweep;
 }
 
