@@ -126,7 +126,8 @@ std::optional<Failure> c_arm_change(const calibration::CArmCheck& check) {
       fmt::format(
           "the source distance is {:+.2f} mm (sigma {:.2f}) and the principal point {:+.2f}, {:+.2f} mm "
           "(sigma {:.2f}, {:.2f}) from what the record predicts; chi-square of all {:.0f}, limit {:.0f}: "
-          "the C-arm has changed, or the case's pixel size, plate or calibrator is wrong",
+          "the C-arm has changed, the record is another C-arm's, or the case's pixel size, plate or "
+          "calibrator is wrong",
           off.x(), worst.sigma_mm.x(), off.y(), off.z(), worst.sigma_mm.y(), worst.sigma_mm.z(), check.chi2,
           check.limit),
       worst.entry.view,
