@@ -15,6 +15,7 @@
 #include "helicarm/geometry/dlt.h"
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/sweep/run_noise.h"
+#include "helicarm/sweep/shared_errors.h"
 
 namespace helicarm::sweep {
 namespace {
@@ -25,24 +26,6 @@ constexpr double step_chi2 = 32;
 constexpr double off_path_limit = 5.5;  // standard deviations
 constexpr std::size_t least_path = 8;   // frames
 constexpr int relinearisations = 4;
-
-/// How each ball's position follows from independent unit errors of the phantom, its scale among them.
-std::vector<Eigen::Matrix3Xd> phantom_errors(const phantom::Calibrator& calibrator) {
-  const calibration::CommonPrior common = pipeline::common_prior(calibrator);
-  const calibration::OffsetRoots roots = calibration::offset_roots(common);
-  const Eigen::Vector3d centre = phantom::middle_of(calibrator);
-  const auto n = Eigen::Index(calibrator.balls.size());
-  const Eigen::Index own = roots.of_ball.empty() ? 0 : roots.joint ? roots.of_ball.front().cols() : 3 * n;
-  std::vector<Eigen::Matrix3Xd> errors;
-  for (Eigen::Index k = 0; k < n; ++k) {
-    Eigen::Matrix3Xd& of_ball = errors.emplace_back(Eigen::Matrix3Xd::Zero(3, own + 1));
-    if (own > 0 && roots.joint) of_ball.leftCols(own) = roots.of_ball[std::size_t(k)];
-    if (own > 0 && !roots.joint)
-      of_ball.middleCols(3 * k, roots.of_ball[std::size_t(k)].cols()) = roots.of_ball[std::size_t(k)];
-    of_ball.col(own) = common.scale_sigma * (calibrator.balls[std::size_t(k)].centre_in_calibrator - centre);
-  }
-  return errors;
-}
 
 void whiten(FramePoints& points, const Eigen::VectorXd& of_centres_px2) {
   Eigen::MatrixXd covariance_px2 = points.map_covariance_px2;
@@ -230,40 +213,6 @@ std::vector<std::size_t> accepted_in(const Sweep& sweep) {
   return accepted;
 }
 
-/// The error of a plate's map between its dots is the same in all images of a run: the pixels of frames as
-/// unit errors of its modes over the field.
-class SharedMap {
- public:
-  SharedMap(const rectification::DistortionMap& map, double noise_factor) : map_(map), factor_(noise_factor) {
-    constexpr int side = 9;
-    for (int row = 0; row < side; ++row)
-      for (int column = 0; column < side; ++column) {
-        const Eigen::Vector2d share((column + 0.5) / side, (row + 0.5) / side);
-        const Eigen::Vector2d place = map.hull_low + share.cwiseProduct(map.hull_high - map.hull_low);
-        if (rectification::raw_in_image(map, place)) grid_.push_back(place);
-      }
-    constexpr double least_share = 1e-3;
-    const auto [values, vectors] = geometry::symmetric_eigen(map.covariance_px2(grid_));
-    const auto n = values.size();
-    const auto kept = (values.array() > least_share * values[n - 1]).count();
-    modes_ = vectors.rightCols(kept) * values.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
-  }
-
-  /// Pixels x modes.
-  Eigen::MatrixXd errors_at(const std::vector<Eigen::Vector2d>& pixels) const {
-    std::vector<Eigen::Vector2d> places = pixels;
-    places.insert(places.end(), grid_.begin(), grid_.end());
-    const auto n = std::ssize(pixels), grid = std::ssize(grid_);
-    return factor_ * map_.covariance_px2(places).topRightCorner(n, grid) * modes_;
-  }
-
- private:
-  const rectification::DistortionMap& map_;
-  double factor_;
-  std::vector<Eigen::Vector2d> grid_;
-  Eigen::MatrixXd modes_;
-};
-
 /// The covariance of each camera, with what all frames share: errors of the phantom and of a plate's map.
 std::vector<CameraMatrix> covariances_of(const Joint& joint, const Detector& detector,
                                          const std::vector<Eigen::Matrix3Xd>& errors,
@@ -288,15 +237,6 @@ std::vector<CameraMatrix> covariances_of(const Joint& joint, const Detector& det
                              map->errors_at(joint.points[i].pixels));
     });
   return covariances;
-}
-
-/// Of the frame in the middle of those that have one.
-std::optional<SharedMap> shared_map_of(const std::vector<FrameEstimate>& estimates, double noise_factor) {
-  std::vector<const rectification::DistortionMap*> maps;
-  for (const FrameEstimate& estimate : estimates)
-    if (!estimate.failure && estimate.map) maps.push_back(&*estimate.map);
-  if (maps.empty()) return {};
-  return SharedMap(*maps[maps.size() / 2], noise_factor);
 }
 
 void set_best(SweepFrame& frame, const Joint& joint, std::size_t i, const CameraMatrix& covariance,
