@@ -201,7 +201,8 @@ Expected<HistoryGrowth> add_to_history(const std::filesystem::path& path,
       throw BadInput(Reason::cannot_write,
                      fmt::format("{}: holds {} acquisitions, limit {}: begin a new file", path.string(),
                                  growth.earlier, most_entries));
-    value_or_throw(write_file(lock.file(), to_text(to_json(history)) + "\n"));
+    if (growth.added > 0 || !std::filesystem::exists(lock.file()))
+      value_or_throw(write_file(lock.file(), to_text(to_json(history)) + "\n"));
     return growth;
   });
 }

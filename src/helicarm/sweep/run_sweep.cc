@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -164,9 +165,9 @@ std::optional<fiducials::ExpectedView> camera_between(const geometry::View& befo
                                  std::max(least_within_deg, of_the_way * turned_deg * std::max(1.0, share))};
 }
 
-/// The two accepted frames from which the camera of a frame follows: on both sides, or at an end of the run
-/// the two nearest ones; each at most `reach` away.
-std::optional<std::pair<std::ptrdiff_t, std::ptrdiff_t>> neighbours_of(
+/// Pairs of accepted frames from which the camera of a frame follows: those on both sides, then the two
+/// nearest ones on either side; each at most `reach` away.
+std::vector<std::pair<std::ptrdiff_t, std::ptrdiff_t>> neighbours_of(
     std::ptrdiff_t frame, const std::vector<FrameEstimate>& frames) {
   constexpr std::ptrdiff_t reach = 5;
   const auto next = [&](std::ptrdiff_t from, std::ptrdiff_t step) -> std::optional<std::ptrdiff_t> {
@@ -174,37 +175,46 @@ std::optional<std::pair<std::ptrdiff_t, std::ptrdiff_t>> neighbours_of(
       if (i >= 0 && i < std::ssize(frames) && !frames[std::size_t(i)].failure) return i;
     return {};
   };
+  std::vector<std::pair<std::ptrdiff_t, std::ptrdiff_t>> pairs;
   const auto before = next(frame, -1), after = next(frame, 1);
-  if (before && after) return std::pair(*before, *after);
-  if (!before && !after) return {};
-  const std::ptrdiff_t nearest = before ? *before : *after, step = before ? -1 : 1;
-  const auto farther = next(nearest, step);
-  if (!farther) return {};
-  return std::pair(*farther, nearest);
+  if (before && after) pairs.emplace_back(*before, *after);
+  for (const auto& [nearest, step] : {std::pair(before, -1), std::pair(after, 1)})
+    if (nearest)
+      if (const auto farther = next(*nearest, step)) pairs.emplace_back(*farther, *nearest);
+  return pairs;
+}
+
+/// The camera of a frame by the accepted frames beside it, if they tell.
+std::optional<fiducials::ExpectedView> expected_at(std::ptrdiff_t frame,
+                                                   const std::vector<FrameEstimate>& frames) {
+  for (const auto& [first, second] : neighbours_of(frame, frames))
+    if (auto expected =
+            camera_between(frames[std::size_t(first)].alone->view, frames[std::size_t(second)].alone->view,
+                           double(frame - first) / double(second - first)))
+      return expected;
+  return {};
 }
 
 /// Labels again the frames that their image alone leaves ambiguous and whose camera the accepted frames
-/// beside them tell. A phantom seen along its axis, or half out of the field, looks alike from two
-/// directions: a run does not jump.
-void label_by_neighbours(double factor, const SweepCase& given, std::vector<FrameEstimate>& estimates,
-                         unsigned threads) {
+/// beside them tell; returns how many. A phantom seen along its axis, or half out of the field, looks alike
+/// from two directions: a run does not jump.
+int label_by_neighbours(double factor, const SweepCase& given, std::vector<FrameEstimate>& estimates,
+                        unsigned threads) {
   const std::vector<FrameEstimate> alone = estimates;
+  std::atomic<int> labelled = 0;
   parallel_for(estimates.size(), threads, [&](std::size_t index) {
-    const auto i = std::ptrdiff_t(index);
     if (!alone[index].failure || alone[index].failure->reason != Reason::ambiguous_labels) return;
-    const auto beside = neighbours_of(i, alone);
-    if (!beside) return;
-    const auto [first, second] = *beside;
-    const auto expected =
-        camera_between(alone[std::size_t(first)].alone->view, alone[std::size_t(second)].alone->view,
-                       double(i - first) / double(second - first));
+    const auto expected = expected_at(std::ptrdiff_t(index), alone);
     if (!expected) return;
     const Frame& frame = given.frames[index];
     auto again = estimate_frame(frame, file_of(frame, given), given.base, {}, expected);
     if (!again || again->failure) return;
     calibrate_with(factor, given, *again, frame.view.name);
-    if (!again->failure) estimates[index] = *std::move(again);
+    if (again->failure) return;
+    estimates[index] = *std::move(again);
+    ++labelled;
   });
+  return labelled;
 }
 
 /// One run tells of its own noise and calibrator many times over: more of its frames would crowd out other
@@ -396,7 +406,10 @@ Sweep swept(const SweepCase& given, const SweepOptions& options,
   parallel_for(estimates.size(), options.threads, [&](std::size_t i) {
     calibrate_with(sweep.noise_factor, given, estimates[i], given.frames[i].view.name);
   });
-  if (is_one_run(given)) label_by_neighbours(sweep.noise_factor, given, estimates, options.threads);
+  // Those in the middle of several follow from those beside them, labelled before.
+  while (is_one_run(given) &&
+         label_by_neighbours(sweep.noise_factor, given, estimates, options.threads) > 0) {
+  }
   const auto accepted =
       std::size_t(std::ranges::count_if(estimates, [](const auto& at) { return !at.failure; }));
   for (std::size_t i = 0; i < estimates.size(); ++i)
