@@ -194,6 +194,14 @@ void drill_by_guidance(operation::Operation& operation, virtual_devices::HeldDri
   }
 }
 
+/// The work on the tunnels. Its end, or the reason why it was stopped, is the record's last line.
+template <class Work>
+void conduct(operation::Operation& operation, const Work& work) {
+  const auto done = guarded(work);
+  value_or_throw(operation.finish(done ? std::nullopt : std::optional(done.error())));
+  value_or_throw(done);
+}
+
 }  // namespace
 
 operation::OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t tracker_port) {
@@ -231,33 +239,34 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
     const auto again = [&](const Failure& why) {
       return options.plans_again && operation::is_late(why) && ++done.replans > 0;
     };
-    value_or_throw(operation.register_robot(nod, again));
-    done.hand_eye_rms_mm = operation.hand_eye().rms_mm;
-    if (options.move_bones) stir(stage.virtual_or->simulated_scene());
-    std::this_thread::sleep_for(before_exposure);  // until the gate accepts the bones again
+    conduct(operation, [&] {
+      value_or_throw(operation.register_robot(nod, again));
+      done.hand_eye_rms_mm = operation.hand_eye().rms_mm;
+      if (options.move_bones) stir(stage.virtual_or->simulated_scene());
+      std::this_thread::sleep_for(before_exposure);  // until the gate accepts the bones again
 
-    for (const operation::PlannedTunnel& tunnel : operation.plan().tunnels) {
-      const robot::RobotState rest = value_or_throw(robot.wait_connected(patience));
-      std::optional<robot::RobotOrder> begun;  // the tool is on its way by this order, or there
-      std::optional<operation::TunnelOutcome> outcome;
-      const auto approach = [&] {
-        const robot::RobotOrder order = value_or_throw(operation.plan_tunnel(tunnel.name));
-        value_or_throw(value_or_throw(operation.live_tool()).overlay(stage.devices->board(), tunnel.bone));
-        begun = order;
-        outcome = value_or_throw(operation.go(order, robot.confirm(order)));
-        add_ends(done, tunnel, *outcome, *stage.virtual_or);
-        done.corrections += static_cast<int>(outcome->loop.size()) - 1;
-      };
-      while (!outcome || begun) {
-        const auto moved = guarded([&] {
-          if (!begun) return approach();
-          value_or_throw(operation.withdraw(*begun, rest, nod));
-          begun.reset();
-        });
-        if (!moved) value_or_throw(operation.plan_again(tunnel.name, moved.error(), again));
+      for (const operation::PlannedTunnel& tunnel : operation.plan().tunnels) {
+        const robot::RobotState rest = value_or_throw(robot.wait_connected(patience));
+        std::optional<robot::RobotOrder> begun;  // the tool is on its way by this order, or there
+        std::optional<operation::TunnelOutcome> outcome;
+        const auto approach = [&] {
+          const robot::RobotOrder order = value_or_throw(operation.plan_tunnel(tunnel.name));
+          value_or_throw(value_or_throw(operation.live_tool()).overlay(stage.devices->board(), tunnel.bone));
+          begun = order;
+          outcome = value_or_throw(operation.go(order, robot.confirm(order)));
+          add_ends(done, tunnel, *outcome, *stage.virtual_or);
+          done.corrections += static_cast<int>(outcome->loop.size()) - 1;
+        };
+        while (!outcome || begun) {
+          const auto moved = guarded([&] {
+            if (!begun) return approach();
+            value_or_throw(operation.withdraw(*begun, rest, nod));
+            begun.reset();
+          });
+          if (!moved) value_or_throw(operation.plan_again(tunnel.name, moved.error(), again));
+        }
       }
-    }
-    value_or_throw(operation.finish());
+    });
     return done;
   });
 }
@@ -270,14 +279,15 @@ Expected<Rehearsal> rehearse_freehand(std::uint64_t seed, const std::filesystem:
     virtual_devices::HeldDrill& drill = stage.virtual_or->drill();
     if (options.move_bones) stir(stage.virtual_or->simulated_scene());
     Rehearsal done{seed, {}};
-    for (const operation::PlannedTunnel& tunnel : operation.plan().tunnels) {
-      drill.move(tunnel.bone, drill.on_tunnel(tunnel.bone, -40, 4, 5), raise_s);
-      std::this_thread::sleep_for(std::chrono::duration<double>(raise_s) + before_exposure);
-      value_or_throw(operation.guide(tunnel.name));
-      drill_by_guidance(operation, drill);
-      add_ends(done, tunnel, value_or_throw(operation.verify_drilled(tunnel.name)), *stage.virtual_or);
-    }
-    value_or_throw(operation.finish());
+    conduct(operation, [&] {
+      for (const operation::PlannedTunnel& tunnel : operation.plan().tunnels) {
+        drill.move(tunnel.bone, drill.on_tunnel(tunnel.bone, -40, 4, 5), raise_s);
+        std::this_thread::sleep_for(std::chrono::duration<double>(raise_s) + before_exposure);
+        value_or_throw(operation.guide(tunnel.name));
+        drill_by_guidance(operation, drill);
+        add_ends(done, tunnel, value_or_throw(operation.verify_drilled(tunnel.name)), *stage.virtual_or);
+      }
+    });
     return done;
   });
 }
