@@ -20,7 +20,8 @@ namespace {
 
 using case_registration::Measurement;
 
-/// Adds each image once; nothing if the residuals are inconsistent with the noise model.
+/// Adds each image once; nothing if the residuals are inconsistent with the noise model or the views
+/// contradict the history.
 Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pipeline::Result& result,
                                     Console& console) {
   const auto growth = pipeline::add_to_record(path, result);

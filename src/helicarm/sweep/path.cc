@@ -110,21 +110,33 @@ Eigen::MatrixXd whitened(const FramePoints& frame, Eigen::Index columns, const O
   return both;
 }
 
+/// How the whitened pixels follow the camera's deviation.
+Eigen::MatrixXd pixels_by_deviation(const FramePoints& frame, const PlacedCamera& at,
+                                    const PlacedCamera& reference, const Detector& detector) {
+  const geometry::View view = view_of(at, detector);
+  const auto by_deviation = parameters_by_deviation(at, reference, detector);
+  return whitened(frame, camera_size, [&](std::size_t i) -> Eigen::Matrix2Xd {
+    return calibration::pixel_by_parameters(view, frame.points[i]) * by_deviation;
+  });
+}
+
+/// information^-1 right, scaled to a unit diagonal first: mm and radian differ by orders of magnitude.
+Eigen::MatrixXd solved(const CameraMatrix& information, const Eigen::MatrixXd& right) {
+  const CameraVector root = information.diagonal().cwiseSqrt().cwiseInverse();
+  const CameraMatrix unit = root.asDiagonal() * information * root.asDiagonal();
+  return root.asDiagonal() * unit.ldlt().solve(root.asDiagonal() * right);
+}
+
 /// Change of the frame's value by errors of its pixels, 2 x `columns` of each.
 template <class Errors>
 Eigen::MatrixXd value_by_errors(const FramePoints& frame, const PlacedCamera& at,
                                 const PathObservation& observation, const PlacedCamera& reference,
                                 const Detector& detector, Eigen::Index columns, const Errors& errors) {
   const geometry::View view = view_of(at, detector);
-  const auto by_deviation = parameters_by_deviation(at, reference, detector);
-  const Eigen::MatrixXd by = whitened(frame, camera_size, [&](std::size_t i) -> Eigen::Matrix2Xd {
-    return calibration::pixel_by_parameters(view, frame.points[i]) * by_deviation;
-  });
+  const Eigen::MatrixXd by = pixels_by_deviation(frame, at, reference, detector);
   const Eigen::MatrixXd gradient =
       by.transpose() * whitened(frame, columns, [&](std::size_t i) { return errors(view, i); });
-  const CameraVector root = observation.information.diagonal().cwiseSqrt().cwiseInverse();
-  const CameraMatrix unit = root.asDiagonal() * observation.information * root.asDiagonal();
-  return root.asDiagonal() * unit.ldlt().solve(root.asDiagonal() * gradient);
+  return solved(observation.information, gradient);
 }
 
 }  // namespace
@@ -214,21 +226,15 @@ PathObservation observation_of(const FramePoints& frame, const PlacedCamera& at,
                                const Orbit& orbit, const Detector& detector) {
   const PlacedCamera reference = orbit.at(angle_deg);
   const geometry::View view = view_of(at, detector);
-  const auto by_deviation = parameters_by_deviation(at, reference, detector);
   PathObservation made;
   made.angle_deg = angle_deg;
-  const Eigen::MatrixXd by = whitened(frame, camera_size, [&](std::size_t i) -> Eigen::Matrix2Xd {
-    return calibration::pixel_by_parameters(view, frame.points[i]) * by_deviation;
-  });
+  const Eigen::MatrixXd by = pixels_by_deviation(frame, at, reference, detector);
   const Eigen::VectorXd off = whitened(frame, 1, [&](std::size_t i) -> Eigen::Matrix2Xd {
     return frame.pixels[i] - view.project(frame.points[i]);
   });
   made.information = by.transpose() * by;
   const CameraVector gradient = by.transpose() * off;
-  const CameraVector root = made.information.diagonal().cwiseSqrt().cwiseInverse();
-  const CameraMatrix unit = root.asDiagonal() * made.information * root.asDiagonal();
-  made.value =
-      deviation_of(at, reference) + root.cwiseProduct(unit.ldlt().solve(root.cwiseProduct(gradient)));
+  made.value = deviation_of(at, reference) + solved(made.information, gradient);
   // A rigid motion (w, t) of the phantom about the centre moves the camera, as the phantom sees it, back.
   const Eigen::Matrix3d& r = reference.rotation;
   made.motion << r * geometry::cross_matrix(at.source - orbit.centre), -r,
@@ -247,11 +253,7 @@ std::vector<double> free_shares(const FramePoints& frame, const PlacedCamera& at
                                 const CameraMatrix& covariance, const PlacedCamera& reference,
                                 const Detector& detector) {
   constexpr double least = 0.1;
-  const geometry::View view = view_of(at, detector);
-  const auto by_deviation = parameters_by_deviation(at, reference, detector);
-  const Eigen::MatrixXd by = whitened(frame, camera_size, [&](std::size_t i) -> Eigen::Matrix2Xd {
-    return calibration::pixel_by_parameters(view, frame.points[i]) * by_deviation;
-  });
+  const Eigen::MatrixXd by = pixels_by_deviation(frame, at, reference, detector);
   const auto n = Eigen::Index(frame.points.size());
   const auto taken = [&](Eigen::Index row) { return by.row(row).dot(by.row(row) * covariance); };
   std::vector<double> shares;

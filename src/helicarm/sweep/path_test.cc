@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include "helicarm/sweep/drawn_run_test.h"
@@ -90,22 +91,60 @@ TEST(PlacedCamera, ParametersByDeviationAreTheirDerivatives) {
   }
 }
 
-TEST(PathObservation, ExactPointsGiveTheCameraThatTookThem) {
-  const geometry::View truth = DrawnRun{}.view(4);
+/// The balls as this camera sees them.
+FramePoints points_in(const geometry::View& view) {
   FramePoints points;
   for (const Eigen::Vector3d& ball : DrawnRun::balls()) {
     points.points.push_back(ball);
-    points.pixels.push_back(truth.project(ball));
+    points.pixels.push_back(view.project(ball));
     points.balls.push_back(points.balls.size());
   }
   const auto n = Eigen::Index(points.points.size());
   points.whitening = Eigen::MatrixXd::Identity(n, n) / 0.02;
-  const Orbit orbit{Eigen::Vector3d::UnitZ(), Eigen::Vector3d::Zero(), placed(DrawnRun{}.view(0), detector)};
+  return points;
+}
+
+const Orbit about_z{Eigen::Vector3d::UnitZ(), Eigen::Vector3d::Zero(), placed(DrawnRun{}.view(0), detector)};
+
+TEST(PathObservation, ExactPointsGiveTheCameraThatTookThem) {
+  const geometry::View truth = DrawnRun{}.view(4);
+  const FramePoints points = points_in(truth);
   PlacedCamera at = placed(truth, detector);
   at.source += Eigen::Vector3d(0.5, -0.3, 0.2);
   for (int i = 0; i < 4; ++i)
-    at = deviated(orbit.at(20), observation_of(points, at, 20, orbit, detector).value);
+    at = deviated(about_z.at(20), observation_of(points, at, 20, about_z, detector).value);
   EXPECT_LT((at.source - truth.source_in_world()).norm(), 1e-6);
+}
+
+TEST(PathObservation, ValueFollowsThePixelsAsItsDerivativeStates) {
+  constexpr double step_px = 1e-4, angle_deg = 20;
+  constexpr std::size_t moved = 3;
+  const geometry::View truth = DrawnRun{}.view(4);
+  const FramePoints points = points_in(truth);
+  const PlacedCamera at = placed(truth, detector);
+  const PathObservation observation = observation_of(points, at, angle_deg, about_z, detector);
+  Eigen::MatrixXd roots = Eigen::MatrixXd::Zero(Eigen::Index(points.points.size()), 1);
+  roots(moved, 0) = 1;
+  const Eigen::MatrixXd by = value_by_pixels(points, at, observation, about_z.at(angle_deg), detector, roots);
+  for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    FramePoints shifted = points;
+    shifted.pixels[moved][axis] += step_px;
+    const CameraVector change =
+        (observation_of(shifted, at, angle_deg, about_z, detector).value - observation.value) / step_px;
+    EXPECT_LT((change - by.col(axis)).norm(), 1e-5 * by.col(axis).norm()) << axis;
+  }
+}
+
+TEST(FreeShares, AFitTakesAsManyDegreesOfFreedomAsItHasParameters) {
+  const geometry::View truth = DrawnRun{}.view(4);
+  const FramePoints points = points_in(truth);
+  const PlacedCamera at = placed(truth, detector);
+  const PathObservation observation = observation_of(points, at, 20, about_z, detector);
+  double taken = 0;
+  for (const double share :
+       free_shares(points, at, observation.information.inverse(), about_z.at(20), detector))
+    taken += 2 * (1 - share);
+  EXPECT_NEAR(taken, camera_size, 1e-3);
 }
 
 }  // namespace

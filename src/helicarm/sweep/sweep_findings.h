@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "helicarm/phantom/calibrator.h"
+#include "helicarm/sweep/estimate_frame.h"
+#include "helicarm/sweep/sweep.h"
+
+/// Warnings and notes of a run.
+namespace helicarm::sweep {
+
+/// Warns where the source distance that the images show with the stated pixel size is not the stated one.
+void compare_distance(Sweep& sweep, const std::vector<FrameEstimate>& estimates);
+
+/// Warns where the angles that the file states are not those of the images.
+void compare_angles(Sweep& sweep);
+
+/// What was odd in the images' files and their labels: of each kind the first, with the number of images.
+void report_images(Sweep& sweep, const std::vector<FrameEstimate>& estimates);
+
+/// Balls of the file that the accepted images hardly use.
+void warn_of_unused_balls(Sweep& sweep, const std::vector<FrameEstimate>& estimates,
+                          const phantom::Calibrator& calibrator);
+
+/// Images that are used although their residuals are larger than the noise, or their camera is off the path.
+void warn_of_doubtful(Sweep& sweep);
+
+/// Names the refused images, by reason.
+void warn_of_refused(Sweep& sweep);
+
+}  // namespace helicarm::sweep
