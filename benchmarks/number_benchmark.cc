@@ -9,7 +9,7 @@
 #include <benchmark/benchmark.h>
 
 #include "helicarm/phantom/conical_helix.h"
-#include "helicarm/study/number.h"
+#include "studies/number.h"
 
 namespace helicarm {
 namespace {

@@ -8,8 +8,8 @@
 #include <dcmtk/dcmdata/dcrledec.h>
 
 #include "helicarm/core/random.h"
-#include "helicarm/study/simd_random.h"
 #include "helicarm/xray/rle.h"
+#include "studies/simd_random.h"
 
 namespace helicarm {
 namespace {

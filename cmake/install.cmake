@@ -3,7 +3,7 @@ include(CMakePackageConfigHelpers)
 set(helicarm_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/helicarm)
 
 # Headers of tests, and those whose types follow the instruction set, stay here.
-set(helicarm_private_header "(_test|/small_studies|/lane[a-z_]*|/simd[a-z_]*|/march|/paper_scene)\\.h$")
+set(helicarm_private_header "(_test|/march)\\.h$")
 
 function(helicarm_install_module name)
   set_target_properties(helicarm_${name} PROPERTIES EXPORT_NAME ${name})

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the layers of the source: which module may include which, no include of apps below apps, a licence in every file.
+"""Checks the layers of the source: which module may include which, no include of apps or studies below them, a licence in every file.
 
 Run from anywhere; prints each breach as file:line and exits 1 if there is one.
 """
@@ -54,8 +54,8 @@ def breaches_of_layers(module, path):
             allowed.add("virtual_devices")
     for number, included in includes(path):
         parts = included.split("/")
-        if "apps" in parts or included.startswith("cli/"):
-            yield f"{path.relative_to(ROOT)}:{number}: src must not include apps ({included})"
+        if "apps" in parts or parts[0] in ("cli", "studies"):
+            yield f"{path.relative_to(ROOT)}:{number}: src must not include apps or studies ({included})"
         elif parts[0] == "helicarm" and parts[1] not in allowed:
             yield f"{path.relative_to(ROOT)}:{number}: {module} must not include {parts[1]} ({included})"
         elif ".." in parts:
@@ -83,7 +83,7 @@ def breaches():
             continue
         for path in sorted(p for p in folder.rglob("*") if p.suffix in SOURCES):
             yield from breaches_of_layers(folder.name, path)
-    for top in ("src", "apps", "tools", "tests", "benchmarks", "fuzz", "python"):
+    for top in ("src", "studies", "apps", "tools", "tests", "benchmarks", "fuzz", "python"):
         for path in sorted(p for p in (ROOT / top).rglob("*") if p.suffix in SOURCES):
             if LICENCE not in "\n".join(path.read_text(encoding="utf-8").splitlines()[:2]):
                 yield f"{path.relative_to(ROOT)}:1: the line \"{LICENCE}\" is missing"

@@ -12,7 +12,7 @@ case "${1:-}" in
   *) files=("$@") ;;
 esac
 # Compiled in other builds only, or as the body of a precompiled header.
-skipped='^(benchmarks/|examples/|src/helicarm/study/small_studies.cc|cmake/precompiled.cc|fuzz/)'
+skipped='^(benchmarks/|examples/|studies/small_studies.cc|cmake/precompiled.cc|fuzz/)'
 mapfile -t files < <(printf '%s\n' "${files[@]}" | grep '\.cc$' | grep -Ev "$skipped" || true)
 [ ${#files[@]} -eq 0 ] && exit 0
 
