@@ -48,10 +48,50 @@ def row(key, schema, required):
     return f"| `{key}` | {value} | {'required' if required else ''} |"
 
 
-def table(schema, path):
+def kind_of(schema):
+    """A value that is written: words for its type, where they say more than the description."""
+    words = [f"`{json.dumps(word)}`" for word in schema.get("enum", []) if word is not None]
+    if words:
+        return " or ".join(words)
+    items = schema.get("items", {})
+    if "array" not in schema.get("type", []) or "number" not in items.get("type", []) and "array" not in items.get("type", []):
+        return ""
+    count = schema.get("minItems")
+    if "array" in items["type"]:
+        columns = items.get("minItems")
+        return f"{count} rows of {columns} numbers" if count and columns else "rows of numbers"
+    return f"{count} numbers" if count else "list of numbers"
+
+
+def written_rows(schema, file, told, prefix=""):
+    """Of a file that is only written: its objects' and lists' keys too, but of those that have a table of their own, or
+    have been told (keys to the place where)."""
+    for key, value in schema["properties"].items():
+        text = ": ".join(filter(None, [kind_of(value), value["description"]]))
+        named = value.get("additionalProperties", {})
+        inside = []
+        for inner, mark in ((value, "."), (value.get("items", {}), "[]."), (named, ".NAME.")):
+            if "properties" not in inner or "see below" in text:
+                continue
+            keys, place = json.dumps(inner["properties"]), f"{prefix}{key}"
+            of_file, at = told.setdefault(keys, (file, place))
+            if at == place and of_file == file:
+                inside += written_rows(inner, file, told, place + mark)
+            else:
+                other = "" if of_file == file else f" of [{of_file}.json](#{of_file}json)"
+                text = "; ".join(filter(None, [text, f"keys as of `{at}`{other}"]))
+        yield f"| `{prefix}{key}` | {text} |"
+        yield from inside
+
+
+def table(schema, path, told):
+    file = schema.get("title", "").removesuffix(".json")
+    is_read = '"additionalProperties": false' in json.dumps(schema)  # of a file that is only written keys may be added
     for key in path:
         schema = schema["properties"][key]
         schema = schema.get("items", schema)
+    if not is_read:
+        return "\n".join(["", "| key | value |", "| --- | --- |", *written_rows(schema, file, told), "", ""])
     required = schema.get("required", []) + schema.get("anyOf", [{}])[0].get("required", [])
     rows = [row(key, value, key in required) for key, value in schema["properties"].items()]
     return "\n".join(["", "| key | value | |", "| --- | --- | --- |", *rows, "", ""])
@@ -60,11 +100,12 @@ def table(schema, path):
 def main():
     program, check = sys.argv[1], "--check" in sys.argv[2:]
     page = PAGE.read_text()
+    told = {}
 
     def filled(mark):
         file, *path = mark[2].split(".")
         schema = json.loads(subprocess.run([program, "schema", file], check=True, capture_output=True).stdout)
-        return mark[1] + table(schema, path) + mark[3]
+        return mark[1] + table(schema, path, told) + mark[3]
 
     new = MARK.sub(filled, page)
     if check:

@@ -19,11 +19,12 @@ CommandResult schema_command(const SchemaArguments& arguments, Console& console)
 }  // namespace
 
 void add_schema(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, group::measure, "schema", "Print the JSON Schema of a file that helicarm reads",
-                  "helicarm schema case > case.schema.json\n\n"
-                  "An editor that is given the schema completes the keys, explains them and marks values out "
-                  "of range\n(https://json-schema.org, draft 2020-12).");
+  auto* command = add_command(
+      app, group::measure, "schema", "Print the JSON Schema of a file that helicarm reads or writes",
+      "helicarm schema case > case.schema.json\n\n"
+      "An editor that is given the schema completes the keys, explains them and marks values out of range\n"
+      "(https://json-schema.org, draft 2020-12). result, registration and sweep are written by the program:\n"
+      "their schema says which keys are always there, and which may be null.");
   auto& arguments = arguments_of(command, action, schema_command);
   command->add_option("FILE", arguments.file, "The file, without .json")
       ->required()

@@ -12,6 +12,7 @@
 #include "helicarm/xray/image_file.h"
 #include "measuring_options.h"
 #include "module.h"
+#include "run_sweep.h"
 #include "signals.h"
 
 namespace helicarm::python {
@@ -136,9 +137,6 @@ sweep::Sweep sweep_images(const std::vector<ImagePointer>& images, const phantom
            fmt::format("images: {} images, 1 to {} are possible", images.size(), most_images),
            {},
            {}});
-  sweep::SweepOptions options;
-  options.threads = threads;
-  if (path) options.path = value_or_raise(sweep::path_kind(*path));
   sweep::SweepCase given;
   given.base.calibrator = calibrator;
   given.base.calibrator_name = calibrator.name;
@@ -158,17 +156,7 @@ sweep::Sweep sweep_images(const std::vector<ImagePointer>& images, const phantom
     given.frames.push_back(std::move(frame));
   }
   given.files[run.image] = value_or_raise(xray::ImageFile::of(std::move(frames)));
-  const RunHooks hooks = run_hooks(py::none());
-  sweep::Sweep result = value_or_raise(without_gil([&] {
-    return sweep::run_sweep(given, options, [&](double share) {
-      hooks.on_view();
-      if (progress.is_none()) return;
-      const py::gil_scoped_acquire acquire;
-      progress(share);
-    });
-  }));
-  if (result.failure) raise(*result.failure, py::cast(result));
-  return result;
+  return run_sweep([&] { return Expected<sweep::SweepCase>(std::move(given)); }, path, threads, progress);
 }
 
 }  // namespace

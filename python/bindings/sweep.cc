@@ -6,7 +6,7 @@
 
 #include "arrays.h"
 #include "module.h"
-#include "signals.h"
+#include "run_sweep.h"
 
 namespace helicarm::python {
 namespace {
@@ -15,23 +15,7 @@ constexpr double absent = std::numeric_limits<double>::quiet_NaN();
 
 sweep::Sweep swept(const std::filesystem::path& folder, const std::optional<std::string>& path,
                    unsigned threads, const py::object& progress) {
-  sweep::SweepOptions options;
-  options.threads = threads;
-  if (path) options.path = value_or_raise(sweep::path_kind(*path));
-  const py::object nothing = py::none();
-  const RunHooks hooks = run_hooks(nothing);
-  sweep::Sweep result = value_or_raise(without_gil([&] {
-    return sweep::read_sweep_case(folder).and_then([&](const sweep::SweepCase& given) {
-      return sweep::run_sweep(given, options, [&](double share) {
-        hooks.on_view();
-        if (progress.is_none()) return;
-        const py::gil_scoped_acquire acquire;
-        progress(share);
-      });
-    });
-  }));
-  if (result.failure) raise(*result.failure, py::cast(result));
-  return result;
+  return run_sweep([&] { return sweep::read_sweep_case(folder); }, path, threads, progress);
 }
 
 /// (n, rows, columns), NaN where a frame is refused.

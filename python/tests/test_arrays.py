@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import helicarm
+from schemas import schema_faults
 from test_registration import body_hu, image_of, sequence  # noqa: F401
 from test_sweep import BALLS, DISTANCE_MM, FRAMES, PIXEL_MM, drawn, projection
 
@@ -151,6 +152,7 @@ def test_arrays_and_files_are_registered_alike(sequence, tmp_path):  # noqa: F81
     of_files = helicarm.register(tmp_path)
     assert alike(answer["models"][0]) == alike(of_files["models"][0]) and steps
     assert answer == json.loads((tmp_path / "out/registration.json").read_text())
+    assert schema_faults("registration", answer) == []
     assert answer.models["body"].world_from_model[:3, 3] == pytest.approx([1, 0, 0], abs=0.2)
     assert (tmp_path / "out/report.html").exists() and (tmp_path / "out/A_overlay.png").exists()
 

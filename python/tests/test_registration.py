@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import helicarm
+from schemas import schema_faults
 
 POINTS = {"a": (10, 0, 5), "b": (-12, 8, 0), "c": (3, -9, 20), "d": (0, 14, -11)}
 SHIFT = np.array([4.0, -2, 6])
@@ -37,6 +38,7 @@ def landmarks(tmp_path):
 def test_register_returns_registration_json(landmarks, tmp_path):
     answer = helicarm.register(landmarks, out=tmp_path / "out")
     assert answer == json.loads((tmp_path / "out/registration.json").read_text())
+    assert schema_faults("registration", answer) == []
     pose = np.array(answer["models"][0]["world_from_model"])
     assert pose[:3, 3] == pytest.approx(SHIFT, abs=1e-4)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import helicarm
+from schemas import schema_faults
 
 WIDTH, HEIGHT, PIXEL_MM, DISTANCE_MM, FRAMES = 256, 240, 1.0, 1000.0, 4
 BALLS = np.random.default_rng(21).uniform([-55, -55, -45], [55, 55, 45], (14, 3))
@@ -77,6 +78,7 @@ def test_cameras_are_arrays(run, tmp_path):
     sweep.write(tmp_path)
     written = json.loads((tmp_path / "sweep.json").read_text())
     assert written == sweep.to_dict()
+    assert schema_faults("sweep", written) == []
     array = np.load(tmp_path / "geometry/matrices.npy")
     assert np.array_equal(array, sweep.projections[[0, 1, 3]])
 

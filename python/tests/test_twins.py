@@ -136,14 +136,14 @@ def test_export_writes_the_same_files(case, result, tmp_path):
         result.export(tmp_path / "python", ["word"])
 
 
-@pytest.mark.parametrize("name", ["calibrator", "case", "machine", "plan", "plate", "session"])
+@pytest.mark.parametrize("name", ["calibrator", "case", "machine", "plan", "plate", "registration", "result", "session", "sweep"])
 def test_schemas_are_the_same(name):
     assert helicarm.schema(name) == json.loads(program("schema", name))
 
 
 def test_a_schema_of_another_file_is_refused():
     with pytest.raises(helicarm.InputError, match="none of: calibrator, case"):
-        helicarm.schema("result")
+        helicarm.schema("report")
 
 
 def test_a_new_case_is_the_same(case, tmp_path):

@@ -98,6 +98,9 @@ Expected<CaseRegistration> register_loaded(const pipeline::Case& given, LoadedVi
 /// registration.json (docs/formats.md).
 Json to_json(const CaseRegistration& result);
 
+/// The JSON Schema of registration.json.
+Json registration_schema();
+
 /// One HTML file with the overlays inside.
 std::string report_html(const CaseRegistration& result);
 

@@ -1,363 +1,473 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/pipeline/result.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
 #include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/core/output.h"
 #include "helicarm/fiducials/candidates.h"
 #include "helicarm/fiducials/status_words.h"
 #include "helicarm/pipeline/calibrate_case.h"
 #include "helicarm/pipeline/diagnosis/advice.h"
+#include "helicarm/pipeline/result_description.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/pipeline/view_parameters.h"
+#include "helicarm/registration/bone_check_description.h"
 
 namespace helicarm::pipeline {
-namespace {
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-template <class T>
-Json optional_number(const std::optional<T>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-template <class Derived>
-Json vector(const Eigen::MatrixBase<Derived>& values) {
-  Json list = Json::array();
-  for (Eigen::Index i = 0; i < values.size(); ++i) list.push_back(number(values[i]));
-  return list;
-}
-
-template <class Derived>
-Json matrix(const Eigen::MatrixBase<Derived>& values) {
-  Json rows = Json::array();
-  for (Eigen::Index i = 0; i < values.rows(); ++i) {
-    Json row = Json::array();
-    for (Eigen::Index j = 0; j < values.cols(); ++j) row.push_back(number(values(i, j)));
-    rows.push_back(std::move(row));
-  }
-  return rows;
-}
-
-Json optional_vector(const auto& values) { return values ? vector(*values) : Json(nullptr); }
-Json optional_matrix(const auto& values) { return values ? matrix(*values) : Json(nullptr); }
-
-Json json_of(const rectification::Rectification& rectification) {
-  const rectification::DistortionMap& map = rectification.map;
-  const bool fitted = !map.is_identity();
-  const auto if_fitted = [&](double value) { return fitted ? number(value) : Json(nullptr); };
-  return {
-      {"model", map.model->name()},
-      {"dots_found", rectification.dots_found},
-      {"dots_expected", optional_number(rectification.dots_expected)},
-      {"residual_rms_px", if_fitted(map.residual_rms_px)},
-      {"residual_max_px", if_fitted(map.residual_max_px)},
-      {"held_out_rms_px", if_fitted(map.held_out_rms_px)},
-      {"raw_mean_px", if_fitted(rectification.raw_mean_px)},
-      {"raw_max_px", if_fitted(rectification.raw_max_px)},
-      {"rectified_pixel_mm", optional_number(map.rectified_pixel_mm)},
-      {"rectified_plane", !map.rectified_plane                                           ? Json(nullptr)
-                          : *map.rectified_plane == rectification::RectifiedPlane::plate ? Json("plate")
-                                                                                         : Json("detector")},
-      {"map", rectification::to_json(map)}};
-}
-
-Json json_of(const fiducials::Fiducial& fiducial) {
-  const bool seen = fiducial.status == fiducials::FiducialStatus::used ||
-                    fiducial.status == fiducials::FiducialStatus::rejected;
-  const auto if_seen = [&](Json value) { return seen ? std::move(value) : Json(nullptr); };
-  return {{"label", fiducial.label},
-          {"status", fiducials::word(fiducial.status)},
-          {"uv_raw", if_seen(vector(fiducial.uv_raw))},
-          {"uv", if_seen(vector(fiducial.uv))},
-          {"sigma_px", if_seen(number(fiducial.sigma_px))},
-          {"residual_px", if_seen(number(fiducial.residual_px))}};
-}
-
-/// f_mm uses the pixel size on the detector: of the rectified image if known there, else of the file.
-Json intrinsics_of(const ViewResult& view) {
-  const geometry::Intrinsics& k = view.calibrated->view.intrinsics;
-  const rectification::DistortionMap& map = view.rectification->map;
-  std::optional<double> pixel_mm;
-  if (map.rectified_plane == rectification::RectifiedPlane::detector) pixel_mm = map.rectified_pixel_mm;
-  if (!pixel_mm && view.xray_image && view.xray_image->acquisition.pixel_mm)
-    pixel_mm = view.xray_image->acquisition.pixel_mm->y();
-  return {{"fx_px", k.fx},
-          {"fy_px", k.fy},
-          {"u0", k.u0},
-          {"v0", k.v0},
-          {"f_mm", pixel_mm ? Json(k.fy * *pixel_mm) : Json(nullptr)},
-          {"pixel_mm", optional_number(pixel_mm)}};
-}
-
-}  // namespace
 
 std::vector<detection::Dot> unlabelled_candidates(const ViewResult& view) {
   if (view.found || !view.dots || !view.rectification) return {};
   return fiducials::ball_candidates(*view.dots, *view.rectification);
 }
 
-namespace {
-
-/// Candidates and best labels, of a view whose labelling was refused.
-void add_guess(Json& json, const ViewResult& view) {
-  json["candidates"] = nullptr;
-  json["guessed"] = Json::array();
-  if (view.found || !view.rectification) return;
-  json["candidates"] = Json::array();
-  for (const detection::Dot& dot : unlabelled_candidates(view))
-    json["candidates"].push_back({{"uv_raw", vector(dot.centre_px)}, {"radius_px", dot.radius_px}});
-  for (const fiducials::GuessedLabel& guess : view.guessed)
-    json["guessed"].push_back(
-        {{"label", guess.label}, {"uv_raw", vector(guess.uv_raw)}, {"residual_px", guess.residual_px}});
-}
-
-constexpr std::array parameter_names{"fx_px",
-                                     "fy_px",
-                                     "u0",
-                                     "v0",
-                                     "rotation_x_rad",
-                                     "rotation_y_rad",
-                                     "rotation_z_rad",
-                                     "translation_x_mm",
-                                     "translation_y_mm",
-                                     "translation_z_mm",
-                                     "skew_px"};
-static_assert(parameter_names.size() == calibration::view_parameters);
-
-}  // namespace
-
-Json parameters_json(const calibration::CalibratedView& view) {
-  if (view.covariance.isZero(0)) return nullptr;
-  const auto sigmas = [](const auto& covariance) {
-    return vector(covariance.diagonal().cwiseMax(0).cwiseSqrt().eval());
-  };
-  const Json all = sigmas(view.covariance);
-  const Eigen::Matrix3d turn = view.covariance.block<3, 3>(4, 4) * std::pow(180 / std::numbers::pi, 2);
-  return {{"order", parameter_names},
-          {"covariance", matrix(view.covariance)},
-          {"sigma",
-           {{"fx_px", all[0]},
-            {"fy_px", all[1]},
-            {"u0", all[2]},
-            {"v0", all[3]},
-            {"source_mm", sigmas(calibration::source_covariance(view))},
-            {"rotation_deg", sigmas(turn)}}}};
-}
-
-namespace {
-
-Json json_of(const ViewResult& view) {
-  Json json = {{"name", view.name}};
-  json["image_size"] = view.xray_image
-                           ? Json({view.xray_image->pixels.width(), view.xray_image->pixels.height()})
-                           : Json(nullptr);
-  json["rectification"] = view.rectification ? json_of(*view.rectification) : Json(nullptr);
-  json["fiducials"] = Json::array();
-  if (view.found)
-    for (const fiducials::Fiducial& fiducial : view.found->fiducials)
-      json["fiducials"].push_back(json_of(fiducial));
-  add_guess(json, view);
-  json["false_blobs"] = view.found ? Json(view.found->false_blobs.size()) : Json(nullptr);
-  json["mirrored"] = view.found ? Json(view.found->mirrored) : Json(nullptr);
-  json["labelling"] = view.found ? Json{{"margin", view.found->margin},
-                                        {"runner_up_matched", view.found->runner_up_matched},
-                                        {"runner_up_rms_px", view.found->runner_up_rms_px}}
-                                 : Json(nullptr);
-  for (const char* key : {"projection", "dlt", "intrinsics", "camera_from_calibrator", "reprojection_rms_px",
-                          "chi2", "dof", "condition", "method", "parameters"})
-    json[key] = nullptr;
-  if (const auto& calibrated = view.calibrated) {
-    json["projection"] = matrix(calibrated->view.projection());
-    json["dlt"] = optional_vector(calibrated->dlt);
-    json["intrinsics"] = intrinsics_of(view);
-    json["camera_from_calibrator"] = matrix(calibrated->view.camera_from_world.matrix());
-    json["reprojection_rms_px"] = number(calibrated->reprojection_rms_px);
-    json["chi2"] = number(calibrated->chi2);
-    json["dof"] = calibrated->dof;
-    json["condition"] = number(calibrated->condition);
-    json["method"] = calibrated->by_paper ? "paper" : "best";
-    json["parameters"] = parameters_json(*calibrated);
-  }
-  return json;
-}
-
-Json json_of(const PointResult& point, const std::vector<ViewResult>& views,
-             const std::vector<guidance::Bone>& bones) {
-  Json json = {{"name", point.name},
-               {"source", point.source == localization::PointSource::pick ? "pick" : "target"}};
-  const auto& place = point.place;
-  json["xyz_mm"] = place ? vector(place->in_calibrator) : Json(nullptr);
-  json["frame"] = "calibrator";
-  json["covariance_mm2"] = place ? matrix(place->covariance_in_calibrator) : Json(nullptr);
-  json["sigma_mm"] =
-      place ? vector(place->covariance_in_calibrator.diagonal().cwiseMax(0).cwiseSqrt()) : Json(nullptr);
-  json["error_95_mm"] =
-      place ? number(localization::length_at_95(place->covariance_in_calibrator)) : Json(nullptr);
-  json["ray_gap_mm"] = place ? number(point.ray_gap_mm) : Json(nullptr);
-  json["views"] = Json::array();
-  json["seen"] = Json::object();
-  for (std::size_t i = 0; i < point.seen.size(); ++i)
-    if (const auto& seen = point.seen[i]) {
-      json["views"].push_back(views[i].name);
-      json["seen"][views[i].name] = {
-          {"uv_raw", vector(seen->uv_raw)}, {"uv", vector(seen->uv)}, {"sigma_px", seen->sigma_px}};
-    }
-  json["reason"] = point.reason ? Json(code(point.reason->reason)) : Json(nullptr);
-  json["message"] = point.reason ? Json(point.reason->message) : Json(nullptr);
-  json["warnings"] = json_list_of(point.warnings);
-  json["notes"] = json_list_of(point.notes);
-  json.update(in_frames(place ? &*place : nullptr, bones));
-  return json;
-}
-
-Json json_of(const localization::Statistics& s) {
-  if (s.n == 0) return nullptr;
-  return {{"mean", s.mean}, {"rms", s.rms}, {"max", s.max}, {"min", s.min}, {"n", s.n}};
-}
-
-Json json_of(const localization::Accuracy& accuracy) {
-  Json json;
-  json["fle_px"] = json_of(accuracy.fle_px);
-  json["fre_mm"] = json_of(accuracy.fre_mm);
-  json["tre_mm"] = json_of(accuracy.tre_mm);
-  json["targets"] = Json::array();
-  for (const localization::TargetError& target : accuracy.targets)
-    json["targets"].push_back({{"name", target.name},
-                               {"error_mm", target.error_mm},
-                               {"predicted_mm", target.predicted_mm},
-                               {"predicted_95_mm", target.predicted_95_mm}});
-  return json;
-}
-
-Json json_of(const guidance::Verification& verification, const std::vector<ViewResult>& views) {
-  const auto per_view = [&](const std::optional<guidance::LineError>& error) {
-    Json json = Json::object();
-    for (std::size_t i = 0; i < views.size(); ++i)
-      json[views[i].name] = error ? optional_number(error->per_view_px[i]) : Json(nullptr);
-    return json;
-  };
-  const auto& [name, start, end] = verification;
-  const auto figure = [](const std::optional<guidance::LineError>& error,
-                         double guidance::LineError::*which) {
-    return error ? number((*error).*which) : Json(nullptr);
-  };
-  return {{"name", name},
-          {"start_px", per_view(start)},
-          {"end_px", per_view(end)},
-          {"err_start_px", figure(start, &guidance::LineError::combined_px)},
-          {"err_end_px", figure(end, &guidance::LineError::combined_px)},
-          {"err_start_mm", figure(start, &guidance::LineError::combined_mm)},
-          {"err_end_mm", figure(end, &guidance::LineError::combined_mm)},
-          {"distance_start_mm", figure(start, &guidance::LineError::distance_mm)},
-          {"distance_end_mm", figure(end, &guidance::LineError::distance_mm)}};
-}
-
-Json json_of(const Timing& timing) {
-  return {{"read", optional_number(timing.read)},           {"rectify", optional_number(timing.rectify)},
-          {"detect", optional_number(timing.detect)},       {"label", optional_number(timing.label)},
-          {"calibrate", optional_number(timing.calibrate)}, {"locate", optional_number(timing.locate)},
-          {"total", optional_number(timing.total)}};
-}
-
-Json json_of(const phantom::CalibratorBall& ball) {
-  return {{"label", ball.label},
-          {"xyz_mm", vector(ball.centre_in_calibrator)},
-          {"diameter_mm", ball.diameter_mm}};
-}
-
-template <class T, class... More>
-Json list_of(const std::vector<T>& items, const More&... more) {
-  Json list = Json::array();
-  for (const T& item : items) list.push_back(json_of(item, more...));
-  return list;
-}
-
-}  // namespace
-
-namespace {
-
-Json json_of(const guidance::Place& place) {
-  return {{"xyz_mm", vector(place.point())},
-          {"covariance_mm2", matrix(place.covariance)},
-          {"error_95_mm", number(localization::length_at_95(place.covariance))}};
-}
-
-Json json_of(const std::map<guidance::Bone, guidance::Place>& in_bones) {
-  Json json = Json::object();
-  for (const auto& [bone, place] : in_bones) json[bone] = json_of(place);
-  return json;
-}
-
-/// Bones in which both ends are known.
-Json ends_in_bones(const guidance::Tunnel& tunnel) {
-  Json json = Json::object();
+std::vector<std::pair<guidance::Bone, TunnelInBone>> ends_in_bones(const guidance::Tunnel& tunnel) {
+  std::vector<std::pair<guidance::Bone, TunnelInBone>> bones;
   for (const auto& [bone, start] : tunnel.start_in_bones)
     if (const auto end = tunnel.end_in_bones.find(bone); end != tunnel.end_in_bones.end())
-      json[bone] = {{"start", json_of(start)}, {"end", json_of(end->second)}};
-  return json;
-}
-
-}  // namespace
-
-Json to_json(const guidance::Tunnel& tunnel) {
-  return {{"name", tunnel.name},
-          {"in_bones", ends_in_bones(tunnel)},
-          {"start_in_tool", optional_vector(tunnel.start_in_tool)},
-          {"end_in_tool", optional_vector(tunnel.end_in_tool)},
-          {"axis_in_tool", optional_vector(tunnel.axis_in_tool)},
-          {"length_mm", optional_number(tunnel.length_mm)},
-          {"length_sigma_mm", optional_number(tunnel.length_sigma_mm)},
-          {"axis_sigma_deg", optional_number(tunnel.axis_sigma_deg())},
-          {"axis_covariance", optional_matrix(tunnel.axis_covariance)}};
-}
-
-Json in_frames(const guidance::PointInFrames* place, const std::vector<guidance::Bone>& bones) {
-  Json json = {{"in_bones", place ? json_of(place->in_bones) : Json::object()}};
-  const auto add = [&](const std::string& frame, const guidance::Place* at) {
-    json["in_" + frame] = at ? vector(at->point()) : Json();
-    json["covariance_in_" + frame + "_mm2"] = at ? matrix(at->covariance) : Json();
-  };
-  for (const guidance::Bone& bone : guidance::knee_bones())
-    if (std::ranges::find(bones, bone) != bones.end()) add(bone, place ? place->in(bone) : nullptr);
-  add("tool", place && place->in_tool ? &*place->in_tool : nullptr);
-  return json;
-}
-
-Json to_json(const Failure& failure) {
-  Json figures = Json::object();
-  for (const auto& [name, value] : failure.figures) figures[name] = number(value);
-  return {{"code", code(failure.reason)},
-          {"message", failure.message},
-          {"view", failure.view.empty() ? Json(nullptr) : Json(failure.view)},
-          {"figures", std::move(figures)}};
+      bones.push_back({bone, {&start, &end->second}});
+  return bones;
 }
 
 namespace {
 
-Json json_of(const std::optional<calibration::LearnedIntrinsics>& history) {
-  if (!history) return nullptr;
-  const auto variation = [](const calibration::IntrinsicsVariation& d) {
-    return Json{{"common_mm", d.common}, {"of_view_mm", d.of_view}};
+using output::if_set;
+
+constexpr std::array<std::string_view, 2> plane_words{"plate", "detector"};
+constexpr std::array<std::string_view, 2> source_words{"pick", "target"};
+
+template <class Output>
+void describe_rectification(Output& output,
+                            const std::optional<rectification::Rectification>& rectification) {
+  using rectification::DistortionMap;
+  using rectification::Rectification;
+  const DistortionMap* const map = rectification ? &rectification->map : nullptr;
+  const DistortionMap* const fitted = map && !map->is_identity() ? map : nullptr;
+  const Rectification* const of_fitted = fitted ? &*rectification : nullptr;
+  const auto number = [&](const char* key, const auto& of, auto part, const char* help) {
+    output.value(key, if_set(of, part), help);
   };
-  return Json{{"focal_mm", history->mean_mm.x()},
-              {"principal_mm", vector(history->mean_mm.tail<2>())},
-              {"focal_sigma", variation(*history->prior.focal)},
-              {"principal_sigma", variation(*history->prior.principal)}};
+  output.value(
+      "model", [&] { return std::string(map->model->name()); }, "of the distortion");
+  output.value(
+      "dots_found", [&] { return rectification->dots_found; }, "of the plate");
+  number("dots_expected", rectification, &Rectification::dots_expected,
+         "of the plate; `null`: unbounded lattice");
+  number("residual_rms_px", fitted, &DistortionMap::residual_rms_px, "of the map at the dots");
+  number("residual_max_px", fitted, &DistortionMap::residual_max_px, "likewise, the largest");
+  number("held_out_rms_px", fitted, &DistortionMap::held_out_rms_px, "at dots that the fit had not");
+  number("raw_mean_px", of_fitted, &Rectification::raw_mean_px,
+         "the distortion: mean distance from raw to rectified over the dots");
+  number("raw_max_px", of_fitted, &Rectification::raw_max_px, "likewise, the largest");
+  number("rectified_pixel_mm", map, &DistortionMap::rectified_pixel_mm,
+         "of the rectified image, in its plane");
+  output.word(
+      "rectified_plane",
+      if_set(map,
+             [](const DistortionMap& of) -> std::optional<std::string_view> {
+               if (!of.rectified_plane) return {};
+               return plane_words[*of.rectified_plane == rectification::RectifiedPlane::plate ? 0 : 1];
+             }),
+      plane_words, "the plane of that pixel size");
+  output.value(
+      "map", [&] { return rectification::to_json(*map); }, "as [map.json](#mapjson)");
 }
 
-void add_calibration(Json& json, const CaseCalibration& calibration) {
-  const auto if_known = [&](auto value) { return calibration.dof > 0 ? number(value) : Json(nullptr); };
-  json["calibration"] = {
-      {"joint_covariance",
-       calibration.joint_covariance.size() > 0 ? matrix(calibration.joint_covariance) : Json(nullptr)},
-      {"chi2", if_known(calibration.chi2)},
-      {"dof", calibration.dof > 0 ? Json(calibration.dof) : Json(nullptr)},
-      {"variance_scale", if_known(calibration.variance_scale)}};
-  json["machine"] = json_of(calibration.history);
-  json["acquisitions"] = calibration::acquisitions_json(calibration.entries);
+template <class Output>
+void describe_fiducial(Output& output, const fiducials::Fiducial& fiducial) {
+  using fiducials::Fiducial;
+  const bool is_seen = fiducial.status == fiducials::FiducialStatus::used ||
+                       fiducial.status == fiducials::FiducialStatus::rejected;
+  const Fiducial* const seen = is_seen ? &fiducial : nullptr;
+  output.value("label", fiducial.label, "as in the calibrator");
+  output.word(
+      "status", [&] { return fiducials::word(fiducial.status); }, fiducials::status_words,
+      "the pixels below are given if it is used or rejected");
+  output.value(
+      "uv_raw", if_set(seen, &Fiducial::uv_raw),
+      "raw pixel of the image of the fiducial's **centre** (`--method paper`: of the circle found on the "
+      "rectified image)");
+  output.value("uv", if_set(seen, &Fiducial::uv), "likewise, rectified");
+  output.value("sigma_px", if_set(seen, &Fiducial::sigma_px), "standard deviation per axis, rectified");
+  output.value("residual_px", if_set(seen, &Fiducial::residual_px), "distance from the view's projection");
+}
+
+/// f_mm uses the pixel size on the detector: of the rectified image if known there, else of the file.
+std::optional<double> pixel_on_detector_mm(const ViewResult& view) {
+  const rectification::DistortionMap& map = view.rectification->map;
+  if (map.rectified_plane == rectification::RectifiedPlane::detector && map.rectified_pixel_mm)
+    return map.rectified_pixel_mm;
+  if (view.xray_image && view.xray_image->acquisition.pixel_mm)
+    return view.xray_image->acquisition.pixel_mm->y();
+  return {};
+}
+
+template <class Output>
+void describe_intrinsics(Output& output, const ViewResult& view) {
+  const auto number = [&](const char* key, double geometry::Intrinsics::*which, const char* help) {
+    output.value(
+        key, [&view, which] { return view.calibrated->view.intrinsics.*which; }, help);
+  };
+  number("fx_px", &geometry::Intrinsics::fx, "negative in a mirrored image");
+  number("fy_px", &geometry::Intrinsics::fy, "");
+  number("u0", &geometry::Intrinsics::u0, "px");
+  number("v0", &geometry::Intrinsics::v0, "px");
+  output.value(
+      "f_mm",
+      [&] {
+        const auto pixel_mm = pixel_on_detector_mm(view);
+        return pixel_mm ? std::optional(view.calibrated->view.intrinsics.fy * *pixel_mm) : std::nullopt;
+      },
+      "distance of source and receiver; `null` where the pixel size is not known");
+  output.value(
+      "pixel_mm", [&] { return pixel_on_detector_mm(view); }, "on the receiver");
+}
+
+/// Candidates and best labels, of a view whose labelling was refused.
+template <class Output>
+void describe_guess(Output& output, const ViewResult& view) {
+  const bool is_refused = !view.found && view.rectification;
+  output.list(
+      "candidates", [&] { return is_refused ? std::optional(unlabelled_candidates(view)) : std::nullopt; },
+      "of a view whose labelling was refused: what may be a fiducial; else `null`",
+      [](auto& row, const detection::Dot& dot) {
+        row.value("uv_raw", dot.centre_px, "raw pixel");
+        row.value("radius_px", dot.radius_px, "");
+      });
+  output.list(
+      "guessed", [&] { return is_refused ? view.guessed : std::vector<fiducials::GuessedLabel>(); },
+      "of such a view: the labels that explain the image best, which must not be used",
+      [](auto& row, const fiducials::GuessedLabel& guess) {
+        row.value("label", guess.label, "as in the calibrator");
+        row.value("uv_raw", guess.uv_raw, "raw pixel");
+        row.value("residual_px", guess.residual_px, "from the fiducial's projection");
+      });
+}
+
+template <class Output>
+void describe_labelling(Output& output, const std::optional<fiducials::LabelledFiducials>& found) {
+  using fiducials::LabelledFiducials;
+  output.value("false_blobs",
+               if_set(found, [](const LabelledFiducials& of) { return of.false_blobs.size(); }),
+               "number of candidates that are not fiducials");
+  output.value("mirrored", if_set(found, &LabelledFiducials::mirrored),
+               "whether the stored image is mirrored");
+  output.object("labelling", found.has_value(),
+                "its evidence ([method](method.md#4-labelling)); `null` where it was refused",
+                [&](auto& row) {
+                  row.value(
+                      "margin", [&] { return found->margin; },
+                      "log odds against the second-best labelling; without one, against chance");
+                  row.value(
+                      "runner_up_matched", [&] { return found->runner_up_matched; },
+                      "fiducials that the second-best one matches; 0: there is none");
+                  row.value(
+                      "runner_up_rms_px", [&] { return found->runner_up_rms_px; }, "at this distance");
+                });
+}
+
+template <class Output>
+void describe_calibrated(Output& output, const ViewResult& view) {
+  using calibration::CalibratedView;
+  const std::optional<CalibratedView>& calibrated = view.calibrated;
+  output.value("projection",
+               if_set(calibrated, [](const CalibratedView& of) { return of.view.projection(); }),
+               "calibrator (mm) to rectified pixels; the third row's first three numbers have unit norm");
+  output.value("dlt", if_set(calibrated, &CalibratedView::dlt), "A1 to A11 of Eq. 6, or `null` if t_z = 0");
+  output.object("intrinsics", calibrated.has_value(), "", [&](auto& row) { describe_intrinsics(row, view); });
+  output.value(
+      "camera_from_calibrator",
+      if_set(calibrated,
+             [](const CalibratedView& of) -> Eigen::Matrix4d { return of.view.camera_from_world.matrix(); }),
+      "mm");
+  output.value("reprojection_rms_px", if_set(calibrated, &CalibratedView::reprojection_rms_px),
+               "of the fiducials used");
+  output.value("chi2", if_set(calibrated, &CalibratedView::chi2),
+               "of the residuals from the fiducials' estimated positions (those of the file unless it states "
+               "tolerances)");
+  output.value("dof", if_set(calibrated, &CalibratedView::dof), "expectation of `chi2` in the joint fit");
+  output.value("condition", if_set(calibrated, &CalibratedView::condition),
+               "as in [method.md](method.md#6-calibration-22)");
+  output.word("method",
+              if_set(calibrated, [](const CalibratedView& of) { return method_words[of.by_paper ? 1 : 0]; }),
+              method_words, "by which the view was calibrated; points of views by `paper` follow from Eq. 8");
+  output.object("parameters", calibrated && !calibrated->covariance.isZero(0), "`null` with `--method paper`",
+                [&](auto& row) {
+                  static const CalibratedView none{};
+                  describe_parameters(row, calibrated ? *calibrated : none);
+                });
+}
+
+template <class Output>
+void describe_view(Output& output, const ViewResult& view) {
+  output.value("name", view.name, "as in the case");
+  output.value("image_size",
+               if_set(view.xray_image,
+                      [](const xray::XrayImage& image) {
+                        return std::array{image.pixels.width(), image.pixels.height()};
+                      }),
+               "width, height");
+  output.object("rectification", view.rectification.has_value(), "",
+                [&](auto& row) { describe_rectification(row, view.rectification); });
+  output.list(
+      "fiducials", [&] { return view.found ? view.found->fiducials : std::vector<fiducials::Fiducial>(); },
+      "of the calibrator; empty where the labelling was refused",
+      [](auto& row, const fiducials::Fiducial& fiducial) { describe_fiducial(row, fiducial); });
+  describe_guess(output, view);
+  describe_labelling(output, view.found);
+  describe_calibrated(output, view);
+}
+
+std::vector<std::pair<std::string, fiducials::ImagePoint>> seen_by_view(
+    const PointResult& point, const std::vector<ViewResult>& views) {
+  std::vector<std::pair<std::string, fiducials::ImagePoint>> seen;
+  for (std::size_t i = 0; i < point.seen.size(); ++i)
+    if (point.seen[i]) seen.push_back({views[i].name, *point.seen[i]});
+  return seen;
+}
+
+/// In which images the point is seen.
+template <class Output>
+void describe_observations(Output& output, const PointResult& point, const std::vector<ViewResult>& views) {
+  output.value(
+      "views",
+      [&] {
+        std::vector<std::string> names;
+        for (const auto& [view, seen] : seen_by_view(point, views)) names.push_back(view);
+        return names;
+      },
+      "names of the views that show it");
+  output.map(
+      "seen", [&] { return seen_by_view(point, views); }, "for each of them",
+      [](auto& row, const fiducials::ImagePoint& seen) {
+        row.value("uv_raw", seen.uv_raw, "raw pixel");
+        row.value("uv", seen.uv, "rectified");
+        row.value("sigma_px", seen.sigma_px, "standard deviation per axis");
+      });
+}
+
+template <class Output>
+void describe_point(Output& output, const PointResult& point, const Result& result) {
+  using guidance::PointInFrames;
+  const auto& place = point.place;
+  output.value("name", point.name, "of a pick or a target of the calibrator");
+  output.word(
+      "source", [&] { return source_words[point.source == localization::PointSource::pick ? 0 : 1]; },
+      source_words, "");
+  output.value("xyz_mm", if_set(place, &PointInFrames::in_calibrator),
+               "at the time of the first view; `null` if not located");
+  output.value("frame", "calibrator", "of `xyz_mm`");
+  output.value("covariance_mm2", if_set(place, &PointInFrames::covariance_in_calibrator), "");
+  output.value("sigma_mm",
+               if_set(place, [](const PointInFrames& of) { return sigmas<3>(of.covariance_in_calibrator); }),
+               "square roots of its diagonal");
+  output.value(
+      "error_95_mm",
+      if_set(place,
+             [](const PointInFrames& of) { return localization::length_at_95(of.covariance_in_calibrator); }),
+      "length that 95 % of errors with this covariance do not exceed");
+  output.value(
+      "ray_gap_mm", if_set(place, [&](const PointInFrames&) { return point.ray_gap_mm; }),
+      "largest distance between two of the rays; with two views `error_95_mm` is never below half of it");
+  describe_observations(output, point, result.views);
+  output.value("reason", if_set(point.reason, [](const Failure& of) { return code(of.reason); }),
+               "why it was not located: [reasons](reasons.md)");
+  output.value("message", if_set(point.reason, &Failure::message), "likewise, for people");
+  describe_failures(output, "warnings", point.warnings, "that concern this point");
+  describe_failures(output, "notes", point.notes, "likewise");
+  describe_in_frames(output, place ? &*place : nullptr, result.bones);
+}
+
+template <class Output>
+void describe_statistics(Output& output, const char* key, const localization::Statistics& statistics,
+                         const char* help) {
+  output.object(key, statistics.n > 0, help, [&](auto& row) {
+    row.value("mean", statistics.mean, "");
+    row.value("rms", statistics.rms, "");
+    row.value("max", statistics.max, "");
+    row.value("min", statistics.min, "");
+    row.value("n", statistics.n, "number of values");
+  });
+}
+
+template <class Output>
+void describe_accuracy(Output& output, const localization::Accuracy& accuracy) {
+  describe_statistics(output, "fle_px", accuracy.fle_px, "Eq. 10; `null` without measurements");
+  describe_statistics(output, "fre_mm", accuracy.fre_mm, "Eq. 11; likewise");
+  describe_statistics(output, "tre_mm", accuracy.tre_mm, "Eq. 12; likewise");
+  output.list("targets", accuracy.targets, "of the calibrator, with known places",
+              [](auto& row, const localization::TargetError& target) {
+                row.value("name", target.name, "");
+                row.value("error_mm", target.error_mm, "measured");
+                row.value("predicted_mm", target.predicted_mm, "rms error by the covariance");
+                row.value("predicted_95_mm", target.predicted_95_mm, "exceeded by 5 % of the errors");
+              });
+}
+
+template <class Output>
+void describe_verification(Output& output, const guidance::Verification& verification,
+                           const std::vector<ViewResult>& views) {
+  using guidance::LineError;
+  const auto per_view = [&](const std::optional<LineError>& error) {
+    std::vector<std::pair<std::string, std::optional<double>>> by_view;
+    for (std::size_t i = 0; i < views.size(); ++i)
+      by_view.push_back({views[i].name, error ? error->per_view_px[i] : std::nullopt});
+    return by_view;
+  };
+  const std::optional<LineError>&start = verification.start, &end = verification.end;
+  output.value("name", verification.name, "of the tool line");
+  output.value(
+      "start_px", [&] { return per_view(start); }, "per view, in rectified pixels");
+  output.value(
+      "end_px", [&] { return per_view(end); }, "likewise");
+  output.value("err_start_px", if_set(start, &LineError::combined_px), "Eq. 17");
+  output.value("err_end_px", if_set(end, &LineError::combined_px), "likewise");
+  output.value("err_start_mm", if_set(start, &LineError::combined_mm), "likewise, at the point's depth");
+  output.value("err_end_mm", if_set(end, &LineError::combined_mm), "likewise");
+  output.value("distance_start_mm", if_set(start, &LineError::distance_mm), "in space");
+  output.value("distance_end_mm", if_set(end, &LineError::distance_mm), "likewise");
+}
+
+template <class Output>
+void describe_calibrator(Output& output, const CalibratorSource& calibrator) {
+  output.value("name", calibrator.name, "of the [calibrator.json](#calibratorjson)");
+  output.value("tolerance_mm", calibrator.tolerance_mm, "of its fiducials, per axis");
+  output.value(
+      "scale_sigma",
+      [&] { return calibrator.scale_sigma > 0 ? std::optional(calibrator.scale_sigma) : std::nullopt; },
+      "of its size; `null`: none stated");
+  output.value("measured", calibrator.measured, "how its coordinates were obtained; `null`: not stated");
+  output.list("balls", calibrator.balls, "its fiducials", [](auto& row, const phantom::CalibratorBall& ball) {
+    row.value("label", ball.label, "");
+    row.value("xyz_mm", ball.centre_in_calibrator, "");
+    row.value("diameter_mm", ball.diameter_mm, "");
+  });
+}
+
+template <class Output>
+void describe_variation(Output& output, const char* key, const calibration::IntrinsicsVariation& sigma,
+                        const char* help) {
+  output.object(key, true, help, [&](auto& row) {
+    row.value("common_mm", sigma.common, "of all views alike");
+    row.value("of_view_mm", sigma.of_view, "of each view by itself");
+  });
+}
+
+template <class Output>
+void describe_machine(Output& output, const std::optional<calibration::LearnedIntrinsics>& history) {
+  const calibration::IntrinsicsVariation none{};
+  output.value(
+      "focal_mm", [&] { return history->mean_mm.x(); }, "distance of source and receiver");
+  output.value(
+      "principal_mm", [&]() -> Eigen::Vector2d { return history->mean_mm.tail<2>(); }, "principal point");
+  describe_variation(output, "focal_sigma", history ? *history->prior.focal : none, "standard deviations");
+  describe_variation(output, "principal_sigma", history ? *history->prior.principal : none, "likewise");
+}
+
+template <class Output>
+void describe_calibration(Output& output, const CaseCalibration& calibration) {
+  const auto if_known = [&](auto value) { return calibration.dof > 0 ? std::optional(value) : std::nullopt; };
+  output.object("calibration", true, "of all views together", [&](auto& row) {
+    row.value(
+        "joint_covariance",
+        [&] {
+          const Eigen::MatrixXd& covariance = calibration.joint_covariance;
+          return covariance.size() > 0 ? std::optional(covariance) : std::nullopt;
+        },
+        "of all views' parameters, 11 per view: fx, fy, u0, v0 (px), rotation vector in the camera frame "
+        "(rad), "
+        "translation (mm), skew (px); `null` with `--method paper`");
+    row.value("chi2", if_known(calibration.chi2), "");
+    row.value("dof", if_known(calibration.dof), "degrees of freedom of `chi2`");
+    row.value("variance_scale", if_known(calibration.variance_scale),
+              "factor of all covariances where chi2 contradicts the sigmas, else 1");
+  });
+  output.object("machine", calibration.history.has_value(),
+                "prior from the C-arm history (`--machine`); `null` without one",
+                [&](auto& row) { describe_machine(row, calibration.history); });
+  output.value(
+      "acquisitions", [&] { return calibration::acquisitions_json(calibration.entries); },
+      "what the views alone say of the C-arm, for `helicarm c-arm add`: entries as `shots` of "
+      "[machine.json](#machinejson); empty where the residuals contradict the noise model, or pixel size or "
+      "source distance is not known");
+}
+
+template <class Output>
+void describe_tunnels(Output& output, const Result& result) {
+  std::vector<ModelTunnel> tunnels;
+  for (const guidance::Tunnel& tunnel : result.tunnels)
+    tunnels.push_back({.model = {}, .tunnel = tunnel, .ends = {}});
+  tunnels.insert(tunnels.end(), result.model_tunnels.begin(), result.model_tunnels.end());
+  output.list(
+      "tunnels", tunnels,
+      "the picked ones, then those of registered models' plans; a model refused for a `tunnel_breach` "
+      "alone shows its tunnels too",
+      [](auto& row, const ModelTunnel& planned) {
+        const bool is_planned = !planned.model.empty();
+        describe_tunnel(row, planned.tunnel);
+        row.value_where(is_planned, "model", planned.model, "whose plan holds it");
+        row.object_where(is_planned, "bone_check", planned.bone_check.has_value(),
+                         "[the tunnel against the bone](#bone_check), see below", [&](auto& check) {
+                           static const registration::BoneCheck none{};
+                           registration::describe_bone_check(check,
+                                                             planned.bone_check ? *planned.bone_check : none);
+                         });
+      });
+}
+
+template <class Output>
+void describe_timing(Output& output, const Timing& timing) {
+  output.value("read", timing.read, "");
+  output.value("rectify", timing.rectify, "chooses the plate's dots, and fits the map");
+  output.value("detect", timing.detect, "finds all dots");
+  output.value("label", timing.label, "assigns the fiducials' labels");
+  output.value("calibrate", timing.calibrate, "");
+  output.value("locate", timing.locate, "");
+  output.value("total", timing.total, "");
+}
+
+template <class Output>
+void describe_options(Output& output, const RunOptions& options) {
+  output.word(
+      "method", [&] { return method_words[options.method == rectification::Method::paper ? 1 : 0]; },
+      method_words, "");
+  output.value("max_error_mm", options.max_error_mm, "limit of a point's error; `null`: none");
+  output.value("motion_sigma_mm", options.motion_sigma_mm, "of a bone without poses");
+  output.value("threads", options.threads, "0: all cores");
+}
+
+template <class Output>
+void describe_result(Output& output, const Result& result) {
+  output.value("format", "helicarm-result/1", "");
+  describe_verdict(output, result.failure);
+  const Advice advice = advice_for(result);
+  output.value("causes", advice.causes, "of a refusal: likely causes, the likeliest first; else empty");
+  output.value(
+      "next", [&] { return advice.next.empty() ? std::nullopt : std::optional(advice.next); },
+      "of a refusal: the next step");
+  describe_failures(output, "warnings", result.warnings, "each with the fields of `failure`");
+  describe_failures(output, "notes", result.notes,
+                    "likewise: limitations that hold for any data of this kind, and deviations within stated "
+                    "tolerances; see [notes](reasons.md#notes)");
+  output.object("calibrator", true, "", [&](auto& row) { describe_calibrator(row, result.calibrator); });
+  output.list("views", result.views, "see below",
+              [](auto& row, const ViewResult& view) { describe_view(row, view); });
+  static const CaseCalibration none{};
+  describe_calibration(output, result.calibration ? *result.calibration : none);
+  output.list("points", result.points, "one per pick name and one per target of the calibrator; see below",
+              [&](auto& row, const PointResult& point) { describe_point(row, point, result); });
+  output.object("accuracy", true, "", [&](auto& row) { describe_accuracy(row, result.accuracy); });
+  describe_tunnels(output, result);
+  output.list("verification", result.verifications, "of each tool line",
+              [&](auto& row, const guidance::Verification& verification) {
+                describe_verification(row, verification, result.views);
+              });
+  output.object("timing_ms", true, "wall clock; `null`: not reached",
+                [&](auto& row) { describe_timing(row, result.timing_ms); });
+  output.value("version", HELICARM_VERSION, "of the program");
+  output.object("options", true, "of the run", [&](auto& row) { describe_options(row, result.options); });
 }
 
 }  // namespace
@@ -366,41 +476,16 @@ Eigen::MatrixXd joint_covariance(const Result& result) {
   return result.calibration ? result.calibration->joint_covariance : Eigen::MatrixXd();
 }
 
+Json to_json(const Failure& failure) {
+  return output_of([&](OutputJson& output) { describe_failure(output, failure); });
+}
+
 Json to_json(const Result& result) {
-  Json json = {{"format", "helicarm-result/1"}, {"status", result.failure ? "refused" : "ok"}};
-  json["failure"] = result.failure ? to_json(*result.failure) : Json(nullptr);
-  const Advice advice = advice_for(result);
-  json["causes"] = advice.causes;
-  json["next"] = advice.next.empty() ? Json(nullptr) : Json(advice.next);
-  json["warnings"] = json_list_of(result.warnings);
-  json["notes"] = json_list_of(result.notes);
-  json["calibrator"] = {
-      {"name", result.calibrator.name},
-      {"tolerance_mm", result.calibrator.tolerance_mm},
-      {"scale_sigma",
-       result.calibrator.scale_sigma > 0 ? Json(result.calibrator.scale_sigma) : Json(nullptr)},
-      {"measured", result.calibrator.measured},
-      {"balls", list_of(result.calibrator.balls)}};
-  json["views"] = list_of(result.views);
-  add_calibration(json, result.calibration ? *result.calibration : CaseCalibration());
-  json["points"] = list_of(result.points, result.views, result.bones);
-  json["accuracy"] = json_of(result.accuracy);
-  json["tunnels"] = Json::array();
-  for (const guidance::Tunnel& tunnel : result.tunnels) json["tunnels"].push_back(to_json(tunnel));
-  for (const ModelTunnel& planned : result.model_tunnels) {
-    json["tunnels"].push_back(to_json(planned.tunnel));
-    json["tunnels"].back()["model"] = planned.model;
-    json["tunnels"].back()["bone_check"] =
-        planned.bone_check ? registration::to_json(*planned.bone_check) : Json();
-  }
-  json["verification"] = list_of(result.verifications, result.views);
-  json["timing_ms"] = json_of(result.timing_ms);
-  json["version"] = HELICARM_VERSION;
-  json["options"] = {{"method", result.options.method == rectification::Method::paper ? "paper" : "best"},
-                     {"max_error_mm", optional_number(result.options.max_error_mm)},
-                     {"motion_sigma_mm", result.options.motion_sigma_mm},
-                     {"threads", result.options.threads}};
-  return json;
+  return output_of([&](OutputJson& output) { describe_result(output, result); });
+}
+
+Json result_schema() {
+  return output_schema("result.json", [](OutputSchema& output) { describe_result(output, Result()); });
 }
 
 }  // namespace helicarm::pipeline

@@ -142,15 +142,11 @@ Eigen::MatrixXd joint_covariance(const Result& result);
 /// result.json (docs/formats.md): all keys, null if not computed.
 Json to_json(const Result& result);
 
+/// The JSON Schema of result.json.
+Json result_schema();
+
 /// As in result.json: code, message, view and figures.
 Json to_json(const Failure& failure);
-
-/// As in result.json's "tunnels".
-Json to_json(const guidance::Tunnel& tunnel);
-
-/// As in result.json's "points": coordinates and covariances in bones and tool, null where not known. Of the
-/// knee's bones also by their own keys, if the case has them.
-Json in_frames(const guidance::PointInFrames* place, const std::vector<guidance::Bone>& bones);
 
 /// A list of failures, warnings or findings.
 template <std::ranges::range Failures>

@@ -8,7 +8,6 @@
 
 #include <Eigen/Geometry>
 
-#include "helicarm/geometry/view_json.h"
 #include "helicarm/registration/bone_surface.h"
 
 namespace helicarm::registration {
@@ -245,34 +244,6 @@ double tunnel_distance_mm(const BoneCheck& a, const BoneCheck& b) {
   const double t = std::clamp(vv > 0 ? (uv * s + v.dot(apart)) / vv : 0, 0.0, 1.0);
   s = std::clamp(uu > 0 ? (t * uv - u.dot(apart)) / uu : 0, 0.0, 1.0);
   return (apart + s * u - t * v).norm() - a.diameter_mm.value_or(0) / 2 - b.diameter_mm.value_or(0) / 2;
-}
-
-Json to_json(const BoneCheck& check) {
-  const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
-  const auto place = [](const std::optional<Vector3d>& value) {
-    return value ? geometry::json_list(*value) : Json();
-  };
-  Json json = {{"diameter_mm", number(check.diameter_mm)},
-               {"bridge_mm", number(check.bridge_mm)},
-               {"bridge_sigma_mm", number(check.sigma_mm)},
-               {"drilled_sigma_mm", number(check.drilled_sigma_mm)},
-               {"required_bridge_mm", number(check.required_mm)},
-               {"at_mm", number(check.at_mm)},
-               {"length_in_bone_mm", check.length_in_bone_mm},
-               {"entry_mm", place(check.entry)},
-               {"exit_mm", place(check.exit)},
-               {"entry_angle_deg", number(check.entry_angle_deg)},
-               {"exit_angle_deg", number(check.exit_angle_deg)},
-               {"end_mm", number(check.end_mm)},
-               {"breach", check.is_breach()},
-               {"thin", check.is_thin()},
-               {"to_tunnels", Json::array()},
-               {"note", nullptr}};
-  for (const TunnelDistance& other : check.to_tunnels)
-    json["to_tunnels"].push_back({{"name", other.tunnel}, {"distance_mm", other.distance_mm}});
-  if (!check.diameter_mm)
-    json["note"] = "the tunnel has no diameter_mm: its wall was not compared with the bone's surface";
-  return json;
 }
 
 }  // namespace helicarm::registration

@@ -65,7 +65,4 @@ BoneCheck check_tunnel(const BoneSurface& bone, const BoneTunnel& tunnel);
 /// Between the walls of two tunnels in the same bone (axes, without a diameter), mm; negative: they meet.
 double tunnel_distance_mm(const BoneCheck& a, const BoneCheck& b);
 
-/// "bone_check" of result.json and registration.json (docs/formats.md).
-Json to_json(const BoneCheck& check);
-
 }  // namespace helicarm::registration

@@ -206,10 +206,6 @@ Warning cameras_without_covariance(const std::string& name) {
           {}};
 }
 
-std::string_view word(Decision decision) {
-  return decision == Decision::accept ? "accept" : decision == Decision::warn ? "warn" : "refuse";
-}
-
 Eigen::Matrix3d point_covariance(const Registration& registration, const Vector3d& in_world) {
   const auto at = [&](const RigidCovariance& covariance) {
     return point_covariance(covariance, registration.centre, in_world);

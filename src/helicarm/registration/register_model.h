@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <functional>
 #include <limits>
 #include <optional>
@@ -15,7 +16,8 @@
 namespace helicarm::registration {
 
 enum class Decision { accept, warn, refuse };
-std::string_view word(Decision decision);
+inline constexpr std::array<std::string_view, 3> decision_words{"accept", "warn", "refuse"};
+inline std::string_view word(Decision decision) { return decision_words[std::size_t(decision)]; }
 
 /// Of a model's size where the case states none: a CT's field of view and table, resampling, a threshold.
 inline constexpr double usual_scale_sigma = 0.005;

@@ -75,6 +75,9 @@ Expected<Sweep> run_sweep(const SweepCase& given, const SweepOptions& options = 
 /// sweep.json (docs/formats.md).
 Json to_json(const Sweep& sweep);
 
+/// The JSON Schema of sweep.json.
+Json sweep_schema();
+
 /// report.html as one page.
 std::string sweep_report(const Sweep& sweep);
 

@@ -1,116 +1,184 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
-#include <cmath>
+#include <string_view>
 
 #include "helicarm/calibration/c_arm_history_file.h"
-#include "helicarm/geometry/view_json.h"
+#include "helicarm/core/output.h"
+#include "helicarm/pipeline/result_description.h"
 #include "helicarm/pipeline/view_parameters.h"
 #include "helicarm/sweep/sweep.h"
 
 namespace helicarm::sweep {
 namespace {
 
-using geometry::json_list, geometry::json_rows;
+using calibration::CalibratedView;
+using output::if_set;
 
 constexpr double degrees = 180 / EIGEN_PI;
-constexpr std::array decision_words{"accept", "warn", "refuse"};
+constexpr std::array<std::string_view, 3> decision_words{"accept", "warn", "refuse"};
 
-template <class T>
-Json or_null(const std::optional<T>& value) {
-  return value ? Json(*value) : Json(nullptr);
+template <class Output>
+void describe_camera(Output& output, const std::optional<CalibratedView>& camera) {
+  using geometry::Intrinsics;
+  output.value("reprojection_rms_px", if_set(camera, &CalibratedView::reprojection_rms_px), "");
+  output.value("chi2", if_set(camera, &CalibratedView::chi2), "");
+  output.value("dof", if_set(camera, &CalibratedView::dof), "expectation of `chi2`");
+  output.value("projection", if_set(camera, [](const CalibratedView& of) { return of.view.projection(); }),
+               "of the best estimate, as in [result.json](#resultjson); `null` if refused");
+  output.object("parameters", camera && !camera->covariance.isZero(0), "likewise", [&](auto& row) {
+    static const CalibratedView none{};
+    pipeline::describe_parameters(row, camera ? *camera : none);
+  });
+  output.object("intrinsics", camera.has_value(), "likewise", [&](auto& row) {
+    const auto number = [&](const char* key, double Intrinsics::*which) {
+      row.value(
+          key, [&camera, which] { return camera->view.intrinsics.*which; }, "px");
+    };
+    number("fx_px", &Intrinsics::fx);
+    number("fy_px", &Intrinsics::fy);
+    number("u0", &Intrinsics::u0);
+    number("v0", &Intrinsics::v0);
+  });
+  output.value(
+      "camera_from_calibrator",
+      if_set(camera,
+             [](const CalibratedView& of) -> Eigen::Matrix4d { return of.view.camera_from_world.matrix(); }),
+      "likewise, mm");
+  output.value("source_mm",
+               if_set(camera, [](const CalibratedView& of) { return of.view.source_in_world(); }),
+               "in the calibrator's frame");
+  const auto covariance = [](const CalibratedView& of) { return calibration::source_covariance(of); };
+  output.value("source_sigma_mm",
+               if_set(camera, [&](const CalibratedView& of) { return pipeline::sigmas<3>(covariance(of)); }),
+               "standard deviations");
+  output.value("source_covariance_mm2", if_set(camera, covariance), "");
 }
 
-void add_camera(Json& json, const calibration::CalibratedView& camera) {
-  const geometry::Intrinsics& k = camera.view.intrinsics;
-  json["reprojection_rms_px"] = camera.reprojection_rms_px;
-  json["chi2"] = camera.chi2;
-  json["dof"] = camera.dof;
-  json["projection"] = json_rows(camera.view.projection());
-  json["parameters"] = pipeline::parameters_json(camera);
-  json["intrinsics"] = {{"fx_px", k.fx}, {"fy_px", k.fy}, {"u0", k.u0}, {"v0", k.v0}};
-  json["camera_from_calibrator"] = json_rows(camera.view.camera_from_world.matrix());
-  json["source_mm"] = json_list(camera.view.source_in_world());
-  const Eigen::Matrix3d covariance = calibration::source_covariance(camera);
-  json["source_sigma_mm"] = json_list(covariance.diagonal().cwiseMax(0).cwiseSqrt());
-  json["source_covariance_mm2"] = json_rows(covariance);
+template <class Output>
+void describe_frame(Output& output, const SweepFrame& frame) {
+  output.value("frame", frame.number, "its number in the file or of the file");
+  output.value("view", frame.view, "`NAME/12`");
+  output.word(
+      "decision", [&] { return decision_words[std::size_t(frame.decision)]; }, decision_words,
+      "`warn`: its residuals, or its distance from the path, are larger than usual; the covariance is "
+      "inflated "
+      "where residuals are");
+  output.object("failure", frame.failure.has_value(), "of a refused image", [&](auto& row) {
+    static const Failure none{};
+    pipeline::describe_failure(row, frame.failure ? *frame.failure : none);
+  });
+  output.object("angle_deg", frame.primary_angle_deg || frame.secondary_angle_deg,
+                "as the file states; `null`: not stated", [&](auto& row) {
+                  row.value("primary", frame.primary_angle_deg, "");
+                  row.value("secondary", frame.secondary_angle_deg, "");
+                });
+  output.value("path_angle_deg", frame.path_angle_deg, "along the path, from the first image");
+  output.value("fiducials_used", frame.fiducials_used, "number");
+  describe_camera(output, frame.best);
+  output.value("alone", if_set(frame.alone, [](const CalibratedView& of) { return of.view.projection(); }),
+               "projection by this image alone");
+  output.value(
+      "off_path_sigma", frame.off_path_sigma,
+      "distance of this image's own camera from the path of the others, as a standard normal deviate; "
+      "`null` if free");
 }
 
-Json json_of(const SweepFrame& frame) {
-  Json json = {{"frame", frame.number},
-               {"view", frame.view},
-               {"decision", decision_words[std::size_t(frame.decision)]},
-               {"failure", frame.failure ? pipeline::to_json(*frame.failure) : Json(nullptr)}};
-  json["angle_deg"] = nullptr;
-  if (frame.primary_angle_deg || frame.secondary_angle_deg)
-    json["angle_deg"] = {{"primary", or_null(frame.primary_angle_deg)},
-                         {"secondary", or_null(frame.secondary_angle_deg)}};
-  json["path_angle_deg"] = or_null(frame.path_angle_deg);
-  json["fiducials_used"] = frame.fiducials_used;
-  for (const char* key : {"reprojection_rms_px", "chi2", "dof", "projection", "parameters", "intrinsics",
-                          "camera_from_calibrator", "source_mm", "source_sigma_mm", "source_covariance_mm2"})
-    json[key] = nullptr;
-  if (frame.best) add_camera(json, *frame.best);
-  json["alone"] = frame.alone ? json_rows(frame.alone->view.projection()) : Json(nullptr);
-  json["off_path_sigma"] = or_null(frame.off_path_sigma);
-  return json;
-}
+/// Columns over the accepted frames.
+struct Flex {
+  std::vector<double> angle_deg;
+  std::vector<CameraVector> deviation;
 
-Json parts_of(const CameraVector& deviation) {
-  return {{"source_mm", json_list(deviation.head<3>())},
-          {"detector_mm", json_list(deviation.segment<3>(3))},
-          {"rotation_deg", json_list((deviation.tail<3>() * degrees).eval())}};
-}
+  template <int first>
+  std::vector<Eigen::Vector3d> part(double factor = 1) const {
+    std::vector<Eigen::Vector3d> column;
+    for (const CameraVector& each : deviation) column.emplace_back(each.segment<3>(first) * factor);
+    return column;
+  }
+};
 
-/// Columns over the accepted frames: deviation of the path from the reference orbit.
-Json flex_of(const Sweep& sweep) {
-  Json flex = {{"angle_deg", Json::array()}};
-  for (const char* key : {"source_mm", "detector_mm", "rotation_deg"}) flex[key] = Json::array();
+Flex flex_of(const Sweep& sweep) {
+  Flex flex;
   for (const SweepFrame& frame : sweep.frames) {
     const std::optional<CameraVector>& deviation = frame.flex ? frame.flex : frame.own;
     if (!deviation || !frame.path_angle_deg || !frame.best) continue;
-    flex["angle_deg"].push_back(*frame.path_angle_deg);
-    const Json parts = parts_of(*deviation);
-    for (const char* key : {"source_mm", "detector_mm", "rotation_deg"}) flex[key].push_back(parts[key]);
+    flex.angle_deg.push_back(*frame.path_angle_deg);
+    flex.deviation.push_back(*deviation);
   }
   return flex;
 }
 
-Json json_of(const SweepPath& path, const Sweep& sweep) {
-  Json json = {{"kind", path_words[std::size_t(path.kind)]},
-               {"axis", path.axis ? json_list(*path.axis) : Json(nullptr)},
-               {"isocentre_mm", json_list(path.isocentre)},
-               {"isocentre_sigma_mm", json_list(path.isocentre_sigma)},
-               {"isocentre_radius_mm", path.isocentre_radius_mm},
-               {"source_to_axis_mm", path.source_to_axis_mm},
-               {"source_to_detector_mm", or_null(path.source_to_detector_mm)},
-               {"arc_deg", path.arc_deg}};
-  json["jitter"] = nullptr;
-  if (path.stiffness)
-    json["jitter"] = {{"source_mm", path.stiffness->jitter[0]},
-                      {"detector_mm", path.stiffness->jitter[1]},
-                      {"rotation_deg", path.stiffness->jitter[2] * degrees}};
-  json["flex"] = flex_of(sweep);
-  return json;
+template <class Output>
+void describe_path(Output& output, const SweepPath& path, const Sweep& sweep) {
+  output.word(
+      "kind", [&] { return path_words[std::size_t(path.kind)]; }, path_words, "");
+  output.value("axis", path.axis, "unit vector; `null` where the camera does not turn");
+  output.value("isocentre_mm", path.isocentre, "nearest to the central rays");
+  output.value("isocentre_sigma_mm", path.isocentre_sigma, "jackknife over eighths of the run");
+  output.value("isocentre_radius_mm", path.isocentre_radius_mm, "to the farthest central ray");
+  output.value("source_to_axis_mm", path.source_to_axis_mm, "");
+  output.value("source_to_detector_mm", path.source_to_detector_mm,
+               "`null` where the pixel size is not known");
+  output.value("arc_deg", path.arc_deg, "between the first and the last image");
+  output.object("jitter", path.stiffness.has_value(),
+                "standard deviation of an image about the path; `null` if free", [&](auto& row) {
+                  row.value(
+                      "source_mm", [&] { return path.stiffness->jitter[0]; }, "");
+                  row.value(
+                      "detector_mm", [&] { return path.stiffness->jitter[1]; }, "");
+                  row.value(
+                      "rotation_deg", [&] { return path.stiffness->jitter[2] * degrees; }, "");
+                });
+  const Flex flex = flex_of(sweep);
+  output.object(
+      "flex", true,
+      "columns over the accepted images: the path's deviation from a camera that turns about the axis, in "
+      "the camera's directions (right, down, to the detector); of a free path the images' own",
+      [&](auto& row) {
+        row.value("angle_deg", flex.angle_deg, "along the path");
+        row.value(
+            "source_mm", [&] { return flex.part<0>(); }, "");
+        row.value(
+            "detector_mm", [&] { return flex.part<3>(); }, "of the middle of the image");
+        row.value(
+            "rotation_deg", [&] { return flex.part<6>(degrees); }, "");
+      });
+}
+
+template <class Output>
+void describe_sweep(Output& output, const Sweep& sweep) {
+  output.value("format", "helicarm-sweep/1", "");
+  pipeline::describe_verdict(output, sweep.failure);
+  pipeline::describe_failures(output, "warnings", sweep.warnings,
+                              "of the run; each code of refused images is a warning that names them");
+  pipeline::describe_failures(output, "notes", sweep.notes, "of the run");
+  output.value(
+      "image_size", [&] { return sweep.detector.image_size; }, "columns and rows");
+  output.value(
+      "pixel_mm", [&] { return sweep.pixel_known ? std::optional(sweep.detector.pixel_mm) : std::nullopt; },
+      "`null` where the pixel size is not known");
+  output.value("noise_factor", sweep.noise_factor,
+               "by which the standard deviations of the ball centres were multiplied, from all residuals");
+  output.list("frames", sweep.frames, "in the order of the case; see below",
+              [](auto& row, const SweepFrame& frame) { describe_frame(row, frame); });
+  output.object("path", sweep.path.has_value(), "see below", [&](auto& row) {
+    static const SweepPath none{};
+    describe_path(row, sweep.path ? *sweep.path : none, sweep);
+  });
+  output.value(
+      "acquisitions", [&] { return calibration::acquisitions_json(sweep.acquisitions); },
+      "as in [result.json](#resultjson), of up to 40 images, evenly spaced over the run");
+  output.value("seconds", sweep.seconds, "wall-clock time");
+  output.value("version", HELICARM_VERSION, "of the program");
 }
 
 }  // namespace
 
 Json to_json(const Sweep& sweep) {
-  Json json = {{"format", "helicarm-sweep/1"},
-               {"status", sweep.failure ? "refused" : "ok"},
-               {"failure", sweep.failure ? pipeline::to_json(*sweep.failure) : Json(nullptr)},
-               {"warnings", pipeline::json_list_of(sweep.warnings)},
-               {"notes", pipeline::json_list_of(sweep.notes)},
-               {"image_size", Json({sweep.detector.image_size.x(), sweep.detector.image_size.y()})},
-               {"pixel_mm", sweep.pixel_known ? Json(sweep.detector.pixel_mm) : Json(nullptr)},
-               {"noise_factor", sweep.noise_factor}};
-  json["frames"] = Json::array();
-  for (const SweepFrame& frame : sweep.frames) json["frames"].push_back(json_of(frame));
-  json["path"] = sweep.path ? json_of(*sweep.path, sweep) : Json(nullptr);
-  json["acquisitions"] = calibration::acquisitions_json(sweep.acquisitions);
-  json["seconds"] = sweep.seconds;
-  json["version"] = HELICARM_VERSION;
-  return json;
+  return output_of([&](OutputJson& output) { describe_sweep(output, sweep); });
+}
+
+Json sweep_schema() {
+  return output_schema("sweep.json", [](OutputSchema& output) { describe_sweep(output, Sweep()); });
 }
 
 }  // namespace helicarm::sweep
