@@ -18,8 +18,9 @@ namespace {
 xray::XrayImage image_of(const Frame& frame, const xray::ImageFile* file) {
   if (!file) return value_or_throw(pipeline::image_of(frame.view));
   xray::XrayImage image = value_or_throw(file->read(frame.view.name, frame.view.frame));
-  value_or_throw(xray::state_geometry(image, {frame.view.pixel_mm, frame.view.source_detector_mm},
-                                      fmt::format("case.json: view {}", frame.run)));
+  value_or_throw(xray::state_geometry(
+      image, {.pixel_mm = frame.view.pixel_mm, .source_detector_mm = frame.view.source_detector_mm},
+      fmt::format("case.json: view {}", frame.run)));
   return image;
 }
 

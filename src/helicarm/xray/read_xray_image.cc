@@ -106,9 +106,20 @@ XrayImage read_by_content(const fs::path& path, std::string_view bytes, FileKind
           {Reason::lossy_image, fmt::format("{}: JPEG compresses an image with loss", origin)});
   }
   // NAME.json beside a DICOM file may be of its case.
-  if (const auto sidecar = kind == FileKind::dicom ? full_sidecar_of(path) : sidecar_of(path))
-    value_or_throw(
-        state_geometry(xray_image, value_or_throw(read_sidecar(*sidecar)), sidecar->filename().string()));
+  if (const auto sidecar = kind == FileKind::dicom ? full_sidecar_of(path) : sidecar_of(path)) {
+    const StatedGeometry stated = value_or_throw(read_sidecar(*sidecar));
+    const std::string name = sidecar->filename().string();
+    const int frames = outline ? outline->frames : frames_of(bytes, kind, origin);
+    if (frames > 1 && (stated.primary_deg || stated.secondary_deg))
+      throw BadInput(
+          {Reason::bad_value,
+           fmt::format("{}: states one angle for the {} images of {}: leave it out, or save the images "
+                       "as numbered files with a sidecar each",
+                       name, frames, origin),
+           {},
+           {{"frames", double(frames)}}});
+    value_or_throw(state_geometry(xray_image, stated, name));
+  }
   return xray_image;
 }
 

@@ -28,8 +28,9 @@ fs::path short_name(const fs::path& image) {
 /// the file of another program or another part of this one. What cannot be read is left to be refused.
 bool is_other_json(const fs::path& path) {
   const auto json = read_json(path);
-  if (!json || !json->is_object() || json->contains("pixel_mm") || json->contains("source_detector_mm"))
-    return false;
+  if (!json || !json->is_object()) return false;
+  for (const char* key : {"pixel_mm", "source_detector_mm", "primary_deg", "secondary_deg"})
+    if (json->contains(key)) return false;
   return json->contains("format") ||
          std::ranges::any_of(*json, [](const Json& value) { return value.is_structured(); });
 }
@@ -46,6 +47,21 @@ void check_agreement(double own, double stated, const char* key, const std::stri
                    origin, key, stated, image, own, 100 * difference),
        {},
        {{"stated_mm", stated}, {"file_mm", own}}});
+}
+
+/// Sets the angle, or compares it with the image's own over whole turns.
+void state_angle(std::optional<double>& own, std::optional<double> stated, const char* key,
+                 const std::string& image, const std::string& origin) {
+  constexpr double tolerance_deg = 1;
+  if (!stated) return;
+  if (own && std::abs(std::remainder(*stated - *own, 360)) > tolerance_deg)
+    throw BadInput({Reason::bad_value,
+                    fmt::format("{}: \"{}\" is {:g}, the image{} itself states {:g}, limit 1 degree; correct "
+                                "it, or leave it out",
+                                origin, key, *stated, image, *own),
+                    {},
+                    {{"stated_deg", *stated}, {"file_deg", *own}}});
+  if (!own) own = stated;
 }
 
 }  // namespace
@@ -75,6 +91,8 @@ Expected<StatedGeometry> read_sidecar(const fs::path& path) {
     stated.pixel_mm = reader.optional_number("pixel_mm", {min_pixel_mm, max_pixel_mm});
     stated.source_detector_mm =
         reader.optional_number("source_detector_mm", {min_source_detector_mm, max_source_detector_mm});
+    stated.primary_deg = reader.optional_number("primary_deg", {-360, 360});
+    stated.secondary_deg = reader.optional_number("secondary_deg", {-360, 360});
     reader.finish();
     return stated;
   });
@@ -98,6 +116,8 @@ Expected<void> state_geometry(XrayImage& xray_image, const StatedGeometry& state
                       image, origin);
     else if (stated.source_detector_mm)
       acquisition.source_detector_mm = stated.source_detector_mm;
+    state_angle(acquisition.primary_angle_deg, stated.primary_deg, "primary_deg", image, origin);
+    state_angle(acquisition.secondary_angle_deg, stated.secondary_deg, "secondary_deg", image, origin);
   });
 }
 

@@ -13,6 +13,7 @@ namespace helicarm::xray {
 struct StatedGeometry {
   std::optional<double> pixel_mm = {};  ///< in the receiver's plane
   std::optional<double> source_detector_mm = {};
+  std::optional<double> primary_deg = {}, secondary_deg = {};  ///< positioner angles, as DICOM counts them
 };
 
 /// The sidecar beside an image, where there is one: NAME.png.json or NAME.json. A JSON file of another kind,
@@ -29,7 +30,8 @@ std::optional<std::filesystem::path> other_json_of(const std::filesystem::path& 
 Expected<StatedGeometry> read_sidecar(const std::filesystem::path& path);
 
 /// Gives the image what its file does not state; `origin` names who states it. A pixel size takes the warning
-/// spacing_missing away. Refuses bad_value where the file's own value differs by more than 1 %.
+/// spacing_missing away. Refuses bad_value where the file's own value differs by more than 1 %, an angle by
+/// more than 1 degree.
 Expected<void> state_geometry(XrayImage& xray_image, const StatedGeometry& stated, const std::string& origin);
 
 }  // namespace helicarm::xray

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "helicarm/core/files.h"
@@ -69,6 +70,35 @@ TEST_F(Sidecar, MustAgreeWithTheFile) {
     EXPECT_EQ(refused.error().reason, Reason::bad_value);
     EXPECT_NE(refused.error().message.find("a.dcm.json"), std::string::npos);
   }
+}
+
+TEST_F(Sidecar, StatesTheAnglesOfAnImageFile) {
+  write_png("a.png");
+  write("a.json", R"({"primary_deg": -31.5, "secondary_deg": 12})");
+  const auto image = read("a.png");
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->acquisition.primary_angle_deg, -31.5);
+  EXPECT_EQ(image->acquisition.secondary_angle_deg, 12);
+}
+
+TEST_F(Sidecar, AnAngleMustAgreeWithTheFileButForWholeTurns) {
+  write("a.dcm", DicomBuilder().text(0x00181510, "DS", "30 ").bytes());
+  write("a.dcm.json", R"({"primary_deg": -330.4})");
+  EXPECT_EQ(read("a.dcm").value().acquisition.primary_angle_deg, 30);
+  write("a.dcm.json", R"({"primary_deg": 32})");
+  const auto refused = read("a.dcm");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::bad_value);
+  EXPECT_THAT(refused.error().message, testing::HasSubstr("a.dcm.json: \"primary_deg\" is 32"));
+}
+
+TEST_F(Sidecar, OneAngleIsNotThatOfSeveralFrames) {
+  write("a.dcm",
+        DicomBuilder().text(0x00280008, "IS", "2").pixels(std::vector<std::uint16_t>(2 * 48, 100)).bytes());
+  write("a.dcm.json", R"({"primary_deg": 30})");
+  const auto refused = read_xray_image(folder_.path() / "a.dcm", "AP", 1);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, testing::HasSubstr("one angle for the 2 images of a.dcm"));
 }
 
 TEST_F(Sidecar, CameraBesideTheImageIsNone) {
