@@ -114,6 +114,7 @@ CaseRegistration present_registration(const ApplicationState& state) {
     model.tunnels.clear();
     model.tunnel_ends.clear();
     model.bone_checks.clear();
+    model.tunnel_slices.clear();
   }
   return registration;
 }

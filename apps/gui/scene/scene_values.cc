@@ -139,6 +139,13 @@ std::optional<ModelShape> shape_of(const case_registration::RegisteredModel& mod
                              model.moves_with,
                              {shape.points[model.tunnel_ends[i].start].error.centre,
                               shape.points[model.tunnel_ends[i].end].error.centre}});
+  for (std::size_t i = 0; i < std::min(model.tunnels.size(), model.bone_checks.size()); ++i)
+    if (const auto& check = model.bone_checks[i]) {
+      TunnelShape& tunnel = shape.tunnels[i];
+      if (check->diameter_mm) tunnel.radius_mm = 0.5 * *check->diameter_mm;
+      tunnel.is_breach = check->is_breach();
+      tunnel.is_thin = check->is_thin();
+    }
   return shape;
 }
 

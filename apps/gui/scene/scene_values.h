@@ -58,6 +58,7 @@ struct TunnelShape {
   std::optional<guidance::Bone> moves_with;
   Segment axis;
   double radius_mm = 4;
+  bool is_breach = false, is_thin = false;  ///< of a plan, against the bone
 };
 
 /// The displayed parts of a result; missing ones are absent.

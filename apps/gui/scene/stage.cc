@@ -147,7 +147,11 @@ void Stage::set_result(const ResultScene& scene, double error_scale) {
     group(point.moves_with).add_ellipsoid(drawn, palette::point);
   }
   for (const TunnelShape& tunnel : scene.tunnels)
-    group(tunnel.moves_with).add_tube(tunnel.axis, tunnel.radius_mm, tunnel.radius_mm, palette::tunnel);
+    group(tunnel.moves_with)
+        .add_tube(tunnel.axis, tunnel.radius_mm, tunnel.radius_mm,
+                  tunnel.is_breach ? palette::breach
+                  : tunnel.is_thin ? palette::thin
+                                   : palette::tunnel);
   if (scene.body) {
     cone.add_mesh(*scene.body, palette::plastic);
     std::array<std::vector<Vector3d>, 2> rims;  // in the order of cone_of: base and top alternate

@@ -101,6 +101,12 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
   layout()->addWidget(says_);
   models_ = add_table(case_registration::models_table({}), "modelTable");
   add_hand();
+  tunnels_ = add_table(case_registration::tunnels_in_bone_table({}), "modelTunnelTable");
+  slices_ = new QLabel;
+  slices_->setObjectName("tunnelSlices");
+  slices_->setAlignment(Qt::AlignLeft | Qt::AlignTop);
+  layout()->addWidget(slices_);
+  connect(tunnels_, &QTableWidget::currentCellChanged, this, &RegisterPage::show_slices);
   points_ = add_table(case_registration::points_table({}), "modelPointTable");
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
@@ -167,6 +173,9 @@ void RegisterPage::show_state(const ApplicationState& state) {
   const std::vector<RegisteredModel> models = listed_models(state);
   models_->fill(table_of_models(state, models));
   points_->fill(case_registration::points_table(models));
+  tunnels_->fill(case_registration::tunnels_in_bone_table(models));
+  listed_ = models;
+  show_slices();
   if (shown_ == state.registration) return;
   shown_ = state.registration;
   const QSignalBlocker quiet(model_);
@@ -176,6 +185,35 @@ void RegisterPage::show_state(const ApplicationState& state) {
   if (shown_)
     for (const RegisteredModel& model : shown_->models) model_->addItem(text(model.registration.name));
   model_->setCurrentIndex(std::clamp(chosen, std::min(0, model_->count() - 1), model_->count() - 1));
+}
+
+void RegisterPage::resizeEvent(QResizeEvent* event) {
+  Page::resizeEvent(event);
+  show_slices();
+}
+
+void RegisterPage::show_slices() {
+  int row = std::max(0, tunnels_->currentRow());
+  slices_->hide();
+  for (const RegisteredModel& model : listed_)
+    for (std::size_t i = 0; i < std::min(model.tunnels.size(), model.bone_checks.size()); ++i)
+      if (model.bone_checks[i] && row-- == 0 && i < model.tunnel_slices.size() && model.tunnel_slices[i]) {
+        const std::string png =
+            case_registration::tunnel_slices_png(*model.tunnel_slices[i], *model.bone_checks[i]);
+        QPixmap pixels;
+        pixels.loadFromData(reinterpret_cast<const uchar*>(png.data()), uint(png.size()));
+        const int width = std::min(pixels.width(), std::max(120, this->width() - 24));
+        slices_->setPixmap(pixels.scaledToWidth(width, Qt::SmoothTransformation));
+        slices_->setAccessibleName(tr("Slices of the CT with tunnel %1").arg(text(model.tunnels[i].name)));
+        slices_->setToolTip(tr("Tunnel %1 in the CT: along it through the thinnest place of the bone beside "
+                               "it (cross), along it at "
+                               "a right angle to that, and across it there. Blue: the bone's surface; the "
+                               "walls are red where they "
+                               "may leave the bone, yellow where it is thinner than planned.")
+                                .arg(text(model.tunnels[i].name)));
+        slices_->show();
+        return;
+      }
 }
 
 QString RegisterPage::words_of(const ApplicationState& state) const {
@@ -221,6 +259,19 @@ std::vector<ModelShape> models_of(const ApplicationState& state) {
   return shapes;
 }
 
+namespace {
+
+/// Of a tunnel whose wall leaves the bone, or comes nearer to its surface than planned.
+std::optional<QColor> warning_ink(const RegisteredModel& model, std::size_t tunnel) {
+  if (tunnel >= model.bone_checks.size() || !model.bone_checks[tunnel]) return {};
+  const registration::BoneCheck& check = *model.bone_checks[tunnel];
+  if (check.is_breach()) return ink::breach;
+  if (check.is_thin()) return ink::thin;
+  return {};
+}
+
+}  // namespace
+
 std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t view) {
   std::vector<ModelOutline> outlines;
   if (!state.registration) return outlines;
@@ -233,11 +284,12 @@ std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t
     if (!stale_model(state, i).isEmpty() || model.registration.failure || view >= model.views.size())
       continue;
     const geometry::View& camera = model.views[view];
-    for (const auto& [start, end] : model.tunnel_ends) {
+    for (std::size_t k = 0; k < model.tunnel_ends.size(); ++k) {
+      const auto& [start, end] = model.tunnel_ends[k];
       const Eigen::Vector3d &from = model.points[start].place.in_calibrator,
                             &to = model.points[end].place.in_calibrator;
       if (camera.depth(from) > 1 && camera.depth(to) > 1)
-        outline.tunnels.push_back({camera.project(from), camera.project(to)});
+        outline.tunnels.push_back({{camera.project(from), camera.project(to)}, warning_ink(model, k)});
     }
     for (const case_registration::RegisteredPoint& point : model.points)
       if (const Eigen::Vector3d& at = point.place.in_calibrator; model.views[view].depth(at) > 1)

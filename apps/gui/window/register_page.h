@@ -19,15 +19,21 @@ class RegisterPage : public Page {
   RegisterPage(Controller& controller, QWidget* parent);
   void show_state(const ApplicationState& state) override;
 
+ protected:
+  void resizeEvent(QResizeEvent* event) override;
+
  private:
   void add_hand();
+  void show_slices();
   void nudge();
   void reset_hand();
   QString words_of(const ApplicationState& state) const;
 
   QPushButton *register_, *from_here_;
   QLabel* says_;
-  PageTable *models_, *points_;
+  PageTable *models_, *tunnels_, *points_;
+  QLabel* slices_;  ///< of the selected tunnel, or the first
+  std::vector<case_registration::RegisteredModel> listed_;
   QWidget* hand_;
   QComboBox* model_;
   std::array<PoseBox*, 6> by_{};  ///< mm, then degrees

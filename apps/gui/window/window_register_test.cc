@@ -5,6 +5,7 @@
 #include "gui/window/plan_tables.h"
 #include "gui/window/register_page.h"
 #include "gui/window/window_test.h"
+#include "gui/xray/mark_painter.h"
 
 namespace helicarm::gui {
 namespace {
@@ -27,6 +28,10 @@ TEST_F(Window, AModelIsRegisteredAndMovedByHand) {
   ASSERT_EQ(models->rowCount(), 1);
   EXPECT_EQ(models->item(0, 0)->text(), "bone");
   EXPECT_EQ(find<QTableWidget>("modelPointTable")->rowCount(), 2);
+  auto* slices = find<QLabel>("tunnelSlices");
+  EXPECT_EQ(find<QTableWidget>("modelTunnelTable")->rowCount(), 1);
+  EXPECT_TRUE(slices->isVisible());
+  EXPECT_GT(slices->pixmap(Qt::ReturnByValue).width(), 100);
   ASSERT_TRUE(wait("the X-ray is shown", [&] { return !window_->xray(0).is_computing(); }));
   const auto pixels_apart = [](const QImage& a, const QImage& b) {
     int apart = 0;
@@ -54,6 +59,8 @@ TEST_F(Window, AModelIsRegisteredAndMovedByHand) {
   EXPECT_TRUE(find("registerFromHere")->isEnabled());
   EXPECT_EQ(card(Phase::registration).status, StepStatus::stale);
   EXPECT_EQ(models->item(0, 1)->text(), "moved by hand");
+  EXPECT_FALSE(slices->isVisible());
+  EXPECT_EQ(find<QTableWidget>("modelTunnelTable")->rowCount(), 0);
   auto* field = find<QDoubleSpinBox>("shiftX");
   field->setFocus();
   QTest::keyClick(field, Qt::Key_E, Qt::ControlModifier);
@@ -118,7 +125,13 @@ TEST(RegisteredModels, RefusedOneHasNoTunnelsAndNoPointsInTheImages) {
   EXPECT_EQ(rows[0].start_95_mm, 0);
   EXPECT_NEAR(rows[0].end_95_mm, 2.79, 0.01);
   EXPECT_EQ(outlines_of(with_registration(model), 0)[0].points.size(), 2u);
-  EXPECT_EQ(outlines_of(with_registration(model), 0)[0].tunnels.size(), 1u);
+  ASSERT_EQ(outlines_of(with_registration(model), 0)[0].tunnels.size(), 1u);
+  EXPECT_FALSE(outlines_of(with_registration(model), 0)[0].tunnels[0].warns);
+  registration::BoneCheck thin{.diameter_mm = 3, .required_mm = 2, .bridge_mm = 1, .drilled_sigma_mm = 0.1};
+  model.bone_checks = {thin};
+  EXPECT_EQ(outlines_of(with_registration(model), 0)[0].tunnels[0].warns, ink::thin);
+  model.bone_checks[0]->bridge_mm = -1;
+  EXPECT_EQ(outlines_of(with_registration(model), 0)[0].tunnels[0].warns, ink::breach);
   EXPECT_EQ(models_of(with_registration(model)).size(), 1u);
 
   model.registration.failure = Failure{Reason::wrong_model, "femur: another bone", {}, {}};

@@ -96,8 +96,9 @@ void LiveMarks::carry(const pipeline::ViewResult& view, Layer layer) {
         outline.in_layer.dots.push_back(*place);
     for (const auto& [name, at] : outline.given.points)
       if (const auto place = in_layer(view, layer, at)) outline.in_layer.points.emplace_back(name, *place);
-    for (const rectification::PixelPath& tunnel : outline.given.tunnels)
-      std::ranges::move(in_layer(view, layer, tunnel), std::back_inserter(outline.in_layer.tunnels));
+    for (const OutlinedTunnel& tunnel : outline.given.tunnels)
+      for (rectification::PixelPath& piece : in_layer(view, layer, tunnel.path))
+        outline.in_layer.tunnels.push_back({std::move(piece), tunnel.warns});
   }
   for (CarriedPick& pick : picks_)
     if (!pick.in_layer) pick.in_layer = layer_from_raw(view, layer, pick.given.raw);
@@ -119,8 +120,8 @@ void paint_outline(QPainter& painter, const ModelOutline& outline, const ImageFr
   for (const Eigen::Vector2d& dot : outline.dots) dots.append(frame.to_widget(dot));
   painter.setPen(QPen(colour, 2));
   painter.drawPoints(dots.data(), int(dots.size()));
-  for (const rectification::PixelPath& tunnel : outline.tunnels)
-    paint_planned_tunnel(painter, tunnel, frame, colour);
+  for (const OutlinedTunnel& tunnel : outline.tunnels)
+    paint_planned_tunnel(painter, tunnel.path, frame, tunnel.warns.value_or(colour));
   constexpr double arm = 10;
   for (const auto& [name, at] : outline.points) {
     const QPointF place = frame.to_widget(at);

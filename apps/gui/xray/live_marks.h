@@ -17,11 +17,17 @@ struct FreshPick {
   QString why_failed = {};  ///< not empty: it is no pick
 };
 
+/// A line of a model's plan. `warns`: the colour of a wall that leaves the bone, or comes near its surface.
+struct OutlinedTunnel {
+  rectification::PixelPath path;
+  std::optional<QColor> warns = {};
+};
+
 /// A registered model: dots along its outline, points and tunnels of its plan, rectified px.
 struct ModelOutline {
   std::vector<Eigen::Vector2d> dots;
   std::vector<std::pair<QString, Eigen::Vector2d>> points;
-  std::vector<rectification::PixelPath> tunnels = {};
+  std::vector<OutlinedTunnel> tunnels = {};
 };
 
 /// Changing marks over the image: as given (picks raw, the rest rectified) and in the layer's pixels.

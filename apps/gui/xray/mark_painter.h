@@ -14,7 +14,8 @@ namespace helicarm::gui {
 namespace ink {
 inline const QColor ball(74, 222, 128), rejected(255, 122, 107), plate(147, 197, 253, 150),
     point(240, 171, 252), tunnel(250, 204, 21), residual(251, 146, 60), tool(239, 68, 68),
-    epipolar(94, 234, 242), measure(255, 255, 255), quiet(200, 208, 220);
+    epipolar(94, 234, 242), measure(255, 255, 255), quiet(200, 208, 220), breach(255, 70, 60),
+    thin(255, 190, 60);
 /// Of registered models, as in the registration's report.
 inline const QColor models[] = {{250, 204, 21}, {96, 165, 250}, {240, 171, 252}, {74, 222, 128}};
 inline const QColor& of_model(std::size_t number) { return models[number % std::size(models)]; }

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/centred_view.h"
+#include "helicarm/case_registration/bone_checks.h"
 #include "helicarm/case_registration/register_in_memory.h"
 #include "helicarm/exchange/import_matrix.h"
 #include "helicarm/geometry/dense_matrix.h"
@@ -202,16 +203,23 @@ Expected<std::vector<RegistrationView>> with_images(const LoadedViews& loaded,
   });
 }
 
-Expected<LoadedModel> load_model(const pipeline::CaseModel& given, bool with_bone) {
+Expected<LoadedModel> load_model(const pipeline::CaseModel& given, const std::optional<Plan>& plan) {
   return guarded([&]() -> LoadedModel {
+    const bool has_tunnels = plan && !plan->tunnels.empty();
+    LoadedModel loaded;
+    const auto compare = [&](const registration::BoneSurface& bone, const volume::Volume* ct) {
+      loaded.bone_checks = bone_checks(*plan, &bone);
+      loaded.tunnel_slices = tunnel_slices(*plan, loaded.bone_checks, bone, ct);
+    };
     if (given.surface) {
       registration::SurfaceMesh surface = value_or_throw(registration::read_surface(*given.surface));
       registration::Model model = value_or_throw(registration::model_from(given.name, surface));
       model.warnings = std::move(surface.warnings);
-      auto bone = with_bone ? registration::bone_surface(*model.surface, model.voxel_mm) : nullptr;
-      return {std::move(model), std::move(bone)};
+      if (has_tunnels) compare(*registration::bone_surface(*model.surface, model.voxel_mm), nullptr);
+      loaded.model = std::move(model);
+      return loaded;
     }
-    if (!given.volume) return {};
+    if (!given.volume) return loaded;
     if (given.voxel_mm && !volume::is_tiff_stack(*given.volume))
       throw BadInput(Reason::bad_value,
                      fmt::format("models: \"{}\": \"voxel_mm\" is for TIFF stacks only; {} states its own",
@@ -233,9 +241,9 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& given, bool with_bon
     registration::Model model = value_or_throw(registration::model_from(given.name, volume, mask, window));
     model.warnings = volume.warnings;
     if (mask) model.warnings.insert(model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
-    const bool outlined = mask || window;
-    return {std::move(model),
-            with_bone && outlined ? registration::bone_surface(volume, mask, window) : nullptr};
+    if (has_tunnels && (mask || window)) compare(*registration::bone_surface(volume, mask, window), &volume);
+    loaded.model = std::move(model);
+    return loaded;
   });
 }
 

@@ -8,9 +8,10 @@
 #include <string_view>
 #include <vector>
 
+#include "helicarm/case_registration/plan.h"
+#include "helicarm/case_registration/tunnel_slices.h"
 #include "helicarm/pipeline/calibrate_case.h"
 #include "helicarm/pipeline/case.h"
-#include "helicarm/registration/bone_surface.h"
 #include "helicarm/registration/model.h"
 #include "helicarm/registration/raster.h"
 
@@ -43,11 +44,13 @@ Expected<std::vector<registration::RegistrationView>> with_images(const LoadedVi
 
 /// What a model's files hold.
 struct LoadedModel {
-  std::optional<registration::Model> model;               ///< nothing: landmarks alone
-  std::shared_ptr<const registration::BoneSurface> bone;  ///< if asked for; null without an outline
+  std::optional<registration::Model> model;  ///< nothing: landmarks alone
+  /// Of each tunnel of the plan, if there is one; nothing: the model has no outline.
+  std::vector<std::optional<registration::BoneCheck>> bone_checks = {};
+  std::vector<std::optional<TunnelSlices>> tunnel_slices = {};
 };
 
-/// The model's files; `with_bone`: also the bone's surface.
-Expected<LoadedModel> load_model(const pipeline::CaseModel& given, bool with_bone = false);
+/// The model's files; of a plan the tunnels against the bone.
+Expected<LoadedModel> load_model(const pipeline::CaseModel& given, const std::optional<Plan>& plan = {});
 
 }  // namespace helicarm::case_registration

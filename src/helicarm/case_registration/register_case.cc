@@ -74,7 +74,7 @@ class Registrar {
     const bool follows = asked.moves_with && tracked(given_, *asked.moves_with);
     const auto views = follows ? following(loaded_.views, given_, *asked.moves_with) : loaded_.views;
     for (const RegistrationView& view : views) made.views.push_back(view.view);
-    LoadedModel files = value_or_throw(load_model(asked, plan && !plan->tunnels.empty()));
+    LoadedModel files = value_or_throw(load_model(asked, plan));
     std::optional<registration::Model>& model = files.model;
     const double motion_sigma_mm = follows ? 0 : options_.run.motion_sigma_mm;
     const auto start = guarded([&] { return start_poses(given_, loaded_, asked, views, motion_sigma_mm); });
@@ -106,7 +106,9 @@ class Registrar {
     if (plan && made.registration.is_determined()) {
       carry_plan(*plan, given_, made);
       limit_error(largest_error(made.points), options_.run.max_error_mm, made.registration);
-      made.bone_checks = bone_checks(*plan, files.bone.get());
+      made.bone_checks = std::move(files.bone_checks);
+      made.bone_checks.resize(plan->tunnels.size());
+      made.tunnel_slices = std::move(files.tunnel_slices);
       judge_tunnels(*plan, made.bone_checks, made.registration);
     }
     if (made.model) add_warnings_of_files(*made.model, made.registration);

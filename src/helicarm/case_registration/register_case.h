@@ -63,6 +63,7 @@ struct RegisteredModel {
   std::vector<pipeline::TunnelEnds> tunnel_ends;  ///< of each tunnel, among the points
   /// Of each tunnel; nothing: the model has no outline.
   std::vector<std::optional<registration::BoneCheck>> bone_checks = {};
+  std::vector<std::optional<TunnelSlices>> tunnel_slices = {};  ///< in the model's files
   std::vector<geometry::View> views;  ///< as used: of a tracked bone at the first acquisition
   /// For overlays, per view: outlines of the model at its pose, rectified px.
   std::vector<std::vector<Eigen::Vector2d>> outlines;

@@ -34,6 +34,22 @@ void draw_point(cv::Mat& image, const geometry::View& view, const RegisteredPoin
               colour, 1, cv::LINE_AA);
 }
 
+/// The planned tunnels in slices of the CT.
+std::string slices_html(const RegisteredModel& model) {
+  std::string html;
+  for (std::size_t i = 0; i < std::min(model.tunnel_slices.size(), model.bone_checks.size()); ++i)
+    if (model.tunnel_slices[i] && model.bone_checks[i])
+      html += fmt::format(
+          "<figure><img alt=\"slices of {0}\" src=\"data:image/png;base64,{1}\"><figcaption>{0}: along the "
+          "tunnel "
+          "through the thinnest place beside it (cross), along it at a right angle to that, across it there. "
+          "Blue: the "
+          "bone's surface.</figcaption></figure>\n",
+          report::escaped(model.tunnels[i].name),
+          report::base64(tunnel_slices_png(*model.tunnel_slices[i], *model.bone_checks[i])));
+  return html;
+}
+
 std::string model_section(const RegisteredModel& model) {
   const Registration& r = model.registration;
   std::string html =
@@ -61,7 +77,7 @@ std::string model_section(const RegisteredModel& model) {
                         model.landmarks->fle_mm);
   if (!model.points.empty()) html += html_of(points_table({model}));
   const report::Table in_bone = report::without_empty_columns(tunnels_in_bone_table({model}));
-  return in_bone.rows.empty() ? html : html + html_of(in_bone);
+  return in_bone.rows.empty() ? html : html + html_of(in_bone) + slices_html(model);
 }
 
 }  // namespace
