@@ -9,8 +9,8 @@
 #include "findings.h"
 #include "helicarm/pipeline/measure.h"
 #include "helicarm/report/earlier_results.h"
+#include "helicarm/report/report.h"
 #include "helicarm/simulation/write_case.h"
-#include "result_files.h"
 #include "result_text.h"
 
 namespace helicarm::cli {
@@ -81,7 +81,7 @@ CommandResult demo_command(const DemoArguments& arguments, Console& console) {
         value_or_throw(pipeline::measure(value_or_throw(pipeline::read_case(folder)), run));
     print_warnings(result.warnings, console);
     print_notes(result.notes, console);
-    value_or_throw(write_result(result, out, false));
+    value_or_throw(report::write_result(result, out));
     if (result.failure) throw BadInput(*result.failure);
     if (!console.json) console.out << summary_of(result);
     print(compare(result, truth), std::filesystem::absolute(out / "report.html"), console);

@@ -115,7 +115,8 @@ void guide_by_hand(const operation::PlannedTunnel& tunnel, operation::Operation&
     });
     if (done && *done) return;
     if (done) continue;
-    if (!is_of_poses(done.error()) && done.error().reason != Reason::off_target) throw BadInput(done.error());
+    if (!operation::is_of_a_reading(done.error()) && done.error().reason != Reason::off_target)
+      throw BadInput(done.error());
     console.progress << fmt::format("{}: {}; again\n", code(done.error().reason),
                                     without_control_characters(done.error().message))
                      << std::flush;

@@ -178,7 +178,7 @@ void add_touched(Observations& observations, const MountArguments& arguments, co
         continue;
       }
       const Failure& why = facet ? pointer.error() : facet.error();
-      if (!is_of_poses(why)) throw BadInput(why);
+      if (!operation::is_of_a_reading(why)) throw BadInput(why);
       console.progress << fmt::format("{}: {}; again\n", code(why.reason),
                                       without_control_characters(why.message))
                        << std::flush;

@@ -45,10 +45,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::seconds robot_patience{10};
+constexpr std::chrono::seconds connect_patience{10};
 
 /// Checks for errors that can be detected before the first X-ray image.
-void check_plan(const operation::OperationPlan& plan, const NavigateArguments& arguments) {
+void check_before_images(const operation::OperationPlan& plan, const NavigateArguments& arguments) {
   const auto refuse = [&](Reason reason, const std::string& problem) {
     throw BadInput(reason, fmt::format("{}: {}", arguments.plan.string(), problem));
   };
@@ -57,10 +57,12 @@ void check_plan(const operation::OperationPlan& plan, const NavigateArguments& a
                    "there is no terminal to confirm orders at; --yes confirms all orders: use it only where "
                    "no person can be injured");
   if (plan.tunnels.empty()) refuse(Reason::bad_value, "\"tunnels\" is empty");
-  if (plan.calibrator != phantom::udcsc().name && !fs::exists(plan.calibrator))
-    refuse(Reason::missing_file, fmt::format("\"calibrator\": {}: no such file", plan.calibrator));
-  if (plan.plate && *plan.plate != phantom::plate48().name && !fs::exists(*plan.plate))
-    refuse(Reason::missing_file, fmt::format("\"plate\": {}: no such file", *plan.plate));
+  if (plan.calibrator != phantom::udcsc().name && !fs::exists(plan.folder / plan.calibrator))
+    refuse(Reason::missing_file,
+           fmt::format("\"calibrator\": {}: no such file", (plan.folder / plan.calibrator).string()));
+  if (plan.plate && *plan.plate != phantom::plate48().name && !fs::exists(plan.folder / *plan.plate))
+    refuse(Reason::missing_file,
+           fmt::format("\"plate\": {}: no such file", (plan.folder / *plan.plate).string()));
   if (!arguments.picks.empty()) return;
   for (const operation::PlannedTunnel& tunnel : plan.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end})
@@ -177,7 +179,7 @@ void go_to(const operation::PlannedTunnel& tunnel, operation::Operation& operati
   const auto approach = [&] {
     for (const std::string& name : operation.checks_to_come(tunnel.bone))
       touch_point(operation, name, input, ending, console);
-    const robot::RobotOrder order = value_or_throw(operation.plan_tunnel(tunnel.name));
+    const robot::RobotOrder order = value_or_throw(operation.plan_order(tunnel.name));
     console.progress << fmt::format("preview: {}\n", (out / ("preview-" + tunnel.name + "-*.png")).string())
                      << std::flush;
     const std::string token = value_or_throw(consent(order, [&] { return operation.check_plan(order); }));
@@ -268,7 +270,7 @@ void drive_robot(const operation::OperationPlan& plan, const NavigateArguments& 
                  operation::Operation& operation, robot::RobotLink& robot, LineInput& input,
                  const Ending& ending, Console& console) {
   Consent consent(robot, ending, arguments.yes, console);
-  const auto until = std::chrono::steady_clock::now() + robot_patience;
+  const auto until = std::chrono::steady_clock::now() + connect_patience;
   ending.wait_until([&] { return robot.wait_connected({}) || std::chrono::steady_clock::now() > until; });
   value_or_throw(robot.unlock("the operator at the terminal"));
   print_tour(value_or_throw(operation.preview_tour()), console);
@@ -321,7 +323,8 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     operation::OperationPlan plan = value_or_throw(
         operation::plan_from(value_or_throw(read_json(arguments.plan)), arguments.plan.string()));
     put_options(arguments, plan);
-    check_plan(plan, arguments);
+    plan.threads = console.threads;
+    check_before_images(plan, arguments);
     StopSignal stop;
     value_or_throw(make_private_folder(arguments.out));
     operation::Connections devices(plan, value_or_throw(receiver::Inbox::open(arguments.out / "inbox")));

@@ -12,7 +12,7 @@
 #include "helicarm/pipeline/map_cache.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/earlier_results.h"
-#include "result_files.h"
+#include "helicarm/report/report.h"
 #include "result_text.h"
 
 namespace helicarm::cli {
@@ -109,7 +109,7 @@ Expected<Measurement> run_and_write(const RunArguments& arguments, Console& cons
     if (arguments.history) value_or_throw(calibration::check_history_file(*arguments.history));
     Measurement measured = value_or_throw(measure(arguments, console));
     value_or_throw(case_registration::write_models(measured.registration, arguments.out));
-    value_or_throw(write_result(measured.result, arguments.out, arguments.no_report));
+    value_or_throw(report::write_result(measured.result, arguments.out, !arguments.no_report));
     if (arguments.history && !measured.result.failure)
       value_or_throw(add_to_c_arm_history(*arguments.history, measured.result, console));
     return measured;

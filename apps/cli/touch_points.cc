@@ -7,11 +7,6 @@
 
 namespace helicarm::cli {
 
-bool is_of_poses(const Failure& failure) {
-  return failure.reason == Reason::no_pose || failure.reason == Reason::stale_pose ||
-         failure.reason == Reason::pose_spread;
-}
-
 void touch_point(operation::Operation& operation, const std::string& name, LineInput& input,
                  const Ending& ending, Console& console) {
   console.progress << fmt::format("touch \"{}\" with the pointer, hold it still and press Enter\n",
@@ -26,7 +21,7 @@ void touch_point(operation::Operation& operation, const std::string& name, LineI
                        << std::flush;
       return;
     }
-    if (!is_of_poses(off.error())) throw BadInput(off.error());
+    if (!operation::is_of_a_reading(off.error())) throw BadInput(off.error());
     console.progress << fmt::format("{}: {}; again\n", code(off.error().reason),
                                     without_control_characters(off.error().message))
                      << std::flush;

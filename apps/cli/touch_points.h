@@ -10,9 +10,6 @@
 
 namespace helicarm::cli {
 
-/// Repeating the reading may help.
-bool is_of_poses(const Failure& failure);
-
 /// Waits until the pointer is held still on the check point in view of the tracker. Throws BadInput as
 /// `Operation::touch`.
 void touch_point(operation::Operation& operation, const std::string& name, LineInput& input,

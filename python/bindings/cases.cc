@@ -67,11 +67,9 @@ HeldCalibration calibration_of(const pipeline::Result& result) {
 
 void write(const case_registration::Measurement& measured, const std::filesystem::path& folder) {
   const auto written = without_gil([&] {
-    return case_registration::write_models(measured.registration, folder)
-        .and_then([&] { return report::write_report(measured.result, folder); })
-        .and_then([&] {
-          return write_file(folder / "result.json", to_text(pipeline::to_json(measured.result)) + "\n");
-        });
+    return case_registration::write_models(measured.registration, folder).and_then([&] {
+      return report::write_result(measured.result, folder);
+    });
   });
   value_or_raise(written);
 }

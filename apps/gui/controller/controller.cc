@@ -235,11 +235,10 @@ void Controller::export_to(const fs::path& folder) {
           const pipeline::Result whole =
               registration ? case_registration::with_models(result, *registration) : result;
           report::forget_exports(folder);
-          value_or_throw(report::write_report(whole, folder));
           value_or_throw(write_pdf_report(whole, folder / "report.pdf"));
           if (!whole.failure) value_or_throw(report::write_exports(whole, folder));
           value_or_throw(case_registration::write_models(registration, folder));
-          value_or_throw(write_file(folder / "result.json", to_text(pipeline::to_json(whole)) + "\n"));
+          value_or_throw(report::write_result(whole, folder));
           return [this, record](ApplicationState& state) {
             state.exported = record;
             emit exported(QString::fromStdString(record.folder.string()));

@@ -97,7 +97,7 @@ class Controller : public QObject {
 
   void unlock(const std::string& who);
   void register_robot();
-  void plan_tunnel(const std::string& tunnel);
+  void plan_order(const std::string& tunnel);
   /// Withdraws the displayed path, with a record, and shows the refusal; a new plan is required.
   void drop_plan(const Failure& why);
   void go();

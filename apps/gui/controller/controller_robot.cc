@@ -97,12 +97,12 @@ void Controller::register_robot() {
   });
 }
 
-void Controller::plan_tunnel(const std::string& tunnel) {
+void Controller::plan_order(const std::string& tunnel) {
   if (!equipment_ || !equipment_->operation) return;
   follow(tunnel);
   begin(Phase::navigate, "planning the path to " + tunnel,
         [this, equipment = equipment_, tunnel]() -> Change {
-          const robot::RobotOrder order = value_or_throw(equipment->operation->plan_tunnel(tunnel));
+          const robot::RobotOrder order = value_or_throw(equipment->operation->plan_order(tunnel));
           const operation::PathPreview path = value_or_throw(equipment->operation->preview(order));
           const operation::PlanWatch watch = value_or_throw(equipment->operation->plan_watch(order));
           return [this, order, path, watch](ApplicationState& state) {

@@ -170,7 +170,7 @@ void Controller::open_devices(const fs::path& file, const receiver::ReceiverOpti
 
 Controller::Change Controller::with_plan(const operation::OperationPlan& plan,
                                          const std::vector<pipeline::Pick>& offered) {
-  const phantom::Calibrator calibrator = value_or_throw(phantom::calibrator_named(plan.calibrator, "."));
+  const phantom::Calibrator calibrator = value_or_throw(operation::files_of(plan)).calibrator;
   return [=](ApplicationState& state) {
     state.views = plan.views;
     state.calibrator = calibrator;

@@ -106,7 +106,7 @@ TEST_F(Window, KeepsItsMemoryOverManyOperations) {
       shoot_both();
       controller.take_offered_picks(), done();
     }
-    controller.plan_tunnel(state().tunnels[std::size_t(round % 2)].name), done();
+    controller.plan_order(state().tunnels[std::size_t(round % 2)].name), done();
     controller.go(), done();
     outcomes += state().tool_is_out && state().refusals.empty();
     std::printf("%5.1f min: %.1f MB, %d outcomes of %d\n", double(since.elapsed()) / 60000, resident_mb(),

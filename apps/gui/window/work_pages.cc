@@ -35,7 +35,7 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
   connect(tunnel_, &QComboBox::currentTextChanged, this,
           [this](const QString& name) { controller_.follow(name.toStdString()); });
   plan_ = add_button(tr("3  &Plan the path and show it in both images"), "planWay",
-                     [this] { controller_.plan_tunnel(tunnel_->currentText().toStdString()); });
+                     [this] { controller_.plan_order(tunnel_->currentText().toStdString()); });
   go_ = add_hold(tr("4  &Move to the tunnel"), "go", [this] { controller_.go(); });
   withdraw_ = add_hold(tr("5  With&draw the tool"), "withdraw", [this] { controller_.withdraw(); });
   for (HoldButton* button : {unlock_, register_, go_, withdraw_})

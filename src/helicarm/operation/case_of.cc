@@ -89,7 +89,7 @@ class CaseFolder {
 }  // namespace
 
 Expected<PlanFiles> files_of(const OperationPlan& plan) {
-  return guarded([&] { return read_files(plan, ".", false); });
+  return guarded([&] { return read_files(plan, plan.folder, false); });
 }
 
 Expected<PlanFiles> files_of_case(const OperationPlan& plan, const fs::path& folder) {
@@ -173,8 +173,7 @@ std::string digest_of(const Json& result) { return xray::digest(to_text(without_
 
 Expected<Digests> write_result(const pipeline::Result& result, const fs::path& folder) {
   return guarded([&] {
-    value_or_throw(report::write_report(result, folder));
-    value_or_throw(write_file(folder / "result.json", to_text(pipeline::to_json(result))));
+    value_or_throw(report::write_result(result, folder));
     std::vector<std::string> names{"result.json", "report.html"};
     for (std::size_t i = 0; i < result.views.size(); ++i)
       if (result.views[i].xray_image) names.push_back(report::overlay_name(result.views[i].name, i));

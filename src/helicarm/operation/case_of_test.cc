@@ -80,6 +80,17 @@ TEST_F(CaseOfOperation, CalibratorThatIsMissingIsRefused) {
   EXPECT_FALSE(files_of(plan_));
 }
 
+TEST_F(CaseOfOperation, FilesAreFoundFromThePlansFolder) {
+  file("plans/cone.json", phantom::to_json(phantom::udcsc()));
+  plan_.calibrator = "cone.json";
+  plan_.plate.reset();
+  EXPECT_FALSE(files_of(plan_)) << "in the working directory";
+  plan_.folder = folder_.path() / "plans";
+  const auto files = files_of(plan_);
+  ASSERT_TRUE(files) << files.error().message;
+  EXPECT_EQ(files->calibrator.balls.size(), phantom::udcsc().balls.size());
+}
+
 TEST_F(CaseOfOperation, FilesOfThePlanAreFoundAgainInTheCasesFolder) {
   phantom::Calibrator calibrator = phantom::udcsc();
   calibrator.tolerance_mm = 0.03;

@@ -30,13 +30,10 @@ Json to_json(const Guidance& guidance);
 /// moves the target.
 class FreehandGuide {
  public:
-  /// Greatest age of a pose unless the tracker's limit is given (`TrackerPlan::oldest_pose_s`).
-  static constexpr double oldest_pose_s = 0.1;
-
   /// `basis`: the poses when guidance began; `oldest_s`: greatest age of a pose, as for a robot. Refuses
   /// not_seen for a tunnel that is not located; no_pose.
   static Expected<FreehandGuide> begin(const OperationPlan& plan, LiveTool live, const std::string& tunnel,
-                                       const guidance::Poses& basis, double oldest_s = oldest_pose_s);
+                                       const guidance::Poses& basis, double oldest_s);
 
   const PlannedTunnel& tunnel() const { return tunnel_; }
   /// Samples of tool and bone in the half second before `now_s`.

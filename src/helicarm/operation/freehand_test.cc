@@ -17,6 +17,7 @@ const RigidTransform tracker_from_femur{geometry::rotation_from_euler(1, 0, 0), 
 /// In the femur marker's frame: the tunnel begins here and extends by 40 mm along z.
 const Vector3d entry(30, 5, -20);
 constexpr double end_s = 100;
+constexpr double oldest_s = 0.1;
 
 OperationPlan plan() {
   OperationPlan plan;
@@ -53,7 +54,7 @@ FreehandGuide guide() {
   basis.tracker_from_bone["femur"] = tracker_from_femur;
   basis.tracker_from_tool = tracker_from_tool(tracker_from_femur, femur_from_tip(0, -20));
   return FreehandGuide::begin(plan(), LiveTool(plan(), measured(), {}, tracked_tool(*plan().drill)), "femur",
-                              basis)
+                              basis, oldest_s)
       .value();
 }
 
@@ -156,7 +157,7 @@ TEST(FreehandGuide, PlanWithARobotIsRefused) {
   OperationPlan with_robot = plan();
   with_robot.drill.reset();
   EXPECT_EQ(FreehandGuide::begin(with_robot, LiveTool(plan(), measured(), {}, tracked_tool(*plan().drill)),
-                                 "femur", {})
+                                 "femur", {}, oldest_s)
                 .error()
                 .reason,
             Reason::usage);

@@ -228,7 +228,7 @@ const PlannedTunnel& Operation::tunnel_named(const std::string& name) const {
   return *tunnel;
 }
 
-Expected<robot::RobotOrder> Operation::plan_tunnel(const std::string& name) {
+Expected<robot::RobotOrder> Operation::plan_order(const std::string& name) {
   return guarded([&] {
     const PlannedTunnel& tunnel = tunnel_named(name);
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())

@@ -34,6 +34,9 @@ struct PathPreview {
   std::vector<Eigen::Vector3d> in_calibrator;                   ///< at the first view's acquisition, mm
 };
 
+/// Whether the reading of a pose failed, so that another one may help.
+bool is_of_a_reading(const Failure& why);
+
 /// Whether poses, robot states or heartbeats came later than their limit: the robot is stopped, and nothing
 /// else is known to be wrong.
 bool is_late(const Failure& why);
@@ -126,7 +129,7 @@ class Operation {
   /// The order that moves the tool to the tunnel, with its preview, also written as preview-TUNNEL-VIEW.png
   /// into the session's folder. Nothing moves. Refuses (usage) a bone whose check points were not touched
   /// since the last order, and (plan_stale) a robot whose base or tool moved since registration.
-  Expected<robot::RobotOrder> plan_tunnel(const std::string& tunnel);
+  Expected<robot::RobotOrder> plan_order(const std::string& tunnel);
   /// Whether this order may be carried out at the newest poses; poll it while the confirmation is open.
   /// Refuses as `PlanWatch::holds`, and (plan_stale) an order that is not the last plan to its tunnel. A plan
   /// once found stale stays stale, and its check points must be touched again.

@@ -119,6 +119,7 @@ pipeline::RunOptions run_options(const OperationPlan& plan) {
   options.max_error_mm = plan.max_error_mm;
   options.motion_sigma_mm = plan.motion_sigma_mm;
   options.history = plan.history;
+  options.threads = plan.threads;
   return options;
 }
 

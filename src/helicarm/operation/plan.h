@@ -96,7 +96,7 @@ struct PlanLimits {
 
 /// Settings of an operation (plan.json, docs/formats.md).
 struct OperationPlan {
-  std::string calibrator = "udcsc";  ///< name of a built-in, or a file beside the plan
+  std::string calibrator = "udcsc";  ///< name of a built-in, or a file by its path from `folder`
   std::optional<std::string> plate = "plate48";
   std::vector<std::string> views{"AP", "LAT"};  ///< in order of acquisition
   std::vector<guidance::Bone> bones = guidance::knee_bones();
@@ -112,7 +112,8 @@ struct OperationPlan {
   std::optional<calibration::CArmHistory> history;  ///< of the C-arm, used as prior
   PlanLimits limits;
   std::vector<pipeline::CaseModel> models = {};  ///< registered after the measurement
-  std::filesystem::path folder = {};             ///< of the models' files
+  std::filesystem::path folder = {};             ///< of the plan's files
+  unsigned threads = 0;                          ///< 0: all cores; of this computer, not in the file
 };
 
 /// Of the plan's measurements.

@@ -14,12 +14,16 @@ constexpr std::chrono::seconds link_patience{2};
 constexpr std::chrono::milliseconds link_interval{20};
 
 /// Of the poses that a plan is made on; a person may remove the cause at any time.
-bool is_of_poses(const Failure& why) {
-  return why.reason == Reason::plan_stale || why.reason == Reason::no_pose ||
-         why.reason == Reason::stale_pose || why.reason == Reason::pose_spread;
+bool is_of_the_plans_poses(const Failure& why) {
+  return why.reason == Reason::plan_stale || is_of_a_reading(why);
 }
 
 }  // namespace
+
+bool is_of_a_reading(const Failure& why) {
+  return why.reason == Reason::no_pose || why.reason == Reason::stale_pose ||
+         why.reason == Reason::pose_spread;
+}
 
 bool is_late(const Failure& why) {
   return why.reason == Reason::stale_pose ||
@@ -42,8 +46,8 @@ bool Operation::answers_again() const {
 Expected<void> Operation::plan_again(const std::string& order, const Failure& why, const Again& again) {
   return guarded([&] {
     int& replans = replans_[order];
-    const bool may = replans < most_replans && (is_of_poses(why) || is_late(why));
-    if (!may || !(answers_again() || is_of_poses(why)) || !again(why)) throw BadInput(why);
+    const bool may = replans < most_replans && (is_of_the_plans_poses(why) || is_late(why));
+    if (!may || !(answers_again() || is_of_the_plans_poses(why)) || !again(why)) throw BadInput(why);
     answers_again();  // a person may have taken minutes; the unlock needs a fresh state
     record(record::Replanned{order, ++replans, std::string(code(why.reason)), who_});
     value_or_throw(robot().unlock(who_));

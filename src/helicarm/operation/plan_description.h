@@ -219,7 +219,8 @@ void describe_plan(Codec& codec, Plan& plan, const std::string& origin) {
         reader.choice("format", {"helicarm-plan/2", "helicarm-plan/1"});
       },
       [] { return std::optional<Json>("helicarm-plan/2"); });
-  codec.text("calibrator", plan.calibrator, "name of a built-in or a file", {1, 200});
+  codec.text("calibrator", plan.calibrator,
+             "name of a built-in, or a file by its path from the plan's folder", {1, 200});
   codec.text("plate", plan.plate, "likewise; `null` or absent: flat panel", {1, 200});
   codec.custom(
       "views", true, {{"type", "array"}, {"items", {{"type", "string"}}}, {"minItems", 2}, {"maxItems", 50}},

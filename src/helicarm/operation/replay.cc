@@ -81,7 +81,11 @@ class Replay {
                                  differing_fields(then, now)));
   }
 
-  template <class Other>
+  /// Of orders (`OrderReplay`), or of nothing that can be derived.
+  template <record::OneOf<record::Session, record::Poses, record::Tour, record::Withdraw, record::Robot,
+                          record::Order, record::Confirmed, record::CarriedOut, record::Halted,
+                          record::Replanned, record::Navigated, record::Outcome>
+                Other>
   void take(const Other&, const std::string&) {}
 
   void take(const record::Plan& record, const std::string&) { plan_ = record.plan; }

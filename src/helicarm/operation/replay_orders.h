@@ -47,7 +47,11 @@ class OrderReplay {
     std::string digest;  ///< of the order to the tunnel that is left
     Withdrawal from;
   };
-  template <class Other>
+  /// No order depends on them.
+  template <record::OneOf<record::Session, record::Plan, record::Models, record::Exposure, record::Refused,
+                          record::Touched, record::CaseBegun, record::Measured, record::Registered,
+                          record::RegistrationConfirmed, record::Preview, record::Guide, record::Guided>
+                Other>
   void take(const Other&, const Context&) {}
   void take(const record::Poses& poses, const Context& at);
   void take(const record::Robot& robot, const Context& at);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <concepts>
 #include <filesystem>
 #include <variant>
 
@@ -9,8 +10,8 @@
 #include "helicarm/operation/orders.h"
 #include "helicarm/operation/session_log.h"
 
-/// What an operation records in session.log (docs/formats.md): a type for each kind, which session_records.cc
-/// describes once for reader, writer and schema.
+/// What an operation records in session.log (docs/formats.md): a type for each kind, which
+/// session_record_descriptions.h describes once for reader, writer and schema.
 namespace helicarm::operation {
 namespace record {
 
@@ -214,6 +215,10 @@ struct End {
       "the operation ended; a log without it is not complete: the program was killed, or lines were removed";
   std::optional<std::string> why, message;
 };
+
+/// The kinds that a reader names to leave them out: a new one must be taken or named.
+template <class Kind, class... Kinds>
+concept OneOf = (std::same_as<Kind, Kinds> || ...);
 
 }  // namespace record
 

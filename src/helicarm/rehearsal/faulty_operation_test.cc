@@ -271,7 +271,7 @@ TEST_F(CheckedOperation, DisplacedMarkerIsDetectedAtItsCheckPoint) {
   expose("AP");
   expose("LAT");
   ASSERT_TRUE(operation_->measure());
-  EXPECT_EQ(operation_->plan_tunnel("femur").error().message, "femur notch: touch this check point first");
+  EXPECT_EQ(operation_->plan_order("femur").error().message, "femur notch: touch this check point first");
   virtual_or_->simulated_scene().bump_marker("femur", {2.5, 0, 0});
   std::this_thread::sleep_for(window);
   const auto femur = touch("femur"), tibia = touch("tibia");

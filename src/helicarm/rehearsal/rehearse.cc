@@ -250,7 +250,7 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
         std::optional<robot::RobotOrder> begun;  // the tool is on its way by this order, or there
         std::optional<operation::TunnelOutcome> outcome;
         const auto approach = [&] {
-          const robot::RobotOrder order = value_or_throw(operation.plan_tunnel(tunnel.name));
+          const robot::RobotOrder order = value_or_throw(operation.plan_order(tunnel.name));
           value_or_throw(value_or_throw(operation.live_tool()).overlay(stage.devices->board(), tunnel.bone));
           begun = order;
           outcome = value_or_throw(operation.go(order, robot.confirm(order)));

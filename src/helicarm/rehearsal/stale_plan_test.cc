@@ -97,7 +97,7 @@ class StalePlan : public testing::Test {
   robot::RobotOrder plan(const std::string& tunnel = "femur") {
     std::optional<robot::RobotOrder> order;
     try_to([&]() -> Expected<void> {
-      return operation_->plan_tunnel(tunnel).map(
+      return operation_->plan_order(tunnel).map(
           [&](robot::RobotOrder planned) { order = std::move(planned); });
     });
     return order.value();
@@ -162,9 +162,9 @@ TEST_F(StalePlan, StaleOrderDoesNotMoveTheRobotThoughConfirmed) {
   EXPECT_THAT(wait_until_stale(order).message, testing::HasSubstr("robot base or tool moved"));
   expect_nothing_moves(order);
   std::this_thread::sleep_for(1s);
-  Expected<robot::RobotOrder> again = operation_->plan_tunnel("femur");
+  Expected<robot::RobotOrder> again = operation_->plan_order("femur");
   for (int i = 0; i < most_attempts && !again && is_timing_failure(again.error()); ++i)
-    again = operation_->plan_tunnel("femur");
+    again = operation_->plan_order("femur");
   ASSERT_FALSE(again);
   EXPECT_EQ(again.error().reason, Reason::plan_stale) << again.error().message;
   EXPECT_THAT(again.error().message, testing::HasSubstr("since registration"));
@@ -328,7 +328,7 @@ TEST_F(StalePlanToACheckedBone, IsMadeAgainOnlyAfterTouchingTheCheckPointAgain) 
   virtual_or_->simulated_scene().bump_marker("femur", {3, 0, 0});
   EXPECT_EQ(wait_until_stale(order).reason, Reason::plan_stale);
   EXPECT_EQ(operation_->checks_to_come("femur"), std::vector<std::string>{"femur notch"});
-  EXPECT_EQ(operation_->plan_tunnel("femur").error().reason, Reason::usage);
+  EXPECT_EQ(operation_->plan_order("femur").error().reason, Reason::usage);
   EXPECT_EQ(touch().error().reason, Reason::residual_too_large);
 }
 

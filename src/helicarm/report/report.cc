@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
+#include "helicarm/report/earlier_results.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/report/sections.h"
@@ -29,6 +31,19 @@ Expected<void> write_report(const pipeline::Result& result, const std::filesyste
           !written)
         return written;
   return {};
+}
+
+Expected<void> write_result(const pipeline::Result& result, const std::filesystem::path& folder,
+                            bool with_report) {
+  auto written = with_report ? write_report(result, folder) : Expected<void>();
+  if (written) written = write_file(folder / "result.json", to_text(pipeline::to_json(result)) + "\n");
+  if (written) return written;
+  std::vector<std::string> overlays;
+  for (std::size_t i = 0; i < result.views.size(); ++i)
+    overlays.push_back(overlay_name(result.views[i].name, i));
+  forget_files(folder, overlays);
+  forget_results(folder);
+  return written;
 }
 
 }  // namespace helicarm::report
