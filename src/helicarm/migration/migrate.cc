@@ -259,7 +259,7 @@ BodyMigration migration_of(const std::vector<Matched>& all, std::size_t index, c
       track::relative_pose({reference.second_from_first, reference.covariance}, reference.centre,
                            {body.second_from_first, body.covariance}, body.centre);
   BodyMigration made{.segment = index, .motion = relative.pose};
-  made.centre = track::mean_of(all[index].segment.places);
+  made.centre = geometry::mean_of(all[index].segment.places);
   const Eigen::Matrix3d rotation = axes.transpose() * relative.pose.rotation * axes;
   made.rotation_deg = degrees * angles_of(rotation);
   made.translation_mm = axes.transpose() * (relative.pose * made.centre - made.centre);

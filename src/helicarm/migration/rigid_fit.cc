@@ -11,8 +11,8 @@ RigidFit fit_rigid(const std::vector<Pair>& pairs) {
   std::vector<Eigen::Vector3d> first, second;
   for (const Pair& pair : pairs) first.push_back(pair.first), second.push_back(pair.second);
   RigidFit fit;
-  fit.second_from_first = track::absolute_pose(first, second);
-  fit.centre = track::mean_of(second);
+  fit.second_from_first = geometry::absolute_pose(first, second);
+  fit.centre = geometry::mean_of(second);
   registration::RigidCovariance normal = registration::RigidCovariance::Zero(), meat = normal;
   for (const Pair& pair : pairs) {
     const Eigen::Vector3d at = fit.second_from_first * pair.first;

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
+#include "helicarm/geometry/absolute_pose.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::registration {
@@ -28,23 +29,8 @@ constexpr double warned_ratio = 2, refused_ratio_of_landmarks = 4;
 
 using Order = std::vector<std::size_t>;
 
-Vector3d mean_of(const std::vector<Vector3d>& points) {
-  Vector3d mean = Vector3d::Zero();
-  for (const Vector3d& point : points) mean += point / double(points.size());
-  return mean;
-}
-
-/// The rigid fit of `from` to `to`.
-geometry::RigidTransform fitted(const std::vector<Vector3d>& from, const std::vector<Vector3d>& to) {
-  const Vector3d a = mean_of(from), b = mean_of(to);
-  Matrix3d across = Matrix3d::Zero();
-  for (std::size_t i = 0; i < from.size(); ++i) across += (to[i] - b) * (from[i] - a).transpose();
-  const Matrix3d rotation = geometry::nearest_rotation(across);
-  return {rotation, b - rotation * a};
-}
-
 double fre_of(const std::vector<Vector3d>& from, const std::vector<Vector3d>& to) {
-  const auto motion = fitted(from, to);
+  const auto motion = geometry::absolute_pose(from, to);
   double sum = 0;
   for (std::size_t i = 0; i < from.size(); ++i) sum += (motion * from[i] - to[i]).squaredNorm();
   return std::sqrt(sum / double(from.size()));
@@ -69,7 +55,7 @@ struct Places {
   }
   double spread(const std::vector<Vector3d>& points) const {
     double sum = 0;
-    for (const Vector3d& point : points) sum += (point - mean_of(points)).squaredNorm();
+    for (const Vector3d& point : points) sum += (point - geometry::mean_of(points)).squaredNorm();
     return std::sqrt(sum / double(points.size()));
   }
 };
@@ -153,7 +139,7 @@ double chi2_of(const std::vector<Landmark>& landmarks, const LandmarkRegistratio
 
 /// The middle, and the normal of the plane that fits the landmarks of the model best.
 std::pair<Vector3d, Vector3d> plane_of(const std::vector<Vector3d>& points) {
-  const Vector3d middle = mean_of(points);
+  const Vector3d middle = geometry::mean_of(points);
   Matrix3d spread = Matrix3d::Zero();
   for (const Vector3d& point : points) spread += (point - middle) * (point - middle).transpose();
   return {middle, Eigen::SelfAdjointEigenSolver<Matrix3d>(spread).eigenvectors().col(0)};

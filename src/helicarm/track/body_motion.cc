@@ -234,8 +234,8 @@ void estimate_body(const SequenceData& work, const BodyPlan& plan, Estimated& at
   std::vector<std::optional<FramePose>> measured = at.poses;
   for (auto& pose : measured)
     if (pose) pose->covariance *= fewer;
-  at.motion = smooth_poses(work.times, measured, mean_of(points));
-  take_motion(body, at.poses, at.motion, mean_of(points));
+  at.motion = smooth_poses(work.times, measured, geometry::mean_of(points));
+  take_motion(body, at.poses, at.motion, geometry::mean_of(points));
 }
 
 std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan& plan, const Estimated& at,
@@ -264,7 +264,7 @@ std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan
     std::vector<Eigen::Vector3d> in_body;
     for (std::size_t k = 0; k < plan.markers.size(); ++k)
       if (at.counts[k] && at.shape.in_body[k]) in_body.push_back(*at.shape.in_body[k]);
-    centre = pose->pose * mean_of(in_body);
+    centre = pose->pose * geometry::mean_of(in_body);
   }
   if (!pose) return std::nullopt;
   const Eigen::Vector3d place = pose->pose * *at.shape.in_body[i];

@@ -43,24 +43,8 @@ Eigen::Matrix<double, 3, 6> point_by_step(const Eigen::Vector3d& point, const Ei
   return slope;
 }
 
-Eigen::Vector3d mean_of(std::span<const Eigen::Vector3d> points) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& point : points) sum += point;
-  return sum / double(points.size());
-}
-
-geometry::RigidTransform absolute_pose(std::span<const Eigen::Vector3d> in_body,
-                                       std::span<const Eigen::Vector3d> in_world) {
-  const Eigen::Vector3d from = mean_of(in_body), to = mean_of(in_world);
-  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < in_body.size(); ++i)
-    products += (in_world[i] - to) * (in_body[i] - from).transpose();
-  const Eigen::Matrix3d rotation = geometry::nearest_rotation(products);
-  return {rotation, to - rotation * from};
-}
-
 Eigen::Vector3d extents(std::span<const Eigen::Vector3d> points) {
-  const Eigen::Vector3d mean = mean_of(points);
+  const Eigen::Vector3d mean = geometry::mean_of(points);
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& point : points) squares += (point - mean) * (point - mean).transpose();
   const Eigen::Vector3d values =

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "helicarm/geometry/absolute_pose.h"
 #include "helicarm/geometry/rigid_transform.h"
 #include "helicarm/geometry/view.h"
 #include "helicarm/registration/motion.h"
@@ -65,10 +66,6 @@ RigidCovariance covariance_of(const PoseFit& fit, std::span<const SeenMarker> ma
 /// d point / d step (rotation about `centre`, translation), for a point that moves with the body.
 Eigen::Matrix<double, 3, 6> point_by_step(const Eigen::Vector3d& point, const Eigen::Vector3d& centre);
 
-/// The motion that takes the first points to the others by least squares; three or more, not collinear.
-geometry::RigidTransform absolute_pose(std::span<const Eigen::Vector3d> in_body,
-                                       std::span<const Eigen::Vector3d> in_world);
-
 /// Standard deviations of the points about their mean along the principal axes, mm, descending. A body's pose
 /// is determined by the second: the distance of its markers from their common line.
 Eigen::Vector3d extents(std::span<const Eigen::Vector3d> points);
@@ -76,7 +73,5 @@ Eigen::Vector3d extents(std::span<const Eigen::Vector3d> points);
 /// Condition number of radiostereometry (Soderkvist and Wedin 1993), per metre: 1 / sqrt(s2^2 + s3^2) of the
 /// singular values of the markers about their mean.
 double condition_per_m(std::span<const Eigen::Vector3d> points);
-
-Eigen::Vector3d mean_of(std::span<const Eigen::Vector3d> points);
 
 }  // namespace helicarm::track

@@ -70,7 +70,7 @@ std::optional<RigidTransform> pose_from(const SequenceData& work, const BodyPlan
       to.push_back(point->place);
     }
   if (from.size() < 3) return std::nullopt;
-  return absolute_pose(from, to);
+  return geometry::absolute_pose(from, to);
 }
 
 Shape shape_of(const SequenceData& work, const BodyPlan& plan, const std::vector<char>& counts) {

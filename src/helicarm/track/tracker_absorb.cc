@@ -95,9 +95,9 @@ void Tracker::absorb(const FrameSights& sights) {
           if (!plan.geometry.empty()) known.push_back(plan.geometry[i]);
         }
       if (places.size() < 3 || extents(places)[1] < least_extent_mm) continue;
-      body.pose = known.empty() ? geometry::RigidTransform{} : absolute_pose(known, places);
+      body.pose = known.empty() ? geometry::RigidTransform{} : geometry::absolute_pose(known, places);
       body.previous = body.first = body.pose;
-      body.centre = mean_of(places);
+      body.centre = geometry::mean_of(places);
       body.determining = int(places.size());
       body.poses = 1;
       for (std::size_t i = 0; i < plan.markers.size(); ++i) {

@@ -77,7 +77,7 @@ void Tracker::check_geometry() const {
   std::vector<std::vector<std::size_t>> indices(given_->bodies.size());
   const auto rms_of = [](const std::vector<Eigen::Vector3d>& known,
                          const std::vector<Eigen::Vector3d>& seen) {
-    const geometry::RigidTransform pose = absolute_pose(known, seen);
+    const geometry::RigidTransform pose = geometry::absolute_pose(known, seen);
     double squares = 0;
     for (std::size_t i = 0; i < known.size(); ++i) squares += (pose * known[i] - seen[i]).squaredNorm();
     return std::sqrt(squares / double(known.size()));

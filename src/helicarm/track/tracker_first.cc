@@ -137,7 +137,7 @@ void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) 
   if (placed.empty())
     throw BadInput(Reason::not_seen, "picks: no marker is picked in two views of the first frame");
   for (std::size_t m = 0; m < markers_.size(); ++m)
-    if (markers_[m].place.isZero()) markers_[m].place = mean_of(placed);
+    if (markers_[m].place.isZero()) markers_[m].place = geometry::mean_of(placed);
   learn_appearance(images);
 
   for (const MarkerPick& pick : given_->picks) {

@@ -78,7 +78,7 @@ std::optional<PoseFit> Tracker::pose_of(const BodyState& body, const BodyPlan& p
   // The centre of the body's markers, not of their images.
   std::vector<Eigen::Vector3d> places;
   for (const SeenMarker& marker : whole) places.push_back(fit->world_from_body * marker.in_body);
-  const Eigen::Vector3d centre = mean_of(places);
+  const Eigen::Vector3d centre = geometry::mean_of(places);
   RigidCovariance moves = RigidCovariance::Identity();
   moves.bottomLeftCorner<3, 3>() = point_by_step(centre, fit->centre).leftCols<3>();
   fit->covariance = moves * fit->covariance * moves.transpose();

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
+#include "helicarm/geometry/absolute_pose.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/least_squares.h"
 #include "helicarm/geometry/pose_step.h"
@@ -76,20 +77,14 @@ std::map<std::string, Vector3d> touched_centres(const Places& places, const Obse
   return means;
 }
 
-/// Rigid motion of the touched centres to the places (Arun, Huang, Blostein 1987).
+/// Rigid motion of the touched centres to the places.
 geometry::RigidTransform first_guess(const Places& places, const Observations& observations) {
-  const auto means = touched_centres(places, observations);
-  const double share = 1 / static_cast<double>(means.size());
-  Vector3d from = Vector3d::Zero(), to = Vector3d::Zero();
-  for (const auto& [label, mean] : means) {
-    from += share * mean;
-    to += share * places.at(label).centre_in_calibrator;
+  std::vector<Vector3d> touched, centres;
+  for (const auto& [label, mean] : touched_centres(places, observations)) {
+    touched.push_back(mean);
+    centres.push_back(places.at(label).centre_in_calibrator);
   }
-  Matrix3d products = Matrix3d::Zero();
-  for (const auto& [label, mean] : means)
-    products += (places.at(label).centre_in_calibrator - to) * (mean - from).transpose();
-  const Matrix3d turn = geometry::nearest_rotation(products);
-  return {turn, to - turn * from};
+  return geometry::absolute_pose(touched, centres);
 }
 
 struct Fit {
