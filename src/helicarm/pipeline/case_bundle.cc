@@ -26,13 +26,7 @@ constexpr std::uintmax_t most_bundled_bytes = std::uintmax_t{256} << 20;
 
 using Renamed = std::map<std::string, std::string>;
 
-/// What of case.json and its views is packed; all else may name a person or a file.
-constexpr std::array packed_keys{"format", "calibrator", "plate",     "bones",   "diameters_mm", "views",
-                                 "picks",  "tunnels",    "poses_now", "tracker", "tool_lines"};
-constexpr std::array packed_view_keys{"name",     "image", "frame",    "plate_image",       "map",
-                                      "mirrored", "poses", "pixel_mm", "source_detector_mm"};
-
-void keep_only(Json& object, std::span<const char* const> keys) {
+void keep_only(Json& object, std::span<const std::string_view> keys) {
   for (auto entry = object.begin(); entry != object.end();)
     entry = std::ranges::find(keys, entry.key()) == keys.end() ? object.erase(entry) : std::next(entry);
 }

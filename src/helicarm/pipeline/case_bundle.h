@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "helicarm/core/json.h"
@@ -11,6 +13,19 @@
 #include "helicarm/pipeline/tar_gz.h"
 
 namespace helicarm::pipeline {
+
+/// What of case.json and its views is packed, and what is left out as it may name a person or a file, or has
+/// no meaning without what is left out. Together they are all keys.
+inline constexpr std::array<std::string_view, 11> packed_keys{
+    "format", "calibrator", "plate",     "bones",   "diameters_mm", "views",
+    "picks",  "tunnels",    "poses_now", "tracker", "tool_lines"};
+inline constexpr std::array<std::string_view, 6> unpacked_keys{"models", "notes",       "markers",
+                                                               "bodies", "calibration", "frame_rate_hz"};
+inline constexpr std::array<std::string_view, 9> packed_view_keys{
+    "name", "image", "frame", "plate_image", "map", "mirrored", "poses", "pixel_mm", "source_detector_mm"};
+/// Of cases of a run or of given cameras, which are not measured.
+inline constexpr std::array<std::string_view, 4> unpacked_view_keys{"camera", "calibration", "frames",
+                                                                    "frame_offset"};
 
 /// A case that may be sent to others.
 struct CaseBundle {

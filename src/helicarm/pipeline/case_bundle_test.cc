@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/pipeline/case_bundle.h"
 
+#include <set>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -125,6 +127,25 @@ TEST_F(BundleOfNamedCase, KeepsWhatAViewStatesOfItsImage) {
   const CaseBundle made = bundle({.measure = false});
   const auto file = std::ranges::find(made.files, "case.json", &ArchivedFile::name);
   EXPECT_EQ((*parse_json(file->bytes, "case.json"))["views"][0]["pixel_mm"], json["views"][0]["pixel_mm"]);
+}
+
+/// Names of an object's keys in its schema.
+std::set<std::string> keys_of(const Json& schema) {
+  std::set<std::string> keys;
+  for (const auto& [key, description] : schema.at("properties").items()) keys.insert(key);
+  return keys;
+}
+
+TEST(BundledKeys, AreAllOfACaseOrLeftOutByName) {
+  const auto both = [](const auto& packed, const auto& left_out) {
+    std::set<std::string> all(packed.begin(), packed.end());
+    all.insert(left_out.begin(), left_out.end());
+    return all;
+  };
+  const Json schema = case_schema();
+  EXPECT_EQ(both(packed_keys, unpacked_keys), keys_of(schema));
+  EXPECT_EQ(both(packed_view_keys, unpacked_view_keys),
+            keys_of(schema.at("properties").at("views").at("items")));
 }
 
 TEST_F(BundleOfNamedCase, IsTheSameEachTime) {
