@@ -8,6 +8,7 @@
 
 #include "helicarm/core/random.h"
 #include "helicarm/phantom/mesh.h"
+#include "helicarm/registration/bone_check_description.h"
 #include "helicarm/registration/bone_surface.h"
 
 namespace helicarm::registration {
@@ -183,7 +184,8 @@ TEST(CheckTunnel, WithoutADiameterOnlyTheAxisIsCompared) {
   EXPECT_NEAR(check.length_in_bone_mm, 44, 0.05);
   EXPECT_FALSE(check.bridge_mm);
   EXPECT_FALSE(check.is_breach());
-  EXPECT_TRUE(to_json(check)["note"].is_string());
+  const Json json = output_of([&](OutputJson& output) { describe_bone_check(output, check); });
+  EXPECT_TRUE(json["note"].is_string());
 }
 
 TEST(CheckTunnel, TwoTunnelsByTheirWalls) {
