@@ -103,7 +103,7 @@ void add_drr(CLI::App& app, Action& action) {
       add_command(app, group::studies, "drr", "Project a CT volume: its line integrals on a flat detector",
                   "helicarm drr knee.nii.gz --angle 90 --out lateral.png --raw lateral.f32");
   auto& a = arguments_of(command, action, drr_command);
-  command->add_option("VOLUME", a.volume, "MetaImage, NRRD, NIfTI-1, or a folder of DICOM CT slices")
+  command->add_option("VOLUME", a.volume, "MetaImage, NRRD, NIfTI, or a folder of DICOM CT slices")
       ->required();
   command->add_option("--out", a.out, "PNG, 16 bits: black = no attenuation, white = maximum");
   command->add_option("--raw", a.raw, "The line integrals as 32-bit floats, little endian, row by row");

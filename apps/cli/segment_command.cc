@@ -117,7 +117,7 @@ void add_segment(CLI::App& app, Action& action) {
       "  helicarm segment ct.nrrd --labels totalsegmentator.nii.gz --label femur=75 --out my-bones\n"
       "Exit code 3: a seed is on no bone, or two are on one. See docs/registration.md.");
   auto& a = arguments_of(command, action, segment_command);
-  command->add_option("CT", a.ct, "MetaImage, NRRD, NIfTI-1, TIFF stack, or a folder of DICOM CT slices")
+  command->add_option("CT", a.ct, "MetaImage, NRRD, NIfTI, TIFF stack, or a folder of DICOM CT slices")
       ->required();
   command->add_option("--seed", a.seeds, "NAME=x,y,z of a bone; once for each")->allow_extra_args(false);
   command->add_option("--space", a.space, "Space of the seeds: LPS, RAS (3D Slicer shows this) or LAS")

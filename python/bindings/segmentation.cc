@@ -66,7 +66,7 @@ void add_segmentation(py::module_& module) {
       py::arg("progress") = py::none(),
       R"(Masks and surfaces of the bones of a CT, by one point on each, as `helicarm segment` makes them.
 
-ct: MetaImage, NRRD, NIfTI-1, TIFF stack (with voxel_mm and tiff_offset_hu), or a folder of DICOM slices. seeds: {name: (x, y,
+ct: MetaImage, NRRD, NIfTI, TIFF stack (with voxel_mm and tiff_offset_hu), or a folder of DICOM slices. seeds: {name: (x, y,
 z)} in the volume's patient frame, mm; space: of the seeds, "LPS", "RAS" or "LAS". threshold_hu: bone is what has at least this
 value; None: 200, more in a noisy CT. gap_mm: gaps of the cortex up to twice this width do not open the marrow cavity. neck:
 parts are one bone where the neck between them has at least this share of the smaller part's radius. label_map, labels:

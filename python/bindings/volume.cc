@@ -128,7 +128,7 @@ unsupported (another frame). as_volume takes objects of other packages, read_vol
             value_or_raise(without_gil([&] { return volume::read_volume(path); })));
       },
       py::arg("path"),
-      R"(Reads MetaImage, NRRD, NIfTI-1, or a folder of DICOM CT slices. Releases the GIL. Returns a Volume.
+      R"(Reads MetaImage, NRRD, NIfTI, or a folder of DICOM CT slices. Releases the GIL. Returns a Volume.
 
 Raises InputError: missing_file, not_an_image, truncated, bad_size, bad_value, unsupported, not_finite.)");
   module.def("_volume_of_slices", [](const std::vector<std::string>& files, const std::string& origin) {

@@ -122,12 +122,11 @@ def _volume_of_nifti(image, data):
     factors = {"mm": 1.0, "meter": 1000.0, "micron": 1e-3, "unknown": 1.0}
     if unit not in factors:
         _refuse(f'nibabel image: the unit of length is "{unit}"')
-    if int(header["sizeof_hdr"]) != 348:  # NIfTI-2
-        return _c.Volume(data, _scaled(image.affine, factors[unit]), frame="RAS")
     header.set_data_dtype(np.float32)
     header.set_data_shape(data.shape)
     header.set_slope_inter(1, 0)
-    header["vox_offset"], header["magic"] = 352, b"n+1"
+    size = int(header["sizeof_hdr"])
+    header["vox_offset"], header["magic"] = size + 4, b"n+1" if size == 348 else b"n+2"  # one file, also of a pair
     voxels = np.asarray(data, header.endianness + "f4")
     volume = _c._volume_of_nifti(header.binaryblock + bytes(4) + voxels.tobytes("F"), "nibabel image")
     own = _scaled(image.affine, factors[unit])

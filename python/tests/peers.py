@@ -58,7 +58,7 @@ def apart(shape, one, other):
 
 
 def nibabel_writes(folder, count=COUNT):
-    """(files, largest distance in mm, largest difference of a voxel): NIfTI-1 files and images in memory."""
+    """(files, largest distance in mm, largest difference of a voxel): NIfTI files, pairs and images in memory."""
     nibabel = importlib.import_module("nibabel")
     random, far, off = np.random.default_rng(1), 0.0, 0.0
     types = ["u1", "i1", "i2", "u2", "i4", "f4", "f8", "i8"]
@@ -67,27 +67,31 @@ def nibabel_writes(folder, count=COUNT):
         form = ("sform", "qform", "both", "sheared")[n // 4 % 4]
         shape = tuple(random.integers(2, 9, 3))
         place = random_affine(random, 0.2 if form == "sheared" else 0)
-        header = nibabel.Nifti1Header(endianness="<>"[n % 2])
+        kind = (nibabel.Nifti1Image, nibabel.Nifti2Image, nibabel.Nifti1Pair, nibabel.Nifti2Pair)[n // 16 % 4]
+        pair, second = kind in (nibabel.Nifti1Pair, nibabel.Nifti2Pair), kind in (nibabel.Nifti2Image, nibabel.Nifti2Pair)
+        header = kind.header_class(endianness="<>"[n % 2])
         data = random_voxels(random, shape, types[n % len(types)])
         header.set_data_dtype(data.dtype)
         header.set_xyzt_units(unit)
         stated = np.diag([1 / mm, 1 / mm, 1 / mm, 1]) @ place
-        image = nibabel.Nifti1Image(data, stated, header)
+        image = kind(data, stated, header)
         if form in ("qform", "both"):
             image.set_qform(stated, 1)
         image.set_sform(None if form == "qform" else stated, {"qform": 0, "both": 1}.get(form, 1 + n % 4))
-        path = folder / f"v{n}.nii{'.gz' if n % 2 else ''}"
+        path = folder / f"v{n}.{'hdr' if pair else 'nii'}{'.gz' if n % 2 else ''}"
         nibabel.save(image, path)
         if n % 3 == 0:  # which nibabel chooses itself
             content = bytearray(nibabel.openers.Opener(path).read())
-            content[112:120] = np.array([random.uniform(0.5, 1.5), random.integers(-100, 100)], "<>"[n % 2] + "f4").tobytes()
+            scale = np.array([random.uniform(0.5, 1.5), random.integers(-100, 100)], "<>"[n % 2] + ("f8" if second else "f4"))
+            content[176 if second else 112:192 if second else 120] = scale.tobytes()
             with nibabel.openers.Opener(path, "wb") as file:
                 file.write(content)
         peer = nibabel.load(path)
         assert apart(shape, peer.affine, stated) * mm < 0.1 and (int(peer.header["sform_code"]) == 0) == (form == "qform")
         expected = TO_LPS @ np.diag([mm, mm, mm, 1]) @ peer.affine
         values = np.asarray(peer.get_fdata(), np.float32)
-        for volume in (helicarm.read_volume(path), helicarm.as_volume(peer)):
+        files = [path, pathlib.Path(str(path).replace(".hdr", ".img"))] if pair else [path]
+        for volume in (*map(helicarm.read_volume, files), helicarm.as_volume(peer)):
             far = max(far, apart(shape, volume.affine, expected))
             off = max(off, np.abs(volume.array - values).max() / max(1, np.abs(values).max()))
     return count, far, off
@@ -394,7 +398,7 @@ def is_there(package):
 
 # function, package, format, direction, limits of what it returns beside the count, their units
 JUDGES = [
-    (nibabel_writes, "nibabel", "NIfTI-1 `.nii`, `.nii.gz`, and images in memory", "read", (0.05, 1e-6), ("mm", "of the largest voxel")),
+    (nibabel_writes, "nibabel", "NIfTI-1 and NIfTI-2: `.nii`, pairs of `.hdr` and `.img`, each plain or `.gz`, and images in memory", "read", (0.05, 1e-6), ("mm", "of the largest voxel")),
     (pydicom_writes_series, "pydicom", "DICOM CT series, and datasets in memory", "read", (0.005, 0), ("mm", "HU")),
     (pydicom_reads_images, "pydicom", "DICOM X-ray image", "written", (0, 1e-6), ("grey values", "mm")),
     (vtk_writes, "vtk", "STL, PLY, VTP, and `vtkPolyData` in memory", "read", (1e-3,), ("mm",)),

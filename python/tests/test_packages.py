@@ -103,6 +103,23 @@ def test_nifti_whose_forms_differ_is_refused_or_warned_of(nibabel):
     assert [warning["code"] for warning in volume.warnings] == ["irregular_file"] and np.allclose(volume.affine, TO_LPS @ image.affine)
 
 
+@pytest.mark.parametrize("kind", ["Nifti1Pair", "Nifti2Image", "Nifti2Pair"])
+def test_nifti_of_either_version_is_checked_alike(nibabel, kind, tmp_path):
+    place = np.array([[0, -1, 0, 4], [1, 0, 0, 5], [0, 0, 2, 6], [0, 0, 0, 1.0]])
+    image = getattr(nibabel, kind)(np.arange(60, dtype=np.int16).reshape(3, 4, 5), place)
+    volume = helicarm.as_volume(image)
+    assert np.allclose(volume.affine, TO_LPS @ place) and np.array_equal(volume.array, image.get_fdata())
+    nibabel.save(image, tmp_path / ("a.img.gz" if kind.endswith("Pair") else "a.nii.gz"))
+    for path in tmp_path.iterdir():
+        assert np.array_equal(helicarm.read_volume(path).array, volume.array)
+    image.set_qform(np.diag([-1, -1, 2, 1.0]), 1)
+    image.set_sform(place, 2)
+    refused("bad_value", "sform.*and qform.*differently", helicarm.as_volume, image)
+    image.set_sform(None, 0)
+    image.set_qform(None, 0)
+    refused("bad_value", "neither sform nor qform", helicarm.as_volume, image)
+
+
 def test_a_sheared_sform_is_kept_and_a_collapsed_one_refused(nibabel):
     sheared = np.array([[1, 0.3, 0, 4], [0, 2, 0.5, 5], [0, 0, 3, 6], [0, 0, 0, 1]])
     image = nibabel.Nifti1Image(np.zeros((3, 4, 5), np.int16), sheared)
@@ -114,7 +131,6 @@ def test_a_sheared_sform_is_kept_and_a_collapsed_one_refused(nibabel):
 def test_other_images_of_nibabel_need_an_orientation(nibabel):
     refused("bad_value", "declares no orientation", helicarm.as_volume, nibabel.AnalyzeImage(np.zeros((3, 4, 5), np.int16), np.eye(4)))
     place = np.array([[0, -1, 0, 4], [1, 0, 0, 5], [0, 0, 2, 6], [0, 0, 0, 1.0]])
-    assert np.allclose(helicarm.as_volume(nibabel.Nifti2Image(np.zeros((3, 4, 5), np.int16), place)).affine, TO_LPS @ place)
     assert np.allclose(helicarm.as_volume(nibabel.MGHImage(np.zeros((3, 4, 5), np.int16), place)).affine, TO_LPS @ place)
     refused("unsupported", "sequence of volumes", helicarm.as_volume, nibabel.Nifti1Image(np.zeros((3, 4, 5, 2), np.int16), place))
 

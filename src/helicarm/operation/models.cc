@@ -13,6 +13,7 @@
 #include "helicarm/core/private_files.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/operation/tool_line.h"
+#include "helicarm/volume/read_volume.h"
 #include "helicarm/xray/digest.h"
 
 namespace helicarm::operation {
@@ -31,11 +32,11 @@ pipeline::Case with_models_of(const OperationPlan& plan, const pipeline::Case& g
   return made;
 }
 
-/// The file of voxels that a header names beside itself (MetaImage, NRRD, NIfTI); nothing: in the file
-/// itself.
+/// The file of voxels that a header names beside itself (MetaImage, NRRD), or the other file of a NIfTI pair;
+/// nothing: in the file itself.
 std::optional<fs::path> data_beside(const fs::path& header) {
   const std::string kind = header.extension().string();
-  if (kind == ".hdr") return fs::path(header).replace_extension(".img");
+  if (const auto other = value_or_throw(volume::other_of_pair(header))) return other;
   if (kind != ".mhd" && kind != ".nhdr") return std::nullopt;
   static const std::regex names(R"((?:^|\n)\s*(?:ElementDataFile\s*=|data ?file:)\s*([^\r\n]*[^\s]))");
   const std::string text = value_or_throw(read_file(header, std::uintmax_t{1} << 24));

@@ -12,7 +12,7 @@ namespace helicarm::volume {
 /// `read_volume` of their folder; `origin` begins the messages.
 Expected<Volume> volume_of_slices(const std::vector<std::string>& files, const std::string& origin);
 
-/// The volume of a NIfTI-1 file in memory. Fails as `read_volume`.
+/// The volume of a NIfTI file in memory, voxels included. Fails as `read_volume`.
 Expected<Volume> volume_of_nifti(const std::string& bytes, const std::string& origin);
 
 /// What every reader's volume is checked for: `check_grid`, and not_finite for a voxel.

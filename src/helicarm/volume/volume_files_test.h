@@ -105,6 +105,34 @@ struct Nifti {
   }
 };
 
+/// NIfTI-2 header for 2 x 1 x 2 voxels of int16, followed by the voxels. Offsets are those of nifti2.h.
+struct Nifti2 {
+  std::string bytes = std::string(544, '\0');
+  bool big = false;
+
+  explicit Nifti2(bool big_endian = false) : big(big_endian) {
+    set<std::int32_t>(0, 540);
+    bytes.replace(4, 8, std::string("n+2\0\r\n\x1a\n", 8));
+    set<std::int16_t>(12, 4).set<std::int16_t>(14, 16);
+    const std::int64_t dims[] = {3, 2, 1, 2, 1, 1, 1, 1};
+    for (std::size_t i = 0; i < 8; ++i) set<std::int64_t>(16 + 8 * i, dims[i]);
+    set<std::int64_t>(168, 544).set<std::int32_t>(348, 1);
+    const double pixdim[] = {1, 1, 2, 3}, rows[] = {1, 0, 0, 10, 0, 2, 0, 20, 0, 0, 3, 30};
+    for (std::size_t i = 0; i < 4; ++i) set(104 + 8 * i, pixdim[i]);
+    for (std::size_t i = 0; i < 12; ++i) set(400 + 8 * i, rows[i]);
+    bytes += stored<std::int16_t>({1, 2, -3, 4}, big);
+  }
+  template <class T>
+  Nifti2& set(std::size_t at, T value) {
+    bytes.replace(at, sizeof value, stored({value}, big));
+    return *this;
+  }
+  /// The header of a pair, alone.
+  std::string header() const {
+    return Nifti2(*this).set<std::int64_t>(168, 0).bytes.replace(4, 2, "ni").substr(0, 544);
+  }
+};
+
 inline const std::string four = stored<std::int16_t>({1, 2, -3, 4});
 
 }  // namespace helicarm::volume

@@ -61,6 +61,8 @@ constexpr std::array signatures = {
     Signature{0, "NDims"sv, "a MetaImage header", as_model},
     Signature{344, "n+1\0"sv, "a NIfTI volume", as_model},
     Signature{344, "ni1\0"sv, "a NIfTI header", as_model},
+    Signature{4, "n+2\0"sv, "a NIfTI volume", as_model},
+    Signature{4, "ni2\0"sv, "a NIfTI header", as_model},
     Signature{0, "version https://git-lfs"sv, "a Git LFS pointer, not the file itself", "run git lfs pull"},
 };
 

@@ -20,6 +20,7 @@ TEST(ForeignFile, IsNamedByItsFirstBytes) {
                                      "HEIC"},
                                     {"\x1F\x8B\x08\0"s, "gzip"},
                                     {"NRRD0005\n"s, "NRRD"},
+                                    {"\x1C\2\0\0n+2\0\r\n\x1A\n"s, "NIfTI"},
                                     {"%PDF-1.4"s, "PDF"},
                                     {"PK\3\4"s, "ZIP"},
                                     {"{\"a\": 1}"s, "JSON"},
