@@ -36,6 +36,14 @@ std::string vtp(const std::string& field) {
          "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n";
 }
 
+std::string legacy_vtk(const std::string& coding, const std::string& points, const std::string& cells,
+                       const std::string& version = "3.0") {
+  return "# vtk DataFile Version " + version + "\nSPACE=RAS\n" + coding +
+         "\nDATASET POLYDATA\nFIELD FieldData 1\na 1 1 int\n" +
+         (coding == "ASCII" ? "1" : std::string("\0\0\0\1", 4)) + "\nPOINTS 4 float\n" + points + "\n" +
+         cells;
+}
+
 }  // namespace
 
 void run(std::string_view bytes) {
@@ -59,10 +67,27 @@ std::vector<std::string> seeds() {
       "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 4\n"
       "property list uchar int vertex_indices\nend_header\n0 0 0\n10 0 0\n0 10 0\n0 0 20\n"
       "3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
-  return {phantom::to_stl(tetrahedron()), text_stl(),
-          "ply\nformat ascii 1.0\ncomment SPACE=LAS\nobj_info units: cm\n" + ply, vtp(""),
+  return {phantom::to_stl(tetrahedron()),
+          text_stl(),
+          "ply\nformat ascii 1.0\ncomment SPACE=LAS\nobj_info units: cm\n" + ply,
+          vtp(""),
           vtp("<FieldData>\n<Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">\n"
-              "82 65 83 0\n</Array>\n</FieldData>\n")};
+              "82 65 83 0\n</Array>\n</FieldData>\n"),
+          "# SPACE=RAS\ng a\nv 0 0 0\nv 10 0 0\nv 0 10 0\nv 0 0 20\nf 1 3 2\nf 1//1 2//1 4//1\nf -4 -1 -2\nf "
+          "2/1 3/1 4/1\n",
+          legacy_vtk("ASCII", "0 0 0 10 0 0 0 10 0 0 0 20",
+                     "POLYGONS 4 16\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"),
+          legacy_vtk("BINARY",
+                     std::string("\0\0\0\0\0\0\0\0\0\0\0\0\x41\x20\0\0\0\0\0\0\0\0\0\0"
+                                 "\0\0\0\0\x41\x20\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x41\xA0\0\0",
+                                 48),
+                     "TRIANGLE_STRIPS 1 7\n" + std::string("\0\0\0\6\0\0\0\0\0\0\0\2\0\0\0\1\0\0\0\3\0\0\0\0"
+                                                           "\0\0\0\2",
+                                                           28)),
+          legacy_vtk("ASCII", "0 0 0 10 0 0 0 10 0 0 0 20",
+                     "POLYGONS 5 12\nOFFSETS vtktypeint64\n0 3 6 9 12\nCONNECTIVITY vtktypeint64\n"
+                     "0 2 1 0 1 3 0 3 2 1 2 3\n",
+                     "5.1")};
 }
 
 }  // namespace helicarm::fuzz

@@ -96,7 +96,7 @@ unit). as_surface takes objects of other packages, read_surface files.)")
             value_or_raise(without_gil([&] { return registration::read_surface(path); })));
       },
       py::arg("path"),
-      R"(Reads STL, PLY or VTP; a frame and unit that the file states are converted. Returns a Surface.
+      R"(Reads STL, PLY, OBJ, VTP or legacy VTK; a frame and unit that the file states are converted. Returns a Surface.
 
 Raises InputError: missing_file, truncated, bad_size, bad_value, not_finite, unsupported.)");
 }

@@ -202,12 +202,16 @@ def vtk_meshes(random, n):
 
 
 def corners_of(surface):
-    """The triangles' corners (F, 3, 3), each turned to its least corner, sorted: the order of a file does not count."""
-    corners = np.asarray(surface[0], float)[np.asarray(surface[1], int)]
-    first = np.lexsort(np.moveaxis(np.round(corners, 2), -1, 0)[::-1], axis=-1)[:, 0]
-    corners = np.array([np.roll(triangle, -at, axis=0) for triangle, at in zip(corners, first)])
-    order = np.lexsort(np.round(corners, 2).reshape(len(corners), 9).T[::-1])
-    return corners[order]
+    """The triangles' corners (F, 3, 3)."""
+    return np.asarray(surface[0], float)[np.asarray(surface[1], int)]
+
+
+def triangles_apart(one, other):
+    """Largest difference of a corner's coordinate between each triangle and the nearest of the other ones, both ways; the
+    order of triangles and the first corner of each do not count, their sense does."""
+    turned = np.stack([np.roll(other, -first, axis=1) for first in range(3)], axis=1)  # (G, 3, 3, 3)
+    far = np.array([np.abs(turned - triangle).max(axis=(2, 3)).min(axis=1) for triangle in one])  # (F, G)
+    return max(far.min(axis=1).max(), far.min(axis=0).max())
 
 
 def numbers_of_vtk(mesh):
@@ -217,12 +221,14 @@ def numbers_of_vtk(mesh):
 
 
 def vtk_writes(folder, count=COUNT):
-    """(files, largest distance of a corner in mm): STL, PLY and VTP, text and binary, and meshes in memory."""
+    """(files, largest distance of a corner in mm): STL, PLY, VTP, OBJ and legacy VTK, text and binary, with triangles or
+    strips, and meshes in memory."""
     random, far = np.random.default_rng(3), 0.0
     for n in range(count):
         vtk, mesh = vtk_meshes(random, n)
-        kind = ("stl", "ply", "vtp")[n // 3 % 3]
-        writer = {"stl": vtk.vtkSTLWriter, "ply": vtk.vtkPLYWriter, "vtp": vtk.vtkXMLPolyDataWriter}[kind]()
+        kind = ("stl", "ply", "vtp", "obj", "vtk")[n // 3 % 5]
+        writer = {"stl": vtk.vtkSTLWriter, "ply": vtk.vtkPLYWriter, "vtp": vtk.vtkXMLPolyDataWriter, "obj": vtk.vtkOBJWriter,
+                  "vtk": vtk.vtkPolyDataWriter}[kind]()
         path = folder / f"m{n}.{kind}"
         writer.SetFileName(str(path))
         writer.SetInputData(mesh)
@@ -234,7 +240,15 @@ def vtk_writes(folder, count=COUNT):
                 writer.SetCompressorTypeToNone()
             if n % 4 == 1:
                 writer.SetByteOrderToBigEndian()
-        elif n % 2:
+        elif kind == "vtk":
+            (writer.SetFileTypeToASCII, writer.SetFileTypeToBinary)[n % 2]()
+            writer.SetFileVersion((42, 51)[n // 2 % 2])
+            writer.SetHeader("3D Slicer output. SPACE=LPS")
+            if n % 3:
+                stripper = vtk.vtkStripper()
+                stripper.SetInputData(mesh)
+                writer.SetInputConnection(stripper.GetOutputPort())
+        elif n % 2 and kind != "obj":
             writer.SetFileTypeToASCII()
         writer.Write()
         expected = corners_of(numbers_of_vtk(mesh))
@@ -242,7 +256,7 @@ def vtk_writes(folder, count=COUNT):
         for surface in (helicarm.read_surface(path), helicarm.as_surface(mesh, frame="LPS")):
             found = corners_of((surface.vertices, surface.faces))
             assert found.shape == kept.shape, (path, found.shape, kept.shape)
-            far = max(far, np.abs(found - kept).max())
+            far = max(far, triangles_apart(found, kept))
     return count, far
 
 
@@ -401,7 +415,7 @@ JUDGES = [
     (nibabel_writes, "nibabel", "NIfTI-1 and NIfTI-2: `.nii`, pairs of `.hdr` and `.img`, each plain or `.gz`, and images in memory", "read", (0.05, 1e-6), ("mm", "of the largest voxel")),
     (pydicom_writes_series, "pydicom", "DICOM CT series, and datasets in memory", "read", (0.005, 0), ("mm", "HU")),
     (pydicom_reads_images, "pydicom", "DICOM X-ray image", "written", (0, 1e-6), ("grey values", "mm")),
-    (vtk_writes, "vtk", "STL, PLY, VTP, and `vtkPolyData` in memory", "read", (1e-3,), ("mm",)),
+    (vtk_writes, "vtk", "STL, PLY, VTP, OBJ, legacy VTK (4.2 and 5.1, strips), and `vtkPolyData` in memory", "read", (1e-3,), ("mm",)),
     (vtk_image, "vtk", "`vtkImageData` in memory", "read", (1e-9, 1e-12), ("mm", "of a voxel")),
     (scipy_rotations, "scipy", "ITK transform `.tfm`, Euler angles", "read", (1e-9,), ("mm",)),
     (opencv_writes, "cv2", "OpenCV YAML, XML, JSON", "read", (1e-8,), ("px",)),

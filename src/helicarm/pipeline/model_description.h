@@ -71,8 +71,9 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
   codec.file(
       "surface", model.surface, folder,
       "path of a closed surface (at most 1 % of its edges open; of a bone: from a mask that is not "
-      "grown), in mm: STL (binary or text), PLY, or VTP (VTK's XML PolyData: text, base64 or raw, plain "
-      "or zlib). RAS, LAS or another unit that a header, comment or field data state (`SPACE=RAS`, "
+      "grown), in mm: STL (binary or text), PLY, OBJ (its polygons), VTP (VTK's XML PolyData: text, base64 "
+      "or raw, plain or zlib), or VTK's legacy PolyData (`.vtk`, text or binary). RAS, LAS or another unit "
+      "that a header, comment or field data state (`SPACE=RAS`, "
       "`units: cm`) is converted to LPS and mm, an unknown one refused; no corner may lie over 1 m from "
       "the surface's middle");
   codec.file(

@@ -93,16 +93,17 @@ SurfaceFile text_stl(std::string_view bytes, const std::string& origin) {
 
 SurfaceFile binary_stl(std::string_view bytes, const std::string& origin) {
   if (bytes.size() < stl_header)
-    throw BadInput(Reason::truncated,
-                   fmt::format("{}: {} bytes, neither STL, PLY nor VTP", origin, bytes.size()));
+    throw BadInput(Reason::truncated, fmt::format("{}: {} bytes, neither STL, PLY, OBJ nor PolyData of VTK",
+                                                  origin, bytes.size()));
   const auto count = value_at<std::uint32_t>(bytes, stl_title);
   const std::size_t needed = stated_size(bytes);
   if (bytes.size() < needed)
     throw BadInput(
         Reason::truncated,
-        fmt::format("{}: is cut off, or no surface (STL, PLY, VTP): {} bytes, {} triangles of an STL "
-                    "file need {}",
-                    origin, bytes.size(), count, needed));
+        fmt::format(
+            "{}: is cut off, or no surface (STL, PLY, OBJ, VTP, VTK): {} bytes, {} triangles of an STL "
+            "file need {}",
+            origin, bytes.size(), count, needed));
   check_triangles(count, origin);
   SurfaceFile file;
   file.declares = bytes.substr(0, std::min(bytes.find('\0'), stl_title));

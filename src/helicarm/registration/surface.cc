@@ -28,9 +28,9 @@ constexpr double farthest_corner_mm = 1000, farthest_place_mm = 10000;
 std::string_view other_kind_of_surface(std::string_view bytes) {
   const std::string_view start = bytes.substr(0, 4000);
   const auto holds = [&](std::string_view word) { return start.find(word) != std::string_view::npos; };
-  if (start.starts_with("# vtk")) return "a legacy file of VTK: save the model as VTP, STL or PLY";
   if (start.starts_with("NRRD000") || holds("ElementDataFile") || holds("DimSize") ||
-      (start.size() >= 348 && (start.substr(344, 3) == "n+1" || start.substr(344, 3) == "ni1")))
+      (start.size() >= 348 && (start.substr(344, 3) == "n+1" || start.substr(344, 3) == "ni1")) ||
+      start.substr(std::min<std::size_t>(4, start.size())).starts_with("n+2"))
     return "a volume: give it as \"volume\" or \"mask\" of the model";
   if (start.size() > 132 && start.substr(128, 4) == "DICM")
     return "a DICOM file: export the segmentation as a closed surface (STL, PLY, VTP)";
@@ -41,8 +41,6 @@ std::string_view other_kind_of_surface(std::string_view bytes) {
   if (start.starts_with("ISO-10303")) return "a STEP file: save the model as STL, PLY or VTP";
   if (start.starts_with("\xff\xff\xfe")) return "a surface of FreeSurfer: save the model as STL, PLY or VTP";
   if (start.starts_with("<")) return "XML other than VTP (VTK's PolyData): save the model as STL, PLY or VTP";
-  if (start.starts_with("mtllib") || start.starts_with("v ") || holds("\nv "))
-    return "an OBJ file: save the model as STL, PLY or VTP";
   return {};
 }
 
@@ -53,6 +51,8 @@ SurfaceFile file_from(std::string_view bytes, const std::string& origin) {
   const std::string_view text = bytes.substr(marked ? 3 : 0);
   if (is_ply(text)) return ply_surface(text, origin);
   if (is_vtk_xml(text)) return vtp_surface(text, origin);
+  if (is_legacy_vtk(text)) return legacy_vtk_surface(text, origin);
+  if (is_obj(text)) return obj_surface(text, origin);
   if (const std::string_view kind = other_kind_of_surface(text); !kind.empty())
     throw BadInput(Reason::unsupported, fmt::format("{}: is {}", origin, kind));
   return binary_stl(bytes, origin);

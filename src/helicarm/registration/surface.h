@@ -20,11 +20,11 @@ struct SurfaceMesh : phantom::TriangleMesh {
   std::vector<Warning> warnings = {};
 };
 
-/// Reads STL (binary or text), PLY (text or binary) or VTK XML PolyData (`vtp_surface`), detected by content.
-/// A space (RAS, LAS, LPS) and a unit that header, comments or field data state are converted to L, P, S and
-/// mm. Corners at one place, up to rounding, are joined. Warns of surplus_data, irregular_file. Fails with
-/// missing_file, truncated, bad_size, bad_value (a corner over 1 m from the surface's middle), not_finite,
-/// unsupported.
+/// Reads STL (binary or text), PLY (text or binary), OBJ, VTK XML PolyData (`vtp_surface`) or VTK's legacy
+/// PolyData, detected by content. A space (RAS, LAS, LPS) and a unit that header, comments or field data
+/// state are converted to L, P, S and mm. Corners at one place, up to rounding, are joined. Warns of
+/// surplus_data, irregular_file. Fails with missing_file, truncated, bad_size, bad_value (a corner over 1 m
+/// from the surface's middle), not_finite, unsupported.
 Expected<SurfaceMesh> read_surface(const std::filesystem::path& path);
 Expected<SurfaceMesh> surface_from(std::string_view bytes, const std::string& origin);
 

@@ -28,6 +28,12 @@ SurfaceFile text_stl(std::string_view bytes, const std::string& origin);
 SurfaceFile binary_stl(std::string_view bytes, const std::string& origin);
 bool is_ply(std::string_view bytes);
 SurfaceFile ply_surface(std::string_view bytes, const std::string& origin);
+/// Wavefront OBJ: its polygons, in groups or not, as one surface.
+bool is_obj(std::string_view bytes);
+SurfaceFile obj_surface(std::string_view bytes, const std::string& origin);
+/// VTK's legacy PolyData, text or binary: polygons and triangle strips.
+bool is_legacy_vtk(std::string_view bytes);
+SurfaceFile legacy_vtk_surface(std::string_view bytes, const std::string& origin);
 
 /// Whether a binary STL's length is that of the triangles its header states.
 bool is_sized_stl(std::string_view bytes);

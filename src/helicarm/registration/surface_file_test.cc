@@ -181,8 +181,9 @@ TEST(Welded, CornersEqualUpToRounding) {
 }
 
 TEST(OtherSurfaces, AreNamedWithTheWayOut) {
-  EXPECT_THAT(refusal_of("# Blender\nv 0 0 0\nv 1 0 0\nf 1 2 3\n").message, HasSubstr("OBJ"));
-  EXPECT_THAT(refusal_of("# vtk DataFile Version 3.0\n").message, HasSubstr("VTP"));
+  EXPECT_THAT(refusal_of("OFF\n4 4 6\n").message, HasSubstr("VTP"));
+  EXPECT_THAT(refusal_of(std::string("\x1c\2\0\0n+2\0", 8) + std::string(600, ' ')).message,
+              HasSubstr("\"volume\""));
   EXPECT_THAT(refusal_of("NRRD0004\ntype: short\n").message, HasSubstr("\"volume\""));
   EXPECT_THAT(refusal_of("<?xml version=\"1.0\"?><GIFTI></GIFTI>").message, HasSubstr("VTP"));
 }
