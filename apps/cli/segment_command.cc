@@ -59,14 +59,19 @@ std::string segment_text(const Json& json) {
     text += fmt::format("  bone from {:g} HU on\n", json["threshold_hu"].get<double>());
   for (const Json& bone : json["bones"]) {
     const auto centre = bone["centre_mm"].get<std::vector<double>>();
-    text += fmt::format("  {}: {:.1f} cm3, {} voxels, surface {:.1f} cm2, centre {:.1f} {:.1f} {:.1f} mm{}\n",
-                        bone["name"].get<std::string>(), bone["volume_cm3"].get<double>(),
-                        bone["voxels"].get<std::size_t>(), bone["surface_cm2"].get<double>(), centre[0],
-                        centre[1], centre[2],
-                        bone["cut_off"].empty()
-                            ? ""
-                            : fmt::format(", reaches the volume's end: {}",
-                                          fmt::join(bone["cut_off"].get<std::vector<std::string>>(), ", ")));
+    const double left_out_cm3 = bone.value("left_out_cm3", 0.0);
+    text += fmt::format(
+        "  {}: {:.1f} cm3, {} voxels, surface {:.1f} cm2, centre {:.1f} {:.1f} {:.1f} mm{}{}\n",
+        bone["name"].get<std::string>(), bone["volume_cm3"].get<double>(), bone["voxels"].get<std::size_t>(),
+        bone["surface_cm2"].get<double>(), centre[0], centre[1], centre[2],
+        bone["cut_off"].empty()
+            ? ""
+            : fmt::format(", reaches the volume's end: {}",
+                          fmt::join(bone["cut_off"].get<std::vector<std::string>>(), ", ")),
+        left_out_cm3 == 0 ? ""
+                          : fmt::format("; {:.1f} cm3 of bone without a seed hang together with it and "
+                                        "are left out ({:.0f} %)",
+                                        left_out_cm3, bone["left_out_percent"].get<double>()));
   }
   return text;
 }

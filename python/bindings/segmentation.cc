@@ -69,11 +69,11 @@ void add_segmentation(py::module_& module) {
 ct: MetaImage, NRRD, NIfTI, TIFF stack (with voxel_mm and tiff_offset_hu), or a folder of DICOM slices. seeds: {name: (x, y,
 z)} in the volume's patient frame, mm; space: of the seeds, "LPS", "RAS" or "LAS". threshold_hu: bone is what has at least this
 value; None: 200, more in a noisy CT. gap_mm: gaps of the cortex up to twice this width do not open the marrow cavity. neck:
-parts are one bone where the neck between them has at least this share of the smaller part's radius. label_map, labels:
+parts are one bone where the neck between them has at least this share of the smaller part's radius within four times its own. label_map, labels:
 instead of seeds, a label map on the CT's grid and {name: [label, ...]}. out: folder for the masks (NRRD), surfaces (STL),
 segment.png and segment.json, or None. progress: called with the name of each step.
 
-Returns segment.json (threshold_hu, bones with volume_cm3, surface_cm2, centre_mm, box_mm, cut_off, contacts; warnings, notes)
+Returns segment.json (threshold_hu, bones with volume_cm3, surface_cm2, centre_mm, box_mm, cut_off, contacts, left_out_cm3, left_out_percent; warnings, notes)
 and labels: (z, y, x) bytes with each bone's label, 0 elsewhere.
 
 Raises InputError, and RefusedError for a seed on no bone and for two seeds on one.)");

@@ -9,10 +9,11 @@ namespace helicarm::segmentation {
 inline constexpr std::uint8_t empty = 0, dense = 1, cavity = 2;
 
 /// Marks as `cavity` what dense voxels enclose, such as marrow. Gaps of the wall up to twice `gap_mm` wide
-/// count as closed for a cavity that is wider than that. `outside`: voxels that are known to be outside; a
-/// cavity is what they do not reach. Without any, a cavity on the grid's faces, where a bone may be cut off,
-/// is what the face's own edges do not reach.
-void fill_cavities(volume::ByteGrid& bone, const ChamferSteps& steps, double gap_mm,
+/// count as closed for a cavity that is wider than that, and for pores behind them. `outside`: voxels that
+/// are known to be outside; a cavity is what they do not reach, but those that a ring of dense voxels
+/// encloses on a face of the grid are marrow of a bone that is cut off there. Without any, a cavity on the
+/// faces is what their own edges do not reach.
+void fill_cavities(volume::ByteGrid& bone, const Eigen::Matrix3d& mm_from_voxel, double gap_mm,
                    const std::vector<std::uint32_t>& outside, const pipeline::Progress& progress);
 
 }  // namespace helicarm::segmentation

@@ -20,7 +20,7 @@ volume::ByteGrid box(const Open& open) {
 }
 
 std::size_t filled(volume::ByteGrid grid, double gap_mm, const std::vector<std::uint32_t>& outside = {}) {
-  fill_cavities(grid, ChamferSteps(Eigen::Matrix3d::Identity()), gap_mm, outside, {});
+  fill_cavities(grid, Eigen::Matrix3d::Identity(), gap_mm, outside, {});
   std::size_t count = 0;
   for (const std::uint8_t value : grid.values) count += value == cavity;
   return count;
@@ -49,6 +49,39 @@ TEST(FillCavities, ReachTheFaceThatCutsThemOff) {
     if (std::max(std::abs(at.x() - 7), std::abs(at.y() - 7)) == 4) tube.values[tube.index(at)] = dense;
   });
   EXPECT_EQ(filled(tube, 1), 490U);
+}
+
+TEST(FillCavities, AirInTheMarrowAtTheFaceIsNotOutside) {
+  volume::ByteGrid tube = volume::byte_grid({15, 15, 10});
+  tube.each([&](const Vector3i& at) {
+    if (std::max(std::abs(at.x() - 7), std::abs(at.y() - 7)) == 4) tube.values[tube.index(at)] = dense;
+  });
+  const auto in_the_marrow = static_cast<std::uint32_t>(tube.index({7, 7, 9}));
+  EXPECT_EQ(filled(tube, 1, {0, in_the_marrow}), 490U);
+  EXPECT_EQ(filled(tube, 0, {0, in_the_marrow}), 490U);
+}
+
+TEST(FillCavities, PoresOfCancellousBoneBehindAHole) {
+  volume::ByteGrid spongy = box([](const Vector3i& at) { return at == Vector3i(5, 10, 10); });
+  spongy.each([&](const Vector3i& at) {
+    const bool inside = (at - Vector3i::Constant(10)).cwiseAbs().maxCoeff() < 5;
+    // Bars along all three axes, one voxel apart.
+    if (inside && (at.x() % 2 == 0) + (at.y() % 2 == 0) + (at.z() % 2 == 0) <= 1)
+      spongy.values[spongy.index(at)] = dense;
+  });
+  EXPECT_LT(filled(spongy, 0), 1U);
+  EXPECT_GT(filled(spongy, 1), 300U);
+}
+
+TEST(FillCavities, NotTheSpaceOfAJoint) {
+  volume::ByteGrid joint = volume::byte_grid({31, 31, 21});
+  joint.each([&](const Vector3i& at) {
+    const bool beside = std::max(std::abs(at.x() - 15), std::abs(at.y() - 15)) <= 10;
+    if (beside && std::abs(at.z() - 10) > 1 && std::abs(at.z() - 10) < 6)
+      joint.values[joint.index(at)] = dense;
+  });
+  EXPECT_EQ(filled(joint, 1), 0U);  // 3 mm
+  EXPECT_EQ(filled(joint, 2), 0U);
 }
 
 TEST(FillCavities, AnOpenSideAtAFaceIsClosedWhereTheOutsideIsKnown) {

@@ -29,7 +29,7 @@ constexpr double most_bone = 0.5;
 constexpr double fragment_mm = 1.5;
 constexpr std::size_t least_voxels = 50;  // of a bone; noise makes some in cancellous bone near the threshold
 // A contact is worth a look from here up to where it joins, and a bone's own neck from there so far on.
-constexpr double doubtful_contact = 0.35, doubtful_join = 0.1;
+constexpr double doubtful_contact = 0.45, doubtful_join = 0.1;
 
 /// The part of the volume that holds bone, with a margin.
 struct Work {
@@ -151,32 +151,6 @@ bool on_bone(const Work& work, const Vector3i& voxel) {
   return work.bone.has(at) && work.bone.values[work.bone.index(at)] != empty;
 }
 
-/// Refuses a seed that is on no bone.
-void check_on_bone(const volume::Volume& ct, const Work& work, const Seed& seed, double threshold) {
-  const Vector3i voxel = voxel_at(ct, seed.point);
-  if (on_bone(work, voxel)) return;
-  double least = std::numeric_limits<double>::infinity();
-  Vector3d nearest = Vector3d::Zero();
-  std::size_t i = 0;
-  work.bone.each([&](const Vector3i& at) {
-    if (work.bone.values[i++] == empty) return;
-    const Vector3d point = ct.patient_from_voxel * (at + work.first).cast<double>();
-    if (const double away = (point - seed.point).squaredNorm(); away < least) least = away, nearest = point;
-  });
-  least = std::sqrt(least);
-  const Vector3d as_ras = seed.point.cwiseProduct(Vector3d(-1, -1, 1));
-  const bool is_ras = holds(ct, as_ras) && on_bone(work, voxel_at(ct, as_ras));
-  const double hu = double(ct.voxels[index_in(ct, voxel)]);
-  throw BadInput(
-      {Reason::seed_off_bone,
-       fmt::format("{}: the seed {} has {:.0f} HU, bone begins at {:g}; the nearest bone is {:.1f} "
-                   "mm away at {}: click on the bone, or lower the threshold{}",
-                   seed.name, text_of(seed.point), hu, threshold, least, text_of(nearest),
-                   is_ras ? "; as R, A, S the seed lies on bone" : ""),
-       {},
-       {{"hu", hu}, {"threshold_hu", threshold}, {"nearest_mm", least}}});
-}
-
 /// The regions of the seeds, which must differ.
 std::vector<std::uint32_t> regions_of(const volume::Volume& ct, const Work& work, std::span<const Seed> seeds,
                                       Watershed& regions) {
@@ -206,16 +180,17 @@ struct Join {
 };
 
 /// Joins the regions that are one bone; the regions of seeds never. Of each region the narrowest join.
-std::vector<Join> join_regions(Watershed& regions, const std::vector<std::uint32_t>& of_seeds,
-                               double neck_width, std::uint16_t small) {
+std::vector<Join> join_regions(Watershed& regions, const DepthMap& depth,
+                               const std::vector<std::uint32_t>& of_seeds, double neck_width,
+                               std::uint16_t small) {
   std::vector<char> seeded(regions.joined.size(), 0);
   for (const std::uint32_t region : of_seeds) seeded[region] = 1;
   std::vector<Join> narrowest(regions.joined.size());
   for (const Neck& neck : regions.necks) {
     const std::uint32_t a = regions.root(neck.a), b = regions.root(neck.b);
     if (a == b || (seeded[a] && seeded[b])) continue;
-    const double width = regions.width(neck);
     const bool is_fragment = std::min(regions.depths[a], regions.depths[b]) <= small;
+    const double width = is_fragment ? 1 : regions.local_width(neck, depth);
     if (width < neck_width && !is_fragment) continue;
     Join join = narrowest[a].width < narrowest[b].width ? narrowest[a] : narrowest[b];
     if (!is_fragment && width < join.width) join = {width, neck};
@@ -227,35 +202,205 @@ std::vector<Join> join_regions(Watershed& regions, const std::vector<std::uint32
   return narrowest;
 }
 
+/// What the watershed made of a volume's bone.
+struct Parts {
+  Work work;
+  double threshold = 0, unit_mm = 0;
+  std::vector<std::uint16_t> distances;
+  Vector3d spacing;     ///< in the unit of the distances
+  std::uint16_t small;  ///< a fragment's depth
+  Watershed regions;
+
+  DepthMap depth() const { return {distances, work.bone.size, spacing}; }
+};
+
+Parts parts_of(const volume::Volume& ct, const SegmentOptions& options, const pipeline::Progress& progress) {
+  Parts made;
+  progress.begin("threshold");
+  made.threshold = options.threshold_hu.value_or(usual_threshold(ct));
+  made.work = thresholded(ct, made.threshold, options.gap_mm, progress);
+  progress.begin("fill");
+  const Eigen::Matrix3d mm_from_voxel = ct.patient_from_voxel.linear();
+  fill_cavities(made.work.bone, mm_from_voxel, options.gap_mm, outside_of(ct, made.work), progress);
+  progress.begin("distance");
+  const ChamferSteps steps(mm_from_voxel);
+  made.unit_mm = steps.unit_mm;
+  made.spacing = mm_from_voxel.colwise().norm() / steps.unit_mm;
+  made.distances =
+      distances_to(made.work.bone, steps, progress, [](std::uint8_t value) { return value == empty; });
+  progress.begin("watershed");
+  const double small_mm = std::max(fragment_mm, 1.5 * mm_from_voxel.colwise().norm().maxCoeff());
+  made.small = static_cast<std::uint16_t>(std::min(double(farthest), small_mm / steps.unit_mm));
+  made.regions = watershed_of(made.distances, made.work.bone.size, made.small, progress);
+  return made;
+}
+
+/// Voxels of each region with those that were joined to it.
+std::vector<std::size_t> sizes_of(Watershed& regions) {
+  std::vector<std::size_t> own(regions.joined.size(), 0), sizes(regions.joined.size(), 0);
+  for (const std::uint32_t label : regions.labels)
+    if (label != 0) ++own[label - 1];
+  for (std::size_t i = 0; i < own.size(); ++i) sizes[regions.root(static_cast<std::uint32_t>(i))] += own[i];
+  return sizes;
+}
+
+/// The voxel nearest to a point of a bone that is no speck; as text and, in mm, in `figures`.
+std::string nearest_bone(const volume::Volume& ct, Parts& parts, const Vector3d& point,
+                         std::map<std::string, double>& figures) {
+  const std::vector<std::size_t> sizes = sizes_of(parts.regions);
+  double least = std::numeric_limits<double>::infinity();
+  Vector3d nearest = Vector3d::Zero();
+  std::size_t i = 0;
+  parts.work.bone.each([&](const Vector3i& at) {
+    const std::size_t k = i++;
+    if (parts.regions.labels[k] == 0) return;
+    const Vector3d here = ct.patient_from_voxel * (at + parts.work.first).cast<double>();
+    const double away = (here - point).squaredNorm();
+    if (away < least && sizes[parts.regions.region_at(k)] >= least_voxels) least = away, nearest = here;
+  });
+  if (!std::isfinite(least)) return fmt::format("no bone has {} voxels or more", least_voxels);
+  figures["nearest_mm"] = std::sqrt(least);
+  return fmt::format("the nearest bone is {:.1f} mm away at {}", std::sqrt(least), text_of(nearest));
+}
+
+/// Refuses seeds that are on no bone.
+void check_on_bone(const volume::Volume& ct, Parts& parts, std::span<const Seed> seeds, double neck) {
+  for (const Seed& seed : seeds) {
+    const Vector3i voxel = voxel_at(ct, seed.point);
+    if (on_bone(parts.work, voxel)) continue;
+    join_regions(parts.regions, parts.depth(), {}, neck, parts.small);
+    const Vector3d as_ras = seed.point.cwiseProduct(Vector3d(-1, -1, 1));
+    const bool is_ras = holds(ct, as_ras) && on_bone(parts.work, voxel_at(ct, as_ras));
+    const double hu = double(ct.voxels[index_in(ct, voxel)]);
+    std::map<std::string, double> figures{{"hu", hu}, {"threshold_hu", parts.threshold}};
+    const std::string nearest = nearest_bone(ct, parts, seed.point, figures);
+    throw BadInput({Reason::seed_off_bone,
+                    fmt::format("{}: the seed {} has {:.0f} HU, bone begins at {:g}; {}: click on the bone, "
+                                "or lower the threshold{}",
+                                seed.name, text_of(seed.point), hu, parts.threshold, nearest,
+                                is_ras ? "; as R, A, S the seed lies on bone" : ""),
+                    {},
+                    std::move(figures)});
+  }
+}
+
+/// Refuses bones that are specks.
+void check_sizes(const volume::Volume& ct, Parts& parts, const Segmentation& made) {
+  for (const Bone& bone : made.bones) {
+    if (bone.voxels >= least_voxels) continue;
+    std::map<std::string, double> figures{{"voxels", double(bone.voxels)}, {"threshold_hu", parts.threshold}};
+    const std::string nearest = nearest_bone(ct, parts, *bone.seed, figures);
+    throw BadInput(
+        {Reason::seed_off_bone,
+         fmt::format("{}: the seed {} lies on a speck of {} voxels, a bone has {} or more; {}: "
+                     "click on the bone, or lower the threshold ({:g} HU)",
+                     bone.name, text_of(*bone.seed), bone.voxels, least_voxels, nearest, parts.threshold),
+         {},
+         std::move(figures)});
+  }
+}
+
+/// Bones and labels of the regions of the seeds. `label_of`: of regions.
+Segmentation labelled(const volume::Volume& ct, Parts& parts, std::span<const Seed> seeds,
+                      const std::vector<std::uint32_t>& of_seeds, std::vector<std::uint8_t>& label_of) {
+  Segmentation made;
+  made.size = ct.size;
+  made.patient_from_voxel = ct.patient_from_voxel;
+  made.threshold_hu = parts.threshold;
+  made.labels.assign(ct.voxels.size(), 0);
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    Bone& bone = made.bones.emplace_back();
+    bone.name = seeds[i].name;
+    bone.seed = seeds[i].point;
+    bone.seed_hu = double(ct.voxels[index_in(ct, voxel_at(ct, seeds[i].point))]);
+    bone.label = label_of[parts.regions.root(of_seeds[i])] = static_cast<std::uint8_t>(i + 1);
+  }
+  std::size_t i = 0;
+  parts.work.bone.each([&](const Vector3i& at) {
+    if (const std::uint32_t region = parts.regions.labels[i++]; region != 0)
+      made.labels[index_in(ct, at + parts.work.first)] = label_of[parts.regions.root(region - 1)];
+  });
+  measure_bones(made);
+  return made;
+}
+
+/// How much bone without a seed hangs together with each bone.
+void add_left_out(Segmentation& made, Watershed& regions, const std::vector<std::uint8_t>& label_of,
+                  const std::vector<std::size_t>& sizes, double voxel_cm3) {
+  Watershed all{{}, regions.joined, regions.depths, {}};
+  for (const Neck& neck : regions.necks) all.join(neck.a, neck.b);
+  std::vector<double> whole(sizes.size(), 0), without(sizes.size(), 0);
+  std::vector<std::uint32_t> group_of(256, 0);
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    if (sizes[i] == 0) continue;  // joined to another one
+    const std::uint32_t group = all.root(static_cast<std::uint32_t>(i));
+    whole[group] += double(sizes[i]);
+    if (label_of[i] == 0) without[group] += double(sizes[i]);
+    group_of[label_of[i]] = group;
+  }
+  for (Bone& bone : made.bones) {
+    const std::uint32_t group = group_of[bone.label];
+    bone.left_out_cm3 = without[group] * voxel_cm3;
+    bone.left_out_percent = 100 * without[group] / whole[group];
+  }
+}
+
+std::string text_of(const Contact& contact, const std::string& name) {
+  const bool no_seed = contact.with.empty();
+  return fmt::format(
+      "{}: meets {} over a contact of {:.1f} mm radius, {:.2f} of the smaller one's, at {}: look at the "
+      "outline there{}",
+      name, no_seed ? fmt::format("{:.1f} cm3 of bone without a seed", contact.with_cm3) : contact.with,
+      contact.neck_mm, contact.width, text_of(contact.at),
+      no_seed ? "; if it is a part of the same bone, give a neck below that" : "");
+}
+
 /// Contacts of the bones, the widest with each other one, and the doubtful ones as warnings.
 template <class PointOf>
-void add_contacts(Segmentation& made, Watershed& regions, const std::vector<std::uint8_t>& label_of,
-                  const PointOf& point_of, double unit_mm) {
+void add_contacts(Segmentation& made, Parts& parts, const std::vector<std::uint8_t>& label_of,
+                  const std::vector<std::size_t>& sizes, const PointOf& point_of) {
+  const double voxel_cm3 = std::abs(made.patient_from_voxel.linear().determinant()) / 1000;
   std::set<std::pair<std::uint32_t, std::uint32_t>> met;
-  for (const Neck& neck : regions.necks) {  // the deepest first
-    const auto [a, b] = std::minmax({regions.root(neck.a), regions.root(neck.b)});
-    if (a == b || (label_of[a] == 0 && label_of[b] == 0) || !met.emplace(a, b).second) continue;
-    const auto name_of = [&](std::uint32_t region) {
-      return label_of[region] == 0 ? std::string() : made.bones[label_of[region] - 1U].name;
+  for (const Neck& neck : parts.regions.necks) {  // the deepest first
+    auto [own, other] = std::minmax({parts.regions.root(neck.a), parts.regions.root(neck.b)});
+    if (own == other || (label_of[own] == 0 && label_of[other] == 0) || !met.emplace(own, other).second)
+      continue;
+    if (label_of[own] == 0) std::swap(own, other);
+    const auto contact_with = [&](std::uint32_t region) {
+      return Contact{label_of[region] == 0 ? std::string() : made.bones[label_of[region] - 1U].name,
+                     double(sizes[region]) * voxel_cm3, neck.depth * parts.unit_mm,
+                     parts.regions.local_width(neck, parts.depth()), point_of(neck)};
     };
-    Contact contact{"", neck.depth * unit_mm, regions.width(neck), point_of(neck)};
-    for (const auto& [own, other] : {std::pair(a, b), std::pair(b, a)})
-      if (label_of[own] != 0) {
-        contact.with = name_of(other);
-        made.bones[label_of[own] - 1U].contacts.push_back(contact);
-      }
+    const Contact contact = contact_with(other);
+    made.bones[label_of[own] - 1U].contacts.push_back(contact);
+    if (label_of[other] != 0) made.bones[label_of[other] - 1U].contacts.push_back(contact_with(own));
     if (contact.width < doubtful_contact) continue;
-    const std::string first = label_of[a] != 0 ? name_of(a) : name_of(b);
-    const std::string second = label_of[a] != 0 ? name_of(b) : "";
+    const Bone& bone = made.bones[label_of[own] - 1U];
+    made.warnings.push_back({Reason::bones_in_contact,
+                             text_of(contact, bone.name),
+                             {},
+                             {{"neck_mm", contact.neck_mm},
+                              {"width", contact.width},
+                              {"with_cm3", contact.with_cm3},
+                              {"left_out_percent", bone.left_out_percent}}});
+  }
+}
+
+/// Warns of bones that are nearly two.
+template <class PointOf>
+void add_narrow_joins(Segmentation& made, Parts& parts, const std::vector<std::uint32_t>& of_seeds,
+                      const std::vector<Join>& narrowest, double neck, const PointOf& point_of) {
+  for (std::size_t k = 0; k < of_seeds.size(); ++k) {
+    const Join& join = narrowest[parts.regions.root(of_seeds[k])];
+    if (join.width >= neck + doubtful_join) continue;
+    const double neck_mm = join.neck.depth * parts.unit_mm;
     made.warnings.push_back(
         {Reason::bones_in_contact,
-         fmt::format(
-             "{}: meets {} over a contact of {:.1f} mm radius, {:.2f} of the smaller one's, at {}: look "
-             "at the outline there{}",
-             first, second.empty() ? "another bone" : second, contact.neck_mm, contact.width,
-             text_of(contact.at), second.empty() ? "; if it is the same bone, give a neck below that" : ""),
+         fmt::format("{}: is narrow at {}: a neck of {:.1f} mm radius, {:.2f} of the smaller part's: if two "
+                     "bones meet there, give each a seed, or a neck above that",
+                     made.bones[k].name, text_of(point_of(join.neck)), neck_mm, join.width),
          {},
-         {{"neck_mm", contact.neck_mm}, {"width", contact.width}}});
+         {{"neck_mm", neck_mm}, {"width", join.width}}});
   }
 }
 
@@ -290,67 +435,23 @@ Expected<Segmentation> segment(const volume::Volume& ct, std::span<const Seed> s
   return guarded([&] {
     value_or_throw(check_fields<SegmentOptions>(segment_fields, options, "segment"));
     check_seeds(ct, seeds);
-    progress.begin("threshold");
-    const double threshold = options.threshold_hu.value_or(usual_threshold(ct));
-    Work work = thresholded(ct, threshold, options.gap_mm, progress);
-    progress.begin("fill");
-    const ChamferSteps steps(ct.patient_from_voxel.linear());
-    fill_cavities(work.bone, steps, options.gap_mm, outside_of(ct, work), progress);
-    for (const Seed& seed : seeds) check_on_bone(ct, work, seed, threshold);
-    progress.begin("distance");
-    const auto depths =
-        distances_to(work.bone, steps, progress, [](std::uint8_t value) { return value == empty; });
-    progress.begin("watershed");
-    const double largest_spacing = ct.patient_from_voxel.linear().colwise().norm().maxCoeff();
-    const auto small = static_cast<std::uint16_t>(
-        std::min(double(farthest), std::max(fragment_mm, 1.5 * largest_spacing) / steps.unit_mm));
-    Watershed regions = watershed_of(depths, work.bone.size, small, progress);
-    const auto of_seeds = regions_of(ct, work, seeds, regions);
-    const auto narrowest = join_regions(regions, of_seeds, options.neck, small);
-
+    Parts parts = parts_of(ct, options, progress);
+    check_on_bone(ct, parts, seeds, options.neck);
+    const auto of_seeds = regions_of(ct, parts.work, seeds, parts.regions);
+    const auto narrowest = join_regions(parts.regions, parts.depth(), of_seeds, options.neck, parts.small);
     progress.begin("label");
-    Segmentation made;
-    made.size = ct.size;
-    made.patient_from_voxel = ct.patient_from_voxel;
-    made.threshold_hu = threshold;
-    made.labels.assign(ct.voxels.size(), 0);
-    std::vector<std::uint8_t> label_of(regions.joined.size(), 0);
-    for (std::size_t i = 0; i < seeds.size(); ++i) {
-      Bone& bone = made.bones.emplace_back();
-      bone.name = seeds[i].name;
-      bone.seed = seeds[i].point;
-      bone.seed_hu = double(ct.voxels[index_in(ct, voxel_at(ct, seeds[i].point))]);
-      bone.label = label_of[regions.root(of_seeds[i])] = static_cast<std::uint8_t>(i + 1);
-    }
-    std::size_t i = 0;
-    work.bone.each([&](const Vector3i& at) {
-      if (const std::uint32_t region = regions.labels[i++]; region != 0)
-        made.labels[index_in(ct, at + work.first)] = label_of[regions.root(region - 1)];
-    });
-    measure_bones(made);
-    for (const Bone& bone : made.bones)
-      if (bone.voxels < least_voxels)
-        throw BadInput(
-            {Reason::seed_off_bone,
-             fmt::format("{}: the seed {} lies on a speck of {} voxels, a bone has {} or more: click on "
-                         "the bone, or lower the threshold ({:g} HU)",
-                         bone.name, text_of(*bone.seed), bone.voxels, least_voxels, threshold),
-             {},
-             {{"voxels", double(bone.voxels)}, {"threshold_hu", threshold}}});
+    std::vector<std::uint8_t> label_of(parts.regions.joined.size(), 0);
+    Segmentation made = labelled(ct, parts, seeds, of_seeds, label_of);
+    check_sizes(ct, parts, made);
     const auto point_of = [&](const Neck& neck) -> Vector3d {
-      return ct.patient_from_voxel * (voxel_of(neck.at, work.bone.size) + work.first).cast<double>();
+      return ct.patient_from_voxel *
+             (voxel_of(neck.at, parts.work.bone.size) + parts.work.first).cast<double>();
     };
-    add_contacts(made, regions, label_of, point_of, steps.unit_mm);
-    for (std::size_t k = 0; k < seeds.size(); ++k)
-      if (const Join& join = narrowest[regions.root(of_seeds[k])]; join.width < options.neck + doubtful_join)
-        made.warnings.push_back(
-            {Reason::bones_in_contact,
-             fmt::format(
-                 "{}: is narrow at {}: a neck of {:.1f} mm radius, {:.2f} of the smaller part's: if two "
-                 "bones meet there, give each a seed, or a neck above that",
-                 seeds[k].name, text_of(point_of(join.neck)), join.neck.depth * steps.unit_mm, join.width),
-             {},
-             {{"neck_mm", join.neck.depth * steps.unit_mm}, {"width", join.width}}});
+    const std::vector<std::size_t> sizes = sizes_of(parts.regions);
+    add_left_out(made, parts.regions, label_of, sizes,
+                 std::abs(ct.patient_from_voxel.linear().determinant()) / 1000);
+    add_contacts(made, parts, label_of, sizes, point_of);
+    add_narrow_joins(made, parts, of_seeds, narrowest, options.neck, point_of);
     return made;
   });
 }

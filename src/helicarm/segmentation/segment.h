@@ -23,7 +23,8 @@ struct Seed {
 struct SegmentOptions {
   std::optional<double> threshold_hu = {};  ///< nothing: `usual_threshold`
   double gap_mm = 1;                        ///< half the width of gaps in the cortex that are closed
-  double neck = 0.6;  ///< parts are one bone where their neck is this share of the smaller one's radius
+  /// Parts are one bone where the neck between them has this share of the smaller one's radius near it
+  double neck = 0.6;
 };
 
 inline constexpr std::array<Field<SegmentOptions>, 3> segment_fields{
@@ -44,13 +45,14 @@ inline constexpr std::array<Field<SegmentOptions>, 3> segment_fields{
          .flag = "--neck",
          .range = {0.05, 0.75},
          .help = "Parts are one bone where the neck between them has at least this share of the smaller "
-                 "part's radius"})};
+                 "part's radius within four times the neck's own"})};
 
 /// Where a bone meets another one.
 struct Contact {
-  std::string with;    ///< a bone with a seed; empty: one without
-  double neck_mm = 0;  ///< radius of the contact
-  double width = 0;    ///< the same, relative to the smaller bone's greatest radius
+  std::string with;     ///< a bone with a seed; empty: bone without
+  double with_cm3 = 0;  ///< its volume
+  double neck_mm = 0;   ///< radius of the contact
+  double width = 0;     ///< the same, relative to the smaller bone's greatest radius near the contact
   Eigen::Vector3d at = Eigen::Vector3d::Zero();
 };
 
@@ -66,6 +68,9 @@ struct Bone {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   std::vector<std::string> cut_off = {};  ///< faces of the volume that it reaches: "superior", ...
   std::vector<Contact> contacts = {};     ///< the widest with each other bone
+  /// Bone without a seed that hangs together with it, also by way of other bones: not in the mask.
+  double left_out_cm3 = 0;
+  double left_out_percent = 0;  ///< of all that hangs together
 };
 
 /// Bones on the grid of their CT.
@@ -85,11 +90,11 @@ inline constexpr std::size_t most_bones = 250;
 double usual_threshold(const volume::Volume& ct);
 
 /// The bones at the seeds: voxels from a threshold on with the cavities they enclose, separated by a
-/// watershed on the distance to their surface, in which every other bone competes. Time grows with the number
-/// of voxels, memory is 11 bytes for each beside the CT. Warns of contacts that are nearly as wide as a bone
-/// and of bones that are nearly two (bones_in_contact), notes bones that the volume cuts off (bone_cut_off).
-/// Fails with bad_value (name, threshold, a seed outside the volume), name_clash, seed_off_bone,
-/// seeds_in_one_bone.
+/// watershed on the distance to their surface, in which every other bone competes: where the neck between two
+/// parts is narrow in comparison with both close by. Time grows with the number of voxels, memory is 11 bytes
+/// for each beside the CT. Warns of contacts that are nearly as wide as a bone and of bones that are nearly
+/// two (bones_in_contact), notes bones that the volume cuts off (bone_cut_off). Fails with bad_value (name,
+/// threshold, a seed outside the volume), name_clash, seed_off_bone, seeds_in_one_bone.
 Expected<Segmentation> segment(const volume::Volume& ct, std::span<const Seed> seeds,
                                const SegmentOptions& options, const pipeline::Progress& progress = {});
 

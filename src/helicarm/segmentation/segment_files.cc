@@ -44,14 +44,18 @@ Json json_of(const Bone& bone, const Segmentation& made, double area_cm2) {
                {"box_voxels", {{"low", bone.low}, {"high", bone.high}}},
                {"cut_off", bone.cut_off},
                {"contacts", Json::array()},
+               {"left_out_cm3", bone.left_out_cm3},
+               {"left_out_percent", bone.left_out_percent},
                {"mask", bone.name + ".nrrd"},
                {"surface", bone.name + ".stl"}};
   for (const Contact& contact : bone.contacts)
     json["contacts"].push_back({{"with", contact.with.empty() ? Json(nullptr) : Json(contact.with)},
+                                {"with_cm3", contact.with_cm3},
                                 {"neck_mm", contact.neck_mm},
                                 {"width", contact.width},
                                 {"at_mm", json_list(contact.at)}});
-  if (!made.threshold_hu) json.erase("contacts");
+  if (!made.threshold_hu)
+    for (const char* key : {"contacts", "left_out_cm3", "left_out_percent"}) json.erase(key);
   return json;
 }
 

@@ -56,6 +56,8 @@ TEST_F(SegmentFiles, AreAMaskASurfaceAnImageAndFigures) {
   EXPECT_EQ(json["format"], "helicarm-segmentation/1");
   EXPECT_EQ(json["volume"]["file"], "ct.nrrd");
   const Json& bone = json["bones"][0];
+  EXPECT_GT(bone["left_out_percent"].get<double>(), 20);
+  EXPECT_EQ(bone["left_out_cm3"], bone["contacts"][0]["with_cm3"]);
   EXPECT_EQ(bone["mask"], "upper.nrrd");
   EXPECT_GT(bone["surface_cm2"].get<double>(), 35);
   const auto ct = volume::read_volume(request_.ct), mask = volume::read_volume(out_ / "upper.nrrd");

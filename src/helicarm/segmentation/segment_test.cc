@@ -42,6 +42,9 @@ TEST(Segment, OneClickSeparatesABoneFromTheOneItTouches) {
   EXPECT_THAT(bone.cut_off, IsEmpty());
   ASSERT_EQ(bone.contacts.size(), 1U);
   EXPECT_EQ(bone.contacts[0].with, "");
+  EXPECT_NEAR(bone.contacts[0].with_cm3, upper.volume_cm3(), 0.09 * upper.volume_cm3());
+  EXPECT_EQ(bone.left_out_cm3, bone.contacts[0].with_cm3);
+  EXPECT_NEAR(bone.left_out_percent, 100 * upper.volume_cm3() / (upper.volume_cm3() + lower.volume_cm3()), 3);
   EXPECT_LT((bone.contacts[0].at - Vector3d(0, 0, 3.5)).norm(), 4);
   EXPECT_THAT(made->warnings, IsEmpty());
 }
@@ -53,6 +56,32 @@ TEST(Segment, EachClickIsABone) {
   EXPECT_GT(dice(plain_ct(), 2, *made, 2), 0.96);
   EXPECT_EQ(made->bones[0].contacts.at(0).with, "lower");
   EXPECT_EQ(made->bones[1].contacts.at(0).with, "upper");
+  EXPECT_EQ(made->bones[0].left_out_cm3, 0);
+}
+
+TEST(Segment, TheWaistOfAShaftIsNoJoint) {
+  std::vector<TestBone> spheres;
+  for (int z = -40; z <= 40; z += 4)
+    spheres.push_back({{0, 0, double(z)}, Vector3d::Constant(6 + 6 * std::pow(z / 40.0, 2))});
+  const TestCt ct = ct_of(spheres, {1, 1, 1}, Eigen::Matrix3d::Identity(), {15, 15, 55});
+  const auto made = segment(ct.volume, std::vector<Seed>{{"ulna", {0, 0, 47}}}, {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_NEAR(made->bones[0].box.min().z(), -52, 1.1);
+  EXPECT_EQ(made->bones[0].left_out_cm3, 0);
+  EXPECT_THAT(made->warnings, IsEmpty());
+}
+
+TEST(Segment, AirInTheMarrowWhereTheVolumeCutsABone) {
+  const TestBone shaft{{0, 0, -40}, {13, 12, 90}};
+  TestCt ct = ct_of({shaft}, {1, 1, 1}, Eigen::Matrix3d::Identity(), {20, 20, 30});
+  for (std::size_t i = 0; i < ct.truth.size(); ++i)
+    if (ct.truth[i] == 0) ct.volume.voxels[i] = -1000;
+  const Vector3d marrow = ct.volume.patient_from_voxel.inverse() * Vector3d(0, 0, 30);
+  const auto i = std::size_t(marrow.x() + 41 * (marrow.y() + 41 * marrow.z()));
+  ct.volume.voxels[i] = ct.volume.voxels[i + 1] = -700;
+  const auto made = segment(ct.volume, std::vector<Seed>{{"shaft", {0, 0, 10}}}, {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_GT(dice(ct, 1, *made, 1), 0.95);
 }
 
 TEST(Segment, ThickSlicesOfATurnedVolume) {
@@ -118,6 +147,23 @@ TEST(Segment, AClickBesideTheBoneNamesTheNearestOne) {
   EXPECT_THAT(refused.message,
               HasSubstr("upper: the seed (22.0, 0.0, 25.0) mm has 40 HU, bone begins at 200"));
   EXPECT_NEAR(refused.figures.at("nearest_mm"), 6, 1.1);
+}
+
+TEST(Segment, TheNearestBoneIsNoSpeck) {
+  TestCt ct = ct_of({upper}, {1, 1, 1});
+  const Vector3d speck = ct.volume.patient_from_voxel.inverse() * Vector3d(23, 0, 25);
+  ct.volume.voxels[std::size_t(speck.x() + 53 * (speck.y() + 53 * speck.z()))] = 500;
+  const Failure refused = refusal_of(ct, {{"upper", {22, 0, 25}}});
+  EXPECT_NEAR(refused.figures.at("nearest_mm"), 6, 1.1);
+  const Failure on_speck = refusal_of(ct, {{"upper", {23, 0, 25}}});
+  EXPECT_THAT(on_speck.message, HasSubstr("lies on a speck of 1 voxels"));
+  EXPECT_NEAR(on_speck.figures.at("nearest_mm"), 7, 1.1);
+}
+
+TEST(Segment, WithoutABoneThereIsNoNearestOne) {
+  TestCt ct = ct_of({}, {1, 1, 1}, Eigen::Matrix3d::Identity(), {10, 10, 10});
+  ct.volume.voxels[1000] = 500;
+  EXPECT_THAT(refusal_of(ct, {{"upper", {0, 0, 0}}}).message, HasSubstr("no bone has 50 voxels or more"));
 }
 
 TEST(Segment, AClickOnASpeckIsRefused) {

@@ -118,7 +118,9 @@ std::string slices_png(const volume::Volume& ct, const Segmentation& made) {
   cv::Mat sheet = cv::Mat::zeros(std::max(1, int(made.bones.size())) * row_px, 3 * tile_px, CV_8UC3);
   int top = 0;
   for (const Bone& bone : made.bones) {
-    cv::putText(sheet, fmt::format("{}: {:.1f} cm3", bone.name, bone.volume_cm3), {8, top + 18},
+    const std::string left_out =
+        bone.left_out_cm3 == 0 ? "" : fmt::format(", {:.1f} cm3 beside it left out", bone.left_out_cm3);
+    cv::putText(sheet, fmt::format("{}: {:.1f} cm3{}", bone.name, bone.volume_cm3, left_out), {8, top + 18},
                 cv::FONT_HERSHEY_SIMPLEX, 0.5, colour_of(bone), 1, cv::LINE_AA);
     if (bone.voxels > 0) {
       const Vector3i through = middle_voxel(made, bone);

@@ -77,6 +77,32 @@ double Watershed::width(const Neck& neck) {
   return double(neck.depth) / double(std::min(depths[root(neck.a)], depths[root(neck.b)]));
 }
 
+double Watershed::local_width(const Neck& neck, const DepthMap& depth) {
+  constexpr double samples = 8;  // of a neck's radius
+  const double reach = flare_reach * neck.depth;
+  const Eigen::Vector3d spacing = depth.spacing;
+  const Vector3i stride = (neck.depth / samples / spacing.array()).cast<int>().max(1);
+  const Vector3i steps = (reach / spacing.array()).cast<int>() / stride.array();
+  const Vector3i middle = voxel_of(neck.at, depth.size);
+  const std::uint32_t a = root(neck.a), b = root(neck.b);
+  std::uint16_t of_a = neck.depth, of_b = neck.depth;
+  for (int z = -steps.z(); z <= steps.z(); ++z)
+    for (int y = -steps.y(); y <= steps.y(); ++y)
+      for (int x = -steps.x(); x <= steps.x(); ++x) {
+        const Vector3i step = Vector3i(x, y, z).cwiseProduct(stride), at = middle + step;
+        if ((at.array() < 0).any() || (at.array() >= depth.size.array()).any()) continue;
+        if (step.cast<double>().cwiseProduct(spacing).norm() > reach) continue;
+        const auto i = std::size_t(at.x()) +
+                       std::size_t(depth.size.x()) *
+                           (std::size_t(at.y()) + std::size_t(depth.size.y()) * std::size_t(at.z()));
+        if (labels[i] == 0) continue;
+        const std::uint32_t region = region_at(i);
+        if (region == a) of_a = std::max(of_a, depth.values[i]);
+        if (region == b) of_b = std::max(of_b, depth.values[i]);
+      }
+  return double(neck.depth) / double(std::min(of_a, of_b));
+}
+
 Watershed watershed_of(const std::vector<std::uint16_t>& depths, const Vector3i& size, std::uint16_t small,
                        const pipeline::Progress& progress) {
   Watershed made;

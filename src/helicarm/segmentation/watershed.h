@@ -10,6 +10,13 @@
 
 namespace helicarm::segmentation {
 
+/// Distances to the surface of bone, 0 outside.
+struct DepthMap {
+  const std::vector<std::uint16_t>& values;
+  Eigen::Vector3i size;
+  Eigen::Vector3d spacing;  ///< of voxels, in the unit of the distances
+};
+
 /// Where two regions of a watershed meet first, coming from their deepest points.
 struct Neck {
   std::uint32_t a = 0, b = 0;  ///< regions
@@ -30,7 +37,12 @@ struct Watershed {
   std::uint32_t join(std::uint32_t a, std::uint32_t b);
   /// Radius of a neck relative to that of the smaller of its two regions.
   double width(const Neck& neck);
+  /// The same, of the regions' parts within `flare_reach` radii of the neck: a joint flares out at once, the
+  /// waist of a shaft slowly. At least `width`.
+  double local_width(const Neck& neck, const DepthMap& depth);
 };
+
+inline constexpr double flare_reach = 4;
 
 /// From this width on two regions are one: two seeds in them are on one bone.
 inline constexpr double surely_one = 0.75;
