@@ -50,11 +50,11 @@ def test_transform_in_ras_moves_ras_points_as_the_one_in_lps_moves_lps_points():
 
 def test_model_stays_in_its_patient_frame_where_that_is_the_scenes():
     scene = scenes.Scene("s", models=[scenes.Model("femur", "accept", TURNED)])
-    world = scenes.scene_from_calibrator(scene, "femur")
+    world = scenes.shown_from_frame(scene, "femur")
     assert world @ scenes.ras_transform(TURNED) == pytest.approx(np.eye(4), abs=1e-12)
-    assert scenes.scene_from_calibrator(scene, None) == pytest.approx(np.eye(4))
+    assert scenes.shown_from_frame(scene, None) == pytest.approx(np.eye(4))
     with pytest.raises(scenes.SceneError, match='"tibia".*femur'):
-        scenes.scene_from_calibrator(scene, "tibia")
+        scenes.shown_from_frame(scene, "tibia")
 
 
 def test_corners_of_the_ellipsoid_lie_on_the_95_percent_region():
@@ -117,6 +117,7 @@ def with_model(case_folder, folder):
     for name in ("ct.nrrd", "stack.tif", "cup.stl", "plan.mrk.json"):
         (folder / name).write_bytes(b"")
     models = [{"name": name, "decision": decision, "world_from_model": TURNED.tolist(), "points": points,
+               "warnings": [{"code": "near", "message": "close"}] if decision == "warn" else [],
                "failure": None if decision != "refuse" else {"code": "wrong_model", "message": "no fit"}}
               for name, decision, points in (("bone", "accept", [{"name": "entry", "xyz_mm": [1, 2, 3], "covariance_mm2": None}]),
                                              ("stack", "accept", []), ("cup", "warn", []), ("lost", "refuse", []))]
@@ -142,7 +143,7 @@ def test_scene_has_what_the_result_has(shown, result):
     assert [(m.name, m.decision) for m in scene.models] == [("bone", "accept"), ("stack", "accept"), ("cup", "warn")]
     assert scene.model("cup").surface == folder / "cup.stl"
     assert scene.model("stack").ijk_to_ras == pytest.approx(np.diag([-0.4, -0.4, 0.6, 1]))
-    assert any("lost: registration refused" in message for message in scene.messages)
+    assert any("lost: registration refused" in message for message in scene.messages) and "cup: close" in scene.messages
 
 
 def test_cameras_of_the_scene_project_as_the_calibration_does(shown, result):
@@ -164,6 +165,28 @@ def test_refused_result_and_missing_files_are_named(tmp_path):
     refused = {"failure": {"code": "no_calibrator", "message": "none found"}, "points": [], "views": [{"name": "AP", "intrinsics": None}]}
     (tmp_path / "result.json").write_text(json.dumps(refused))
     assert scenes.read_scene(tmp_path, tmp_path).messages == ["refused: no_calibrator: none found", "AP: not calibrated"]
+
+
+def with_cameras(folder, image_size):
+    (folder / "case.json").write_text(json.dumps({"views": [{"name": "cam1", "camera": "cam1.json"}], "models": []}))
+    (folder / "registration.json").write_text(json.dumps({"models": []}))
+    (folder / "cam1_overlay.png").write_bytes(b"\x89PNG\r\n\x1a\n" + (13).to_bytes(4, "big") + b"IHDR"
+                                              + (640).to_bytes(4, "big") + (480).to_bytes(4, "big"))
+    camera = {"name": "cam1", "K": [[2000, 0, 320], [0, 2000, 240], [0, 0, 1]], "R": np.eye(3).tolist(), "t": [0, 0, 700],
+              "image_size": image_size}
+    (folder / "cameras.json").write_text(json.dumps({"views": [camera]}))
+
+
+@pytest.mark.parametrize("image_size", [[640, 480], None])
+def test_cameras_of_another_program_are_shown_beside_the_registration(tmp_path, image_size):
+    with_cameras(tmp_path, image_size)
+    scene = scenes.read_scene(tmp_path, tmp_path)
+    view, = scene.views
+    assert scene.frame == "world"
+    assert (view.width, view.height, view.detector_mm) == (640, 480, 1400)
+    assert scenes.source_of(view) == pytest.approx([0, 0, -700])
+    (tmp_path / "cameras.json").unlink()
+    assert "cameras are not shown" in scenes.read_scene(tmp_path, tmp_path).messages[0]
 
 
 # ---- the measurement beside the window ----
@@ -197,13 +220,37 @@ def script(tmp_path, text):
     return file
 
 
-def test_work_by_a_program_gives_its_lines_and_its_exit_code(tmp_path):
+@pytest.fixture
+def empty_case(tmp_path):
+    (tmp_path / "case.json").write_text("{}")
+    return tmp_path
+
+
+def test_case_without_a_file_fails_by_name(tmp_path):
+    job = work.Work(tmp_path, tmp_path / "out")
+    ended(job)
+    assert "case.json" in job.failure
+
+
+def test_case_with_cameras_is_registered_and_its_cameras_are_kept(tmp_path):
+    with_cameras(tmp_path, [640, 480])
+    answer = (tmp_path / "cameras.json").read_text()
+    one = json.dumps(json.loads(answer)["views"][0])
+    job = work.Work(tmp_path, tmp_path, program=script(tmp_path, f"echo '{one}'; echo $1 >> {tmp_path}/calls"))
+    lines = ended(job)
+    assert job.failure is None and (tmp_path / "calls").read_text().split() == ["register", "import"] and len(lines) == 1
+    assert json.loads((tmp_path / "cameras.json").read_text())["views"][0]["t"] == [0, 0, 700]
+
+
+def test_work_by_a_program_gives_its_lines_and_its_exit_code(empty_case):
+    tmp_path = empty_case
     job = work.Work(tmp_path, tmp_path / "out", program=script(tmp_path, 'echo "$@"; echo no such thing >&2; exit 2'))
     assert ended(job) == [f"run {tmp_path} --out {tmp_path / 'out'}", "no such thing"]
     assert job.failure == "exit code 2: no such thing"
 
 
-def test_program_can_be_cancelled(tmp_path):
+def test_program_can_be_cancelled(empty_case):
+    tmp_path = empty_case
     job = work.Work(tmp_path, tmp_path, program=script(tmp_path, "echo begun; exec sleep 60"))
     while "begun" not in job.poll():
         pass
@@ -249,7 +296,7 @@ def test_everything_is_shown_at_its_place(slicer, shown):
     logic = Helicarm.HelicarmLogic()
     logic.show(scene)
     nodes = nodes_of(slicer)
-    assert {"world_from_calibrator", "calibrator_from_bone", "calibrator_from_cup", "calibrator_from_AP", "points",
+    assert {"slicer_from_calibrator", "calibrator_from_bone", "calibrator_from_cup", "calibrator_from_AP", "points",
             "tunnel a", "95 % regions", "camera AP", "image AP", "camera LAT", "image LAT"} <= set(nodes)
     volume = nodes[str(folder / "ct.nrrd")]
     assert volume.to_world() == pytest.approx(scenes.ras_transform(TURNED)) and volume.ijk_to_ras is None
@@ -261,7 +308,7 @@ def test_everything_is_shown_at_its_place(slicer, shown):
     assert nodes["points"].descriptions[0] == f"95 %: {scene.points[0].error_95_mm:.2f} mm"
     hierarchy = slicer.mrmlScene.hierarchy
     assert hierarchy.folders and set(hierarchy.parents) == {hierarchy.GetItemByDataNode(n) for n in slicer.mrmlScene.nodes}
-    logic.set_world("bone")
+    logic.set_frame("bone")
     assert volume.to_world() == pytest.approx(np.eye(4), abs=1e-9)
     logic.show(scene)  # replaces
     assert len(slicer.mrmlScene.nodes) == len(nodes) and len(hierarchy.folders) == 1
@@ -292,7 +339,7 @@ def test_closed_scene_is_shown_again_without_errors(slicer, shown):
     logic = Helicarm.HelicarmLogic()
     logic.show(shown[1])
     slicer.mrmlScene.Clear()
-    logic.set_world("bone")
+    logic.set_frame("bone")
     logic.show(shown[1])
     assert "points" in nodes_of(slicer)
 
@@ -334,8 +381,9 @@ def test_window_says_what_is_missing(slicer, tmp_path):
             "no program that can be run" in slicer.util.errors[2]] == [True] * 3
 
 
-def test_window_cancels(slicer, tmp_path):
+def test_window_cancels(slicer, empty_case):
     import Helicarm
+    tmp_path = empty_case
     widget = widget_of(Helicarm, tmp_path, tmp_path / "out", script(tmp_path, "exec sleep 60"))
     widget.run_button.press()
     widget.cancel_button.press()
@@ -343,14 +391,14 @@ def test_window_cancels(slicer, tmp_path):
     assert widget.log.lines[-1] == "cancelled" and widget.run_button.enabled
 
 
-def test_world_is_chosen_by_the_models_name(slicer, shown):
+def test_frame_is_chosen_by_the_models_name(slicer, shown):
     import Helicarm
     widget = widget_of(Helicarm, shown[0], shown[0])
     widget.show_button.press()
-    assert widget.world.items == ["calibrator", "bone", "stack", "cup"]
-    widget.world.index = 1
-    widget.world.slots["activated(int)"](1)
-    root = nodes_of(slicer)["world_from_calibrator"]
+    assert widget.frame.items == ["calibrator", "bone", "stack", "cup"]
+    widget.frame.index = 1
+    widget.frame.slots["activated(int)"](1)
+    root = nodes_of(slicer)["slicer_from_calibrator"]
     assert root.matrix == pytest.approx(np.linalg.inv(scenes.ras_transform(TURNED)))
 
 

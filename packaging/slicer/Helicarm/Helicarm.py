@@ -16,7 +16,6 @@ from HelicarmLib import scene as scenes
 from HelicarmLib import work
 
 COLOURS = {"accept": (0.9, 0.85, 0.7), "warn": (1.0, 0.75, 0.2)}
-CALIBRATOR = "calibrator"
 
 
 class Helicarm(ScriptedLoadableModule):
@@ -43,9 +42,9 @@ class HelicarmWidget(ScriptedLoadableModuleWidget):
                                  "Folder for result.json and the overlays; empty: helicarm-result in the case's folder")
         self.program = self._path("Program", ctk.ctkPathLineEdit.Files, "helicarm/program",
                                   "helicarm; empty: the Python package, else the program in the path")
-        self.world = qt.QComboBox()
-        self.world.toolTip = "Frame of the scene: the calibrator's, or a registered model's own (its CT's patient frame)"
-        self.form.addRow("World", self.world)
+        self.frame = qt.QComboBox()
+        self.frame.toolTip = "Slicer's world: the calibrator's frame, or a registered model's own (its CT's patient frame)"
+        self.form.addRow("Frame", self.frame)
         self.run_button = self._button("Measure", "Measure the case, then show the result", self.on_run)
         self.show_button = self._button("Show", "Show the result of an earlier measurement", self.on_show)
         self.cancel_button = self._button("Cancel", "Stop the measurement", self.on_cancel)
@@ -55,11 +54,10 @@ class HelicarmWidget(ScriptedLoadableModuleWidget):
         self.log.readOnly = True
         for widget in (self.bar, self.log):
             self.layout.addWidget(widget)
-        self.world.connect("activated(int)", self.on_world)
+        self.frame.connect("activated(int)", self.on_frame)
         self.timer = qt.QTimer()
         self.timer.setInterval(self.POLL_MS)
         self.timer.connect("timeout()", self.on_timer)
-        self._set_worlds([])
         self._set_running(False)
 
     def _path(self, label, kind, key, tip):
@@ -97,10 +95,6 @@ class HelicarmWidget(ScriptedLoadableModuleWidget):
         self.cancel_button.enabled = is_running
         self.bar.setRange(0, 0 if is_running else 1)
 
-    def _set_worlds(self, models):
-        self.world.clear()
-        self.world.addItems([CALIBRATOR, *models])
-
     def on_run(self):
         try:
             self.work = self.logic.measure(*self._folders(), self.program.currentPath)
@@ -123,8 +117,8 @@ class HelicarmWidget(ScriptedLoadableModuleWidget):
         failure, self.work = self.work.failure, None
         if failure:
             self._say(failure)
-        # A refusal leaves result.json with all that was computed.
-        if failure != "cancelled" and (self._folders()[1] / "result.json").is_file():
+        # A refusal leaves a result with all that was computed.
+        if failure != "cancelled" and any((self._folders()[1] / name).is_file() for name in scenes.RESULTS):
             self.on_show()
 
     def on_cancel(self):
@@ -134,18 +128,19 @@ class HelicarmWidget(ScriptedLoadableModuleWidget):
     def on_show(self):
         try:
             scene = scenes.read_scene(*self._folders())
-            self._set_worlds([model.name for model in scene.models])
             self.logic.show(scene)
         except scenes.SceneError as error:
             slicer.util.errorDisplay(str(error))
             return
+        self.frame.clear()
+        self.frame.addItems([scene.frame, *(model.name for model in scene.models)])
         for message in scene.messages:
             self._say(message)
         self._say(f"shown: {len(scene.points)} points, {len(scene.tunnels)} tunnels, {len(scene.models)} models, "
                   f"{len(scene.views)} cameras")
 
-    def on_world(self, _index=0):
-        self.logic.set_world(None if self.world.currentText == CALIBRATOR else self.world.currentText)
+    def on_frame(self, index):
+        self.logic.set_frame(self.frame.currentText if index > 0 else None)
 
 
 class HelicarmLogic(ScriptedLoadableModuleLogic):
@@ -166,12 +161,12 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
             raise scenes.SceneError("helicarm was not found: choose the program, or install the Python package in Slicer's Python")
         return work.Work(case_folder, result_folder, program=found, environment=slicer.util.startupEnvironment())
 
-    def show(self, scene, world=None):
+    def show(self, scene, frame=None):
         self.clear()
         self.scene = scene
         hierarchy = slicer.mrmlScene.GetSubjectHierarchyNode()
         self.folder = hierarchy.CreateFolderItem(hierarchy.GetSceneItemID(), scene.name)
-        self.root = self._transform("world_from_calibrator", scenes.scene_from_calibrator(scene, world), None)
+        self.root = self._transform(f"slicer_from_{scene.frame}", scenes.shown_from_frame(scene, frame), None)
         for model in scene.models:
             self._show_model(model)
         for view in scene.views:
@@ -182,10 +177,10 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
             for end in (tunnel.start, tunnel.end):
                 node.AddControlPoint(list(scenes.ras_from_lps(end.xyz_mm)), end.name)
 
-    def set_world(self, world):
-        """The scene's frame: None for the calibrator's, or the name of a model."""
+    def set_frame(self, frame):
+        """Slicer's world: None for the scene's own frame, or the name of a model."""
         if self.root is not None and slicer.mrmlScene.IsNodePresent(self.root):
-            slicer.util.updateTransformMatrixFromArray(self.root, scenes.scene_from_calibrator(self.scene, world))
+            slicer.util.updateTransformMatrixFromArray(self.root, scenes.shown_from_frame(self.scene, frame))
 
     def clear(self):
         """Removes what `show` added, unless the scene was closed since."""
@@ -216,7 +211,7 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
         return self._keep(node, parent)
 
     def _show_model(self, model):
-        name = f"calibrator_from_{model.name}"
+        name = f"{self.scene.frame}_from_{model.name}"
         transform = self._transform(name, scenes.ras_transform(model.world_from_model), self.root)
         if model.volume:
             volume = self._keep(slicer.util.loadVolume(_file_of_volume(model.volume)), transform)
@@ -249,7 +244,7 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
             display.SetOpacity(0.5)
 
     def _show_camera(self, view):
-        self._transform(f"calibrator_from_{view.name}", scenes.ras_transform(np.linalg.inv(view.camera_from_world)), self.root)
+        self._transform(f"{self.scene.frame}_from_{view.name}", scenes.ras_transform(np.linalg.inv(view.camera_from_world)), self.root)
         corners, lines = scenes.frustum(view)
         display = self._model(f"camera {view.name}", _polydata(corners, lines=lines)).GetDisplayNode()
         display.SetColor(1.0, 1.0, 0.4)
@@ -322,14 +317,14 @@ class HelicarmTest(ScriptedLoadableModuleTest):
         turned = np.array([[0, -1, 0, 10.0], [1, 0, 0, 20], [0, 0, 1, 30], [0, 0, 0, 1]])
         point = scenes.Point("P", np.array([1.0, 2, 3]), np.diag([0.01, 0.04, 0.09]), 0.5)
         other = scenes.Point("Q", np.array([4.0, 5, 6]), None)
-        scene = scenes.Scene("test", [point, other], [scenes.Tunnel("t", point, other)],
-                             [scenes.Model("bone", "accept", turned)])
+        scene = scenes.Scene("test", points=[point, other], tunnels=[scenes.Tunnel("t", point, other)],
+                             models=[scenes.Model("bone", "accept", turned)])
         logic = HelicarmLogic()
         logic.show(scene)
         place = [0.0, 0.0, 0.0]
         slicer.util.getNode("points").GetNthControlPointPositionWorld(0, place)
         np.testing.assert_allclose(place, (-1, -2, 3))
-        logic.set_world("bone")
+        logic.set_frame("bone")
         bone = slicer.util.arrayFromTransformMatrix(slicer.util.getNode("calibrator_from_bone"), toWorld=True)
         np.testing.assert_allclose(bone, np.eye(4), atol=1e-12)
         logic.clear()

@@ -13,6 +13,7 @@ from typing import Dict, List, Optional
 
 import numpy as np
 
+RESULTS = ("result.json", "registration.json")
 RAS_FROM_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
@@ -23,7 +24,7 @@ class SceneError(Exception):
 @dataclass
 class Point:
     name: str
-    xyz_mm: np.ndarray                    # (3,), calibrator's frame
+    xyz_mm: np.ndarray                    # (3,), frame of the scene
     covariance_mm2: Optional[np.ndarray]  # (3, 3)
     error_95_mm: Optional[float] = None
 
@@ -39,7 +40,7 @@ class Tunnel:
 class Model:
     name: str
     decision: str                        # accept, warn or refuse
-    world_from_model: np.ndarray         # (4, 4); the calibrator's frame from the model's, LPS
+    world_from_model: np.ndarray         # (4, 4); frame of the scene from the model's, LPS
     volume: Optional[pathlib.Path] = None
     surface: Optional[pathlib.Path] = None
     plan: Optional[pathlib.Path] = None
@@ -60,6 +61,7 @@ class View:
 @dataclass
 class Scene:
     name: str
+    frame: str = "calibrator"  # of all coordinates; "world" where the cameras of another program define it
     points: List[Point] = field(default_factory=list)
     tunnels: List[Tunnel] = field(default_factory=list)
     models: List[Model] = field(default_factory=list)
@@ -85,11 +87,12 @@ def ras_transform(lps_transform):
     return RAS_FROM_LPS @ np.asarray(lps_transform, float) @ RAS_FROM_LPS
 
 
-def scene_from_calibrator(scene, world):
-    """(4, 4), RAS: `world` is None for the calibrator's frame, or the name of the model whose patient frame it is."""
-    if world is None:
+def shown_from_frame(scene, chosen):
+    """(4, 4), RAS: Slicer's world from the frame of the scene. `chosen` is None for that frame itself, or the name of the
+    model whose patient frame is Slicer's world."""
+    if chosen is None:
         return np.eye(4)
-    return np.linalg.inv(ras_transform(scene.model(world).world_from_model))
+    return np.linalg.inv(ras_transform(scene.model(chosen).world_from_model))
 
 
 # ---- confidence regions ----
@@ -145,14 +148,14 @@ def ellipsoid_mesh(centre_mm, covariance_mm2, probability=0.95, rings=12, sector
 # ---- cameras ----
 
 def on_detector(view, u, v):
-    """(3,) place of a rectified pixel on the view's plane, calibrator's frame."""
+    """(3,) place of a rectified pixel on the view's plane."""
     ray = np.linalg.solve(view.intrinsics, (u, v, 1.0))
     turn, shift = view.camera_from_world[:3, :3], view.camera_from_world[:3, 3]
     return turn.T @ (ray / ray[2] * view.detector_mm - shift)
 
 
 def source_of(view):
-    """(3,) focal spot, calibrator's frame."""
+    """(3,) focal spot."""
     return -view.camera_from_world[:3, :3].T @ view.camera_from_world[:3, 3]
 
 
@@ -201,14 +204,36 @@ def _points(listed, scene, prefix=""):
     return found
 
 
+def _size_of_png(path):
+    """Width and height by the file's header, or None."""
+    head = path.read_bytes()[:24] if path.is_file() else b""
+    return (int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")) if head[12:16] == b"IHDR" else None
+
+
+def _imported_view(camera, folder):
+    """A camera of another program; its image is free of distortion."""
+    image = folder / f"{camera['name']}_overlay.png"
+    size = camera.get("image_size") or _size_of_png(image)
+    if not size:
+        raise SceneError(f"{camera['name']}: size of the image is not known")
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = _array(camera["R"], (3, 3), camera["name"]), _array(camera["t"], (3,), camera["name"])
+    return View(camera["name"], _array(camera["K"], (3, 3), camera["name"]), pose, *size, _behind_the_world(pose),
+                image if image.is_file() else None)
+
+
+def _behind_the_world(pose):
+    """Without the detector's place: as far behind the world's origin as the source lies before it, mm."""
+    return 2 * float(pose[2, 3]) if pose[2, 3] > 0 else 1000.0
+
+
 def _view(view, folder):
     intrinsics = view["intrinsics"]
     width, height = view["image_size"]
     matrix = np.array([[intrinsics["fx_px"], intrinsics.get("skew", 0) or 0, intrinsics["u0"]],
                        [0, intrinsics["fy_px"], intrinsics["v0"]], [0, 0, 1.0]])
     pose = _array(view["camera_from_calibrator"], (4, 4), view["name"])
-    # Without the detector's place the plane lies as far behind the calibrator as the source before it.
-    detector = intrinsics.get("f_mm") or 2 * pose[2, 3]
+    detector = intrinsics.get("f_mm") or _behind_the_world(pose)
     image = folder / f"{view['name']}_overlay.png"
     return View(view["name"], matrix, pose, width, height, float(detector), image if image.is_file() else None)
 
@@ -230,18 +255,14 @@ def _models(case, registration, folder, scene):
             reason = (registered.get("failure") or {}).get("message", "no pose")
             scene.messages.append(f"{name}: registration refused, not shown: {reason}")
             continue
+        scene.messages += [f"{name}: {warning['message']}" for warning in registered.get("warnings") or []]
         model = described.get(name, {})
         scene.models.append(Model(name, registered["decision"], _array(pose, (4, 4), name), path_of(model, "volume"),
                                   path_of(model, "surface"), path_of(model, "plan"), _stack_grid(model)))
         _points(registered.get("points") or [], scene, name + ": ")
 
 
-def read_scene(case_folder, result_folder):
-    """The scene of a case and the folder that `helicarm run` wrote; a refused result is shown as far as it was
-    computed."""
-    case_folder, result_folder = pathlib.Path(case_folder), pathlib.Path(result_folder)
-    case, result = _read(case_folder / "case.json"), _read(result_folder / "result.json")
-    scene = Scene(case_folder.resolve().name)
+def _calibrated(case, result, folder, scene):
     if result.get("failure"):
         scene.messages.append(f"refused: {result['failure']['code']}: {result['failure']['message']}")
     scene.messages += [f"{warning['code']}: {warning['message']}" for warning in result.get("warnings") or []]
@@ -251,9 +272,27 @@ def read_scene(case_folder, result_folder):
             scene.tunnels.append(Tunnel(tunnel["name"], located[tunnel["start"]], located[tunnel["end"]]))
     for view in result.get("views") or []:
         if view.get("intrinsics") and view.get("camera_from_calibrator") and view.get("image_size"):
-            scene.views.append(_view(view, result_folder))
+            scene.views.append(_view(view, folder))
         else:
             scene.messages.append(f"{view['name']}: not calibrated")
-    if (result_folder / "registration.json").is_file():
-        _models(case, _read(result_folder / "registration.json"), case_folder, scene)
+
+
+def read_scene(case_folder, result_folder):
+    """The scene of a case and the folder that `helicarm run` wrote, or `helicarm register` of a case with cameras of
+    another program; a refused result is shown as far as it was computed."""
+    case_folder, result_folder = pathlib.Path(case_folder), pathlib.Path(result_folder)
+    case = _read(case_folder / "case.json")
+    scene = Scene(case_folder.resolve().name)
+    registration, cameras = result_folder / "registration.json", result_folder / "cameras.json"
+    brings_cameras = any(view.get("camera") for view in case.get("views", []))
+    if brings_cameras:
+        scene.frame = "world"
+    if not brings_cameras:
+        _calibrated(case, _read(result_folder / "result.json"), result_folder, scene)
+    elif cameras.is_file():
+        scene.views += [_imported_view(camera, result_folder) for camera in _read(cameras)["views"]]
+    else:
+        scene.messages.append("cameras are not shown: measure here, not outside Slicer, to have them")
+    if brings_cameras or registration.is_file():
+        _models(case, _read(registration), case_folder, scene)
     return scene
