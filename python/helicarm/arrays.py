@@ -243,6 +243,15 @@ def _triangles_of_vtk(mesh):
     return _numpy(mesh.GetPoints().GetData()), _numpy(cells.GetConnectivityArray()).reshape(-1, 3), declared
 
 
+def _mask_on(volume, mask):
+    """A mask as as_volume takes it, or an array of the volume's shape (i, j, k) on its grid."""
+    if not isinstance(mask, np.ndarray):
+        return as_volume(mask)
+    if mask.shape != tuple(volume.shape):
+        _refuse(f"mask: an array of shape {mask.shape} is not on the volume's grid, whose shape (i, j, k) is {tuple(volume.shape)}")
+    return _c.Volume((mask != 0).astype(np.float32), volume.affine, frame="LPS")
+
+
 def as_model(obj):
     """The arguments of a model: {"volume" or "surface", "mask", "window_hu", "scale_sigma"}."""
     if isinstance(obj, Mapping):
@@ -252,9 +261,11 @@ def as_model(obj):
         if ("volume" in obj) == ("surface" in obj) or ("surface" in obj and {"mask", "window_hu"} & set(obj)):
             _refuse('models: give "volume" (with "mask" or "window_hu") or "surface"')
         model = {name: value for name, value in obj.items() if value is not None}
-        for name, convert in (("volume", as_volume), ("mask", as_volume), ("surface", as_surface)):
+        for name, convert in (("volume", as_volume), ("surface", as_surface)):
             if name in model:
                 model[name] = convert(model[name])
+        if "mask" in model:
+            model["mask"] = _mask_on(model["volume"], model["mask"])
         return model
     is_surface = isinstance(obj, _c.Surface) or hasattr(obj, "GetPolys") or hasattr(obj, "faces")
     return {"surface": as_surface(obj)} if is_surface else {"volume": as_volume(obj)}

@@ -79,8 +79,8 @@ def register(folder=None, *, models=None, views=None, starts=None, camera_covari
     history=None, cache=True, progress=None): the models of a case, as `helicarm register` does.
 
     register(models={name: model}, views={name: (image, camera)}, starts={name: world_from_model}, ...): in memory.
-      model: what as_volume or as_surface takes, or a dict of "volume" with "mask" (on the volume's grid) or "window_hu"
-        (low, high), or "surface", and "scale_sigma" (relative). Model coordinates: L, P, S, mm.
+      model: what as_volume or as_surface takes, or a dict of "volume" with "mask" (a volume, or an array of the volume's
+        shape, what is not 0 is the body) or "window_hu" (low, high), or "surface", and "scale_sigma" (relative). Model coordinates: L, P, S, mm.
       image: what as_image takes, metal dark; of floats an XrayImage, which states their range. Free of distortion unless its
         camera has a map.
       camera: what as_camera takes, all of one world; or a Calibration, whose view of that name is used with its map, and

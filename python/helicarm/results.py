@@ -28,14 +28,15 @@ def frame_of(rows, columns=None):
 
 
 def _pose_columns(matrix):
-    """x_mm.. and the 9 numbers of the rotation, as the CSV files have a pose: 16 numbers by rows without the last."""
-    return {f"m{row}{column}": float(matrix[row][column]) for row in range(3) for column in range(4)}
+    """A pose with the names of the CSV files: m11 to m44, by rows."""
+    values = np.full((4, 4), np.nan) if matrix is None else np.asarray(matrix, float)
+    return {f"m{row + 1}{column + 1}": float(values[row, column]) for row in range(4) for column in range(4)}
 
 
 def _sigma_columns(covariance):
     sigma = np.full(6, np.nan) if covariance is None else np.sqrt(np.diag(np.asarray(covariance, float)))
-    return {**{f"s{axis}_deg": float(np.degrees(sigma[i])) for i, axis in enumerate(("rx", "ry", "rz"))},
-            **{f"s{axis}_mm": float(sigma[3 + i]) for i, axis in enumerate(_AXES)}}
+    return {**{f"sigma_r{axis}_deg": float(np.degrees(sigma[i])) for i, axis in enumerate(_AXES)},
+            **{f"sigma_{axis}_mm": float(sigma[3 + i]) for i, axis in enumerate(_AXES)}}
 
 
 class RegisteredModel(dict):
@@ -80,7 +81,7 @@ class RegistrationAnswer(_ModelsAnswer):
     _Model = RegisteredModel
 
     def to_frame(self):
-        """pandas.DataFrame, a row for each model: name, decision, pose (m00 .. m23), standard deviations at its centre."""
+        """pandas.DataFrame, a row for each model: name, decision, pose and standard deviations as in registration.csv."""
         return frame_of([{"name": model["name"], "decision": model["decision"], **_pose_columns(model["world_from_model"]),
                           **_sigma_columns(model["covariance"])} for model in self["models"]])
 
@@ -124,13 +125,13 @@ def _point_row(point):
     xyz = np.full(3, np.nan) if point.xyz_mm is None else point.xyz_mm
     covariance = np.full((3, 3), np.nan) if point.covariance_mm2 is None else point.covariance_mm2
     return {"name": point.name, "source": point.source, **{f"{axis}_mm": xyz[i] for i, axis in enumerate(_AXES)},
-            **{f"s{axis}_mm": np.sqrt(covariance[i, i]) for i, axis in enumerate(_AXES)},
+            **{f"sigma_{axis}_mm": np.sqrt(covariance[i, i]) for i, axis in enumerate(_AXES)},
             "error_95_mm": np.nan if point.error_95_mm is None else point.error_95_mm,
             "reason": None if point.reason is None else point.reason["code"]}
 
 
 def _result_frame(self):
-    """pandas.DataFrame, a row for each point: place, standard deviations, error_95_mm, reason."""
+    """pandas.DataFrame, a row for each point, as points.csv: place, standard deviations, error_95_mm; and reason."""
     return frame_of([_point_row(point) for point in self.points])
 
 
@@ -141,7 +142,7 @@ def _sweep_frame(self):
         sigma = np.sqrt(np.diag(self.source_covariances[i]))
         rows.append({"frame": frame, "accepted": self.accepted[i],
                      **{f"source_{axis}_mm": self.sources[i, k] for k, axis in enumerate(_AXES)},
-                     **{f"source_s{axis}_mm": sigma[k] for k, axis in enumerate(_AXES)}})
+                     **{f"source_sigma_{axis}_mm": sigma[k] for k, axis in enumerate(_AXES)}})
     return frame_of(rows)
 
 
@@ -184,6 +185,12 @@ class Snapshot:
     def __reduce__(self):
         values = {name: value for name, value in self.__dict__.items() if not name.startswith("_")}
         return Snapshot, (self._kind, values, self._content)
+
+    def __getattr__(self, name):
+        if not name.startswith("_") and hasattr(getattr(_c, self.__dict__.get("_kind", ""), None), name):
+            raise AttributeError(f"{self._kind}.{name}: a pickled copy has values, to_dict and to_frame only; call {name} "
+                                 "before pickling")
+        raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
 
     def __repr__(self):
         return f"<{self._kind}: a pickled copy>"

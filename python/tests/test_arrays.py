@@ -157,6 +157,17 @@ def test_arrays_and_files_are_registered_alike(sequence, tmp_path):  # noqa: F81
     assert (tmp_path / "out/report.html").exists() and (tmp_path / "out/A_overlay.png").exists()
 
 
+def test_a_mask_may_be_an_array_on_the_volumes_grid(sequence):  # noqa: F811
+    volume = volume_of_body()
+    body = volume.array > 300
+    held = helicarm.Volume(body.astype(np.float32), volume.affine, frame="LPS")
+    by_array, by_volume = (helicarm.register(models={"body": {"volume": volume, "mask": mask}}, views=views_of(sequence),
+                                             starts={"body": start()})["models"][0] for mask in (body, held))
+    assert alike(by_array) == alike(by_volume)
+    refused("bad_value", r"mask: an array of shape .* the volume's grid", helicarm.register,
+            models={"body": {"volume": volume, "mask": body[:-1]}}, views=views_of(sequence))
+
+
 def test_a_start_may_be_one_of_several_and_views_a_list(sequence):  # noqa: F811
     far = start()
     far[:3, 3] += 60

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import helicarm
+from helicarm.results import RegistrationAnswer
 from test_arrays import start, views_of, volume_of_body
 from test_registration import sequence  # noqa: F401
 from test_sweep import run  # noqa: F401
@@ -102,9 +103,33 @@ def test_frames_are_pandas(result, swept, registered):
     assert list(frames.accepted) == swept.accepted and frames.source_x_mm.isna().sum() == 1
     row = registered.to_frame().iloc[0]
     model = registered.models["body"]
-    assert (row.name, row["name"], row.m03) == (0, "body", model.world_from_model[0, 3])
-    assert row.sx_mm == pytest.approx(np.sqrt(model.covariance[3, 3]))
+    assert (row.name, row["name"], row.m14) == (0, "body", model.world_from_model[0, 3])
+    assert row.sigma_x_mm == pytest.approx(np.sqrt(model.covariance[3, 3]))
     assert again(swept).to_frame().equals(frames)
+
+
+def heading(path):
+    return path.read_text().splitlines()[0].split(",")
+
+
+def test_columns_of_frames_are_those_of_the_csv_files(result, sequence, tmp_path):  # noqa: F811
+    pytest.importorskip("pandas")
+    result.export(tmp_path, ["csv"])
+    assert set(heading(tmp_path / "points.csv")) - {"frame"} <= set(result.to_frame().columns)
+    followed = helicarm.register_sequence(sequence, "1-2", out=tmp_path)
+    assert set(heading(tmp_path / "registration.csv")) - {"code"} <= set(followed.to_frame().columns)
+    one = {"name": "cup", "decision": "refuse", "world_from_model": None, "covariance": None}
+    assert RegistrationAnswer({"models": [one]}).to_frame().m11.isna().all()
+
+
+def test_a_pickled_copy_says_what_it_lacks(result, swept):
+    with pytest.raises(AttributeError, match="Sweep.write: a pickled copy.*before pickling"):
+        again(swept).write("x")
+    with pytest.raises(AttributeError, match="Result.export"):
+        again(result).export("x")
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        again(result).nothing
+    assert not hasattr(again(swept), "write") and copy.copy(again(swept)).frames == swept.frames
 
 
 def test_what_is_missing_for_a_frame_is_named(monkeypatch, swept):
