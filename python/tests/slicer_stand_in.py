@@ -3,6 +3,7 @@
 
 Calls that Slicer does not have raise AttributeError here as there.
 """
+import pathlib
 import sys
 import types
 
@@ -201,6 +202,8 @@ class Base:
 
 def _from_file(kind):
     def load(path, properties=None):
+        if not pathlib.Path(path).is_file():
+            raise RuntimeError("Failed to load node from file: " + path)
         scene = sys.modules["slicer"].mrmlScene
         node = kind(kind.__name__, path)
         node.CreateDefaultDisplayNodes()

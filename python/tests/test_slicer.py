@@ -334,6 +334,17 @@ def test_regions_and_images_are_meshes_at_their_place(slicer, shown):
     assert plane.display.texture is not None
 
 
+def test_model_whose_file_is_missing_is_named_and_the_rest_is_shown(slicer, tmp_path):
+    import Helicarm
+    (tmp_path / "empty").mkdir()
+    models = [scenes.Model("gone", "accept", TURNED, surface=tmp_path / "gone.stl"),
+              scenes.Model("slices", "accept", TURNED, volume=tmp_path / "empty")]
+    scene = scenes.Scene("s", points=[scenes.Point("P", np.zeros(3), None)], models=models)
+    Helicarm.HelicarmLogic().show(scene)
+    assert ["gone.stl: not shown" in scene.messages[0], "an empty folder" in scene.messages[1]] == [True] * 2
+    assert "points" in nodes_of(slicer) and "95 % regions" not in nodes_of(slicer)
+
+
 def test_closed_scene_is_shown_again_without_errors(slicer, shown):
     import Helicarm
     logic = Helicarm.HelicarmLogic()

@@ -149,6 +149,7 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
     def __init__(self):
         ScriptedLoadableModuleLogic.__init__(self)
         self.scene, self.nodes, self.root, self.folder = None, [], None, None
+        self.readers = []  # of the textures: a display node does not keep them
 
     def measure(self, case_folder, result_folder, program=""):
         """A `Work` that has begun."""
@@ -190,7 +191,7 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
                 slicer.mrmlScene.RemoveNode(node)
         if is_open:
             slicer.mrmlScene.GetSubjectHierarchyNode().RemoveItem(self.folder)
-        self.scene, self.nodes, self.root, self.folder = None, [], None, None
+        self.scene, self.nodes, self.root, self.folder, self.readers = None, [], None, None, []
 
     def _keep(self, node, parent):
         self.nodes.append(node)
@@ -213,17 +214,26 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
     def _show_model(self, model):
         name = f"{self.scene.frame}_from_{model.name}"
         transform = self._transform(name, scenes.ras_transform(model.world_from_model), self.root)
-        if model.volume:
-            volume = self._keep(slicer.util.loadVolume(_file_of_volume(model.volume)), transform)
-            if model.ijk_to_ras is not None:
-                volume.SetIJKToRASMatrix(_vtk_matrix(model.ijk_to_ras))
-        if model.surface:
-            surface = self._keep(slicer.util.loadModel(str(model.surface)), transform)
-            surface.GetDisplayNode().SetColor(*COLOURS.get(model.decision, COLOURS["warn"]))
-        if model.plan:
-            plans = slicer.util.loadMarkups(str(model.plan))
-            for plan in plans if isinstance(plans, (list, tuple)) else [plans]:
-                self._keep(plan, transform)
+        for path, load in ((model.volume, self._volume), (model.surface, self._surface), (model.plan, self._plan)):
+            try:
+                if path:
+                    load(model, transform)
+            except (RuntimeError, OSError) as error:  # Slicer's readers raise RuntimeError
+                self.scene.messages.append(f"{path}: not shown: {error}")
+
+    def _volume(self, model, transform):
+        volume = self._keep(slicer.util.loadVolume(_file_of_volume(model.volume)), transform)
+        if model.ijk_to_ras is not None:
+            volume.SetIJKToRASMatrix(_vtk_matrix(model.ijk_to_ras))
+
+    def _surface(self, model, transform):
+        surface = self._keep(slicer.util.loadModel(str(model.surface)), transform)
+        surface.GetDisplayNode().SetColor(*COLOURS.get(model.decision, COLOURS["warn"]))
+
+    def _plan(self, model, transform):
+        plans = slicer.util.loadMarkups(str(model.plan))
+        for plan in plans if isinstance(plans, (list, tuple)) else [plans]:
+            self._keep(plan, transform)
 
     def _show_points(self, points):
         if not points:
@@ -267,6 +277,7 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
         display = node.GetDisplayNode()
         display.SetBackfaceCulling(False)
         display.SetLighting(False)
+        self.readers.append(reader)
         display.SetTextureImageDataConnection(reader.GetOutputPort())
 
     def _model(self, name, polydata):
@@ -278,8 +289,8 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
 def _file_of_volume(path):
     """A file: of a folder of DICOM slices one of them, whose series Slicer reads."""
     files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
-    if not files or not files[0].exists():
-        raise scenes.SceneError(f"{path}: missing")
+    if not files:
+        raise OSError("an empty folder")
     return os.fspath(files[0])
 
 
