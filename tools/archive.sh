@@ -104,6 +104,7 @@ chmod +x "$root/bin/helicarm"
 tools/cli_reference.py "$build/bin/helicarm" man "$root/share/man/man1"
 tools/cli_reference.py "$build/bin/helicarm" completion "$root/share/bash-completion/completions/helicarm"
 cp -r README.md CHANGELOG.md LICENSE docs "$root"
+cp -r packaging/slicer "$root/share/helicarm/slicer"
 licences "$root/licences"
 
 mkdir -p build/archive

@@ -17,6 +17,7 @@ struct Console {
   unsigned threads = 0;
   std::uint64_t seed = 1;
   bool answered = false;  ///< the command printed its own answer to a refusal, with --json
+  bool tags = false;      ///< progress in the tags of Slicer's Execution Model
 };
 
 /// A command is `CommandResult name_command(const NameArguments&, Console&)` in name_command.cc, with its

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -13,6 +14,16 @@
 
 #include "command.h"
 #include "helicarm/core/field.h"
+
+/// What --help calls a file or folder.
+template <>
+constexpr const char* CLI::detail::type_name<std::filesystem::path>() {
+  return "PATH";
+}
+template <>
+constexpr const char* CLI::detail::type_name<std::optional<std::filesystem::path>>() {
+  return "PATH";
+}
 
 namespace helicarm::cli {
 

@@ -2,8 +2,11 @@
 #include <algorithm>
 #include <functional>
 #include <iostream>
+#include <iterator>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -11,6 +14,8 @@
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
 #include "helicarm/pipeline/result.h"
+#include "module_description.h"
+#include "module_words.h"
 
 /// " (5da20f9512)", or empty; written at each build by cmake/commit.cmake.
 extern const char* const commit_in_brackets;
@@ -20,11 +25,11 @@ namespace {
 
 constexpr int internal_error = 1;
 
-int report(const Failure& failure, const Console& console) {
+int report(const Failure& failure, const Console& console, std::ostream& errors) {
   const int exit = exit_code(failure.reason);
   const std::string view = failure.view.empty() ? std::string{} : failure.view + ": ";
-  console.progress << fmt::format("helicarm: {}: {}{}\n", code(failure.reason), view,
-                                  without_control_characters(failure.message));
+  errors << fmt::format("helicarm: {}: {}{}\n", code(failure.reason), view,
+                        without_control_characters(failure.message));
   if (console.json && !console.answered)
     console.out << to_text({{"status", exit == 3 ? "refused" : "failed"},
                             {"failure", pipeline::to_json(failure)}})
@@ -32,13 +37,11 @@ int report(const Failure& failure, const Console& console) {
   return exit;
 }
 
-int run(int argc, char** argv) {
-  Console console{std::cout, std::cerr};
-  Action action;
-  CLI::App app(
+/// What every command takes.
+void describe(CLI::App& app, Console& console) {
+  app.description(
       "helicarm: 3-D points with confidence regions from X-ray images with a calibrator.\n"
-      "Research instrument, not a medical device.",
-      "helicarm");
+      "Research instrument, not a medical device.");
   app.footer("Begin with:\n  helicarm demo\nHelp for a command: helicarm COMMAND --help");
   app.set_version_flag("--version", std::string("helicarm " HELICARM_VERSION) + commit_in_brackets);
   app.fallthrough();
@@ -49,38 +52,67 @@ int run(int argc, char** argv) {
   app.add_option("--seed", console.seed, "Seed of the random numbers")
       ->check(within(0, 1e19))
       ->capture_default_str();
+}
+
+/// `COMMAND --xml`: the XML of the command, and true. `--slicer COMMAND ...`: `words` become those of the
+/// program's own options.
+bool is_answered_as_module(const CLI::App& app, std::vector<std::string>& words, Console& console) {
+  console.tags = !words.empty() && words.front() == "--slicer";
+  if (console.tags) words.erase(words.begin());
+  std::span<const std::string> rest(words);
+  const CLI::App* command = command_named(app, rest);
+  if (!command) return false;
+  if (rest.size() == 1 && rest.front() == "--xml") {
+    console.out << module_description(*command);
+    return true;
+  }
+  if (!console.tags) return false;
+  std::vector<std::string> own(words.begin(), words.end() - std::ptrdiff_t(rest.size()));
+  std::ranges::move(words_of_module(*command, rest), std::back_inserter(own));
+  words = std::move(own);
+  return false;
+}
+
+int run(int argc, char** argv) {
+  Console console{std::cout, std::cerr};
+  Action action;
+  CLI::App app({}, "helicarm");
+  describe(app, console);
   add_commands(app, action);
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  if (is_answered_as_module(app, words, console)) return 0;
   try {
     const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
-    if (argc > 1 && argv[1][0] != '-' &&
-        std::ranges::none_of(commands, [&](const CLI::App* c) { return c->get_name() == argv[1]; }))
+    if (!words.empty() && !words[0].starts_with('-') &&
+        std::ranges::none_of(commands, [&](const CLI::App* c) { return c->get_name() == words[0]; }))
       throw CLI::ParseError(fmt::format("\"{}\" is not a command; helicarm --help lists the commands",
-                                        without_control_characters(argv[1])),
+                                        without_control_characters(words[0])),
                             CLI::ExitCodes::ExtrasError);
-    if (argc == 1) {
+    if (words.empty()) {
       console.progress << app.help();
       return exit_code(Reason::usage);
     }
-    app.parse(argc, argv);
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
   } catch (const CLI::Success& wish) {
     return app.exit(wish, console.out, console.progress);
   } catch (const CLI::ParseError& error) {
-    console.json =
-        std::any_of(argv, argv + argc, [](const char* word) { return std::string_view(word) == "--json"; });
+    console.json = std::ranges::find(words, "--json") != words.end();
     std::string message = error.what();
     const auto commands = app.get_subcommands();
     if (!commands.empty()) message += fmt::format(" (see helicarm {} --help)", commands.front()->get_name());
-    return report({Reason::usage, std::move(message), {}, {}}, console);
+    return report({Reason::usage, std::move(message), {}, {}}, console, console.progress);
   }
   std::ostream nowhere(nullptr);
   Console heard{console.quiet && !console.json ? nowhere : console.out,
-                console.progress,
+                console.tags ? console.out : console.progress,  // Slicer shows stderr as an error
                 console.json,
                 console.quiet,
                 console.threads,
-                console.seed};
+                console.seed,
+                false,
+                console.tags};
   const auto done = action(heard);
-  return done ? 0 : report(done.error(), heard);
+  return done ? 0 : report(done.error(), heard, console.progress);
 }
 
 }  // namespace

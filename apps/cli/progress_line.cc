@@ -12,6 +12,7 @@ namespace {
 constexpr double silent_s = 1;
 constexpr double between_lines_s = 0.2;
 constexpr double between_shares = 0.1;
+constexpr double between_tags = 0.01;
 
 double seconds(std::chrono::steady_clock::duration time) {
   return std::chrono::duration<double>(time).count();
@@ -28,6 +29,7 @@ std::string span_of(double s) {
 ProgressLine::ProgressLine(const Console& console)
     : out_(console.quiet ? nullptr : &console.progress),
       terminal_(&console.progress == &std::cerr && ::isatty(STDERR_FILENO)),
+      tags_(console.tags),
       start_(Clock::now()),
       reported_(start_) {}
 
@@ -37,6 +39,12 @@ ProgressLine::~ProgressLine() {
 
 void ProgressLine::notify(double share) {
   if (!out_) return;
+  if (tags_) {
+    if (told_share_ > 0 && share - told_share_ < between_tags && share < 1) return;
+    *out_ << fmt::format("<filter-progress>{:.2f}</filter-progress>\n", share) << std::flush;
+    told_share_ = share;
+    return;
+  }
   const auto now = Clock::now();
   if (first_share_ < 0) first_share_ = told_share_ = share, start_ = now;
   const double passed = seconds(now - start_);

@@ -25,6 +25,7 @@ class ProgressLine {
 
   std::ostream* out_;  ///< null: silent
   bool terminal_;
+  bool tags_;  ///< of Slicer's Execution Model: a line per 1 %
   bool begun_ = false;
   double first_share_ = -1;
   double told_share_ = 0;

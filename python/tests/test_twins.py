@@ -40,6 +40,7 @@ TWINS = {
 }
 WITHOUT = {
     "pick": "picks by hand in the desktop application or by a table; Calibration.locate takes pixels",
+    "slicer": "writes launchers of the program; in 3D Slicer the package is used by the scripted module",
     "receive": "a service that runs beside the program which uses its images",
     "tracker": "a service, and a calibration at the device; its files are CSV",
     "robot": "watches a device",
