@@ -20,6 +20,9 @@ class Node:
     def GetName(self):
         return self.name
 
+    def SetName(self, name):
+        self.name = name
+
     def SetAndObserveTransformNodeID(self, identifier):
         self.parent = next(node for node in sys.modules["slicer"].mrmlScene.nodes if node.GetID() == identifier)
 
@@ -142,7 +145,7 @@ class Widget:
 
     def __init__(self, text=""):
         self.text, self.lines, self.slots = text, [], {}
-        self.currentPath, self.enabled, self.items, self.index = "", True, [], 0
+        self.currentPath, self.enabled, self.items, self.index, self.value = "", True, [], 0, 1
 
     def connect(self, signal, slot):
         self.slots[signal] = slot
@@ -230,7 +233,7 @@ def install():
     util.arrayFromTransformMatrix = lambda node, toWorld=False: node.to_world() if toWorld else node.matrix
     util.startupEnvironment = lambda: None
     util.errorDisplay = util.errors.append
-    qt.QComboBox = qt.QPushButton = qt.QProgressBar = qt.QPlainTextEdit = qt.QTimer = qt.QFormLayout = Widget
+    qt.QComboBox = qt.QSpinBox = qt.QPushButton = qt.QProgressBar = qt.QPlainTextEdit = qt.QTimer = qt.QFormLayout = Widget
     ctk.ctkPathLineEdit = PathEdit
     sys.modules.update({"slicer": slicer, "slicer.util": util, "slicer.ScriptedLoadableModule": loadable, "qt": qt, "ctk": ctk})
     return slicer

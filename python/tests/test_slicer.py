@@ -84,6 +84,16 @@ def test_region_holds_95_percent_of_draws():
     assert np.linalg.det(directions) == pytest.approx(1)
 
 
+def test_enlarged_region_has_its_centre_and_its_shape():
+    covariance, centre = random_covariance(5), np.array([1.0, 2, 3])
+    once, triangles = scenes.ellipsoid_mesh(centre, covariance)
+    points = [scenes.Point("P", centre, covariance), scenes.Point("Q", centre, None), scenes.Point("R", -centre, covariance)]
+    corners, joined = scenes.regions_mesh(points, enlarged=20)
+    assert corners[:len(once)] - centre == pytest.approx(20 * (once - centre))
+    assert (joined[len(triangles):] == triangles + len(once)).all() and joined.max() == len(corners) - 1
+    assert scenes.regions_mesh(points[1:2]) is None
+
+
 def test_flat_covariance_gives_a_flat_region_and_a_negative_one_is_refused():
     assert scenes.ellipsoid_axes(np.diag([0, 1, 1]))[0][0] == 0
     with pytest.raises(scenes.SceneError, match="not positive"):
@@ -400,6 +410,20 @@ def test_window_cancels(slicer, empty_case):
     widget.cancel_button.press()
     until_idle(widget)
     assert widget.log.lines[-1] == "cancelled" and widget.run_button.enabled
+
+
+def test_regions_are_enlarged_in_place(slicer, shown):
+    import Helicarm
+    widget = widget_of(Helicarm, shown[0], shown[0])
+    widget.show_button.press()
+    widget.enlarged.slots["valueChanged(int)"](20)
+    bounds = [np.diff(np.reshape(nodes_of(slicer)[name].polydata.GetBounds(), (3, 2))).max()
+              for name in ("95 % regions, 20 times as large",)]
+    widget.enlarged.slots["valueChanged(int)"](1)
+    bounds.append(np.diff(np.reshape(nodes_of(slicer)["95 % regions"].polydata.GetBounds(), (3, 2))).max())
+    assert bounds[0] > bounds[1]
+    slicer.mrmlScene.Clear()
+    widget.enlarged.slots["valueChanged(int)"](20)  # a closed scene is left alone
 
 
 def test_frame_is_chosen_by_the_models_name(slicer, shown):

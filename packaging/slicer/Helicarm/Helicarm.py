@@ -45,6 +45,10 @@ class HelicarmWidget(ScriptedLoadableModuleWidget):
         self.frame = qt.QComboBox()
         self.frame.toolTip = "Slicer's world: the calibrator's frame, or a registered model's own (its CT's patient frame)"
         self.form.addRow("Frame", self.frame)
+        self.enlarged = qt.QSpinBox()
+        self.enlarged.setRange(1, 1000)
+        self.enlarged.toolTip = "Draw the 95 % regions this many times as large: most are smaller than a point's glyph"
+        self.form.addRow("Enlarge regions", self.enlarged)
         self.run_button = self._button("Measure", "Measure the case, then show the result", self.on_run)
         self.show_button = self._button("Show", "Show the result of an earlier measurement", self.on_show)
         self.cancel_button = self._button("Cancel", "Stop the measurement", self.on_cancel)
@@ -55,6 +59,7 @@ class HelicarmWidget(ScriptedLoadableModuleWidget):
         for widget in (self.bar, self.log):
             self.layout.addWidget(widget)
         self.frame.connect("activated(int)", self.on_frame)
+        self.enlarged.connect("valueChanged(int)", self.on_enlarge)
         self.timer = qt.QTimer()
         self.timer.setInterval(self.POLL_MS)
         self.timer.connect("timeout()", self.on_timer)
@@ -129,6 +134,7 @@ class HelicarmWidget(ScriptedLoadableModuleWidget):
         try:
             scene = scenes.read_scene(*self._folders())
             self.logic.show(scene)
+            self.logic.enlarge(self.enlarged.value)
         except scenes.SceneError as error:
             slicer.util.errorDisplay(str(error))
             return
@@ -142,6 +148,9 @@ class HelicarmWidget(ScriptedLoadableModuleWidget):
     def on_frame(self, index):
         self.logic.set_frame(self.frame.currentText if index > 0 else None)
 
+    def on_enlarge(self, times):
+        self.logic.enlarge(times)
+
 
 class HelicarmLogic(ScriptedLoadableModuleLogic):
     """Shows one scene at a time; `show` removes what the last call added."""
@@ -149,6 +158,7 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
     def __init__(self):
         ScriptedLoadableModuleLogic.__init__(self)
         self.scene, self.nodes, self.root, self.folder = None, [], None, None
+        self.regions = None
         self.readers = []  # of the textures: a display node does not keep them
 
     def measure(self, case_folder, result_folder, program=""):
@@ -191,7 +201,7 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
                 slicer.mrmlScene.RemoveNode(node)
         if is_open:
             slicer.mrmlScene.GetSubjectHierarchyNode().RemoveItem(self.folder)
-        self.scene, self.nodes, self.root, self.folder, self.readers = None, [], None, None, []
+        self.scene, self.nodes, self.root, self.folder, self.regions, self.readers = None, [], None, None, None, []
 
     def _keep(self, node, parent):
         self.nodes.append(node)
@@ -243,15 +253,18 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
             index = node.AddControlPoint(list(scenes.ras_from_lps(point.xyz_mm)), point.name)
             if point.error_95_mm is not None:
                 node.SetNthControlPointDescription(index, f"95 %: {point.error_95_mm:.2f} mm")
-        meshes = [scenes.ellipsoid_mesh(point.xyz_mm, point.covariance_mm2) for point in points
-                  if point.covariance_mm2 is not None]
-        if meshes:
-            first = np.cumsum([0] + [len(corners) for corners, _ in meshes])
-            corners = np.vstack([corners for corners, _ in meshes])
-            triangles = np.vstack([triangles + start for (_, triangles), start in zip(meshes, first)])
-            display = self._model("95 % regions", _polydata(corners, triangles=triangles)).GetDisplayNode()
-            display.SetColor(0.2, 0.7, 1.0)
-            display.SetOpacity(0.5)
+        mesh = scenes.regions_mesh(points)
+        if mesh:
+            self.regions = self._model("95 % regions", _polydata(mesh[0], triangles=mesh[1]))
+            self.regions.GetDisplayNode().SetColor(0.2, 0.7, 1.0)
+            self.regions.GetDisplayNode().SetOpacity(0.5)
+
+    def enlarge(self, times):
+        """Draws the regions larger about their points; the node's name says so."""
+        if self.regions is not None and slicer.mrmlScene.IsNodePresent(self.regions):
+            corners, triangles = scenes.regions_mesh(self.scene.points, times)
+            self.regions.SetAndObservePolyData(_polydata(corners, triangles=triangles))
+            self.regions.SetName("95 % regions" if times == 1 else f"95 % regions, {times} times as large")
 
     def _show_camera(self, view):
         self._transform(f"{self.scene.frame}_from_{view.name}", scenes.ras_transform(np.linalg.inv(view.camera_from_world)), self.root)

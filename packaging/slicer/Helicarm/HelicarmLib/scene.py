@@ -125,9 +125,10 @@ def ellipsoid_axes(covariance_mm2, probability=0.95):
     return np.sqrt(chi_square_quantile_3(probability) * np.clip(variances, 0, None)), directions
 
 
-def ellipsoid_mesh(centre_mm, covariance_mm2, probability=0.95, rings=12, sectors=24):
-    """Corners (n, 3) and triangles (m, 3), outward, of the region's surface."""
+def ellipsoid_mesh(centre_mm, covariance_mm2, probability=0.95, enlarged=1, rings=12, sectors=24):
+    """Corners (n, 3) and triangles (m, 3), outward, of the region's surface, `enlarged` times about its centre."""
     semi_axes, directions = ellipsoid_axes(covariance_mm2, probability)
+    semi_axes = enlarged * semi_axes
     polar = np.pi * np.arange(1, rings) / rings
     azimuth = 2 * np.pi * np.arange(sectors) / sectors
     rim = np.stack([np.outer(np.sin(polar), np.cos(azimuth)), np.outer(np.sin(polar), np.sin(azimuth)),
@@ -143,6 +144,17 @@ def ellipsoid_mesh(centre_mm, covariance_mm2, probability=0.95, rings=12, sector
             triangles += [(a, a + sectors, b), (b, a + sectors, b + sectors)]
         triangles.append((last, last - sectors + following, last - sectors + sector))
     return np.asarray(centre_mm, float) + (sphere * semi_axes) @ directions.T, np.array(triangles)
+
+
+def regions_mesh(points, enlarged=1):
+    """`ellipsoid_mesh` of all points that have a covariance, in one; None where none has."""
+    meshes = [ellipsoid_mesh(point.xyz_mm, point.covariance_mm2, enlarged=enlarged) for point in points
+              if point.covariance_mm2 is not None]
+    if not meshes:
+        return None
+    first = np.cumsum([0] + [len(corners) for corners, _ in meshes])
+    return (np.vstack([corners for corners, _ in meshes]),
+            np.vstack([triangles + start for (_, triangles), start in zip(meshes, first)]))
 
 
 # ---- cameras ----
