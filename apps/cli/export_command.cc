@@ -11,7 +11,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/exports.h"
-#include "run_command.h"
+#include "measuring.h"
 
 namespace helicarm::cli {
 

@@ -25,7 +25,7 @@
 #include "helicarm/phantom/plate.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "line_input.h"
-#include "run_command.h"
+#include "measuring.h"
 #include "touch_points.h"
 
 namespace helicarm::cli {

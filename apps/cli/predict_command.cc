@@ -20,7 +20,7 @@
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/tre_figure.h"
-#include "run_command.h"
+#include "measuring.h"
 
 namespace helicarm::cli {
 

@@ -27,7 +27,7 @@
 #include "helicarm/xray/write_dicom.h"
 #include "image_files.h"
 #include "named_files.h"
-#include "run_command.h"
+#include "measuring.h"
 
 namespace helicarm::cli {
 

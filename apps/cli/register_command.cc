@@ -17,7 +17,7 @@
 #include "interruption.h"
 #include "progress_line.h"
 #include "resumed_sequence.h"
-#include "run_command.h"
+#include "measuring.h"
 
 namespace helicarm::cli {
 

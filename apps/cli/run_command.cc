@@ -1,139 +1,178 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_command.h"
 
-#include <cmath>
+#include <algorithm>
+#include <optional>
 
 #include <fmt/format.h>
 
-#include "findings.h"
-#include "helicarm/calibration/c_arm_history_file.h"
-#include "helicarm/pipeline/c_arm.h"
-#include "helicarm/pipeline/case.h"
-#include "helicarm/pipeline/map_cache.h"
+#include "command_line.h"
+#include "distinct_names.h"
+#include "helicarm/case_registration/register_fields.h"
+#include "helicarm/core/csv.h"
+#include "helicarm/core/earlier_files.h"
+#include "helicarm/core/files.h"
+#include "helicarm/localization/error_bound.h"
+#include "helicarm/pipeline/result.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/earlier_results.h"
-#include "helicarm/report/report.h"
-#include "result_text.h"
 
 namespace helicarm::cli {
 namespace {
 
-using case_registration::Measurement;
+namespace fs = std::filesystem;
 
-/// Adds each image once; nothing if the residuals are inconsistent with the noise model or the views
-/// contradict the history.
-Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pipeline::Result& result,
-                                    Console& console) {
-  const auto growth = pipeline::add_to_record(path, result);
-  if (!growth) return tl::unexpected<Failure>(growth.error());
-  if (!console.quiet)
-    console.progress << (result.calibration->variance_scale > 1
-                             ? fmt::format(
-                                   "helicarm: {}: not added to the C-arm history: residuals are {:.2g} times "
-                                   "the noise model\n",
-                                   path.string(), std::sqrt(result.calibration->variance_scale))
-                             : fmt::format("helicarm: {}: {} earlier acquisitions, {} added\n", path.string(),
-                                           growth->earlier, growth->added));
-  return {};
+/// A line of summary.csv.
+struct CaseSummary {
+  std::string name;
+  std::optional<Failure> failure;
+  std::size_t points = 0, located = 0, warnings = 0;
+  std::optional<double> worst_error_mm, fre_mm, tre_mm;
+};
+
+CaseSummary summary_of(const std::string& name, const Expected<case_registration::Measurement>& measured) {
+  CaseSummary summary;
+  summary.name = name;
+  const pipeline::Result* result = measured ? &measured->result : nullptr;
+  summary.failure = result ? result->failure : measured.error();
+  if (summary.failure && !summary.failure->view.empty())
+    summary.failure->message = summary.failure->view + ": " + summary.failure->message;
+  if (!result) return summary;
+  summary.warnings = result->warnings.size();
+  summary.points = result->points.size();
+  for (const pipeline::PointResult& point : result->points)
+    if (point.place) {
+      ++summary.located;
+      summary.worst_error_mm = std::max(summary.worst_error_mm.value_or(0),
+                                        localization::length_at_95(point.place->covariance_in_calibrator));
+    }
+  if (result->accuracy.fre_mm.n > 0) summary.fre_mm = result->accuracy.fre_mm.mean;
+  if (result->accuracy.tre_mm.n > 0) summary.tre_mm = result->accuracy.tre_mm.mean;
+  return summary;
 }
 
-/// A case whose description excludes an answer (a flat calibrator, for example) is refused like any other.
-Expected<Measurement> measurement_of(const std::filesystem::path& folder,
-                                     const case_registration::RegisterOptions& options,
-                                     const case_registration::Progress& progress) {
-  const auto given = pipeline::read_case(folder);
-  if (given) return case_registration::measure_case(*given, options, progress);
-  if (exit_code(given.error().reason) == 2) return tl::unexpected<Failure>(given.error());
-  Measurement refused;
-  refused.result.options = options.run;
-  refused.result.failure = given.error();
-  return refused;
+std::string_view status_of(const CaseSummary& summary) {
+  if (!summary.failure) return "ok";
+  return exit_code(summary.failure->reason) == 2 ? "failed" : "refused";
+}
+
+std::string csv_of(const std::vector<CaseSummary>& cases) {
+  const auto number = [](const std::optional<double>& value) {
+    return value ? fmt::format("{:.4f}", *value) : std::string();
+  };
+  std::string csv =
+      "case,status,code,message,points,located,worst_error_95_mm,fre_mean_mm,tre_mean_mm,warnings\n";
+  for (const CaseSummary& c : cases)
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(c.name), status_of(c),
+                       c.failure ? code(c.failure->reason) : "",
+                       c.failure ? csv_field(c.failure->message) : "", c.points, c.located,
+                       number(c.worst_error_mm), number(c.fre_mm), number(c.tre_mm), c.warnings);
+  return csv;
+}
+
+/// What went wrong with the cases, by the gravest of them.
+Failure gravest(const std::vector<CaseSummary>& cases, const fs::path& csv) {
+  std::size_t failed = 0;
+  const CaseSummary* worst = nullptr;
+  for (const CaseSummary& c : cases) {
+    if (!c.failure) continue;
+    ++failed;
+    if (!worst || exit_code(c.failure->reason) < exit_code(worst->failure->reason)) worst = &c;
+  }
+  Failure failure = *worst->failure;
+  failure.view.clear();
+  failure.message = fmt::format("{} of {} cases give no result, {} for example: {} ({} lists all)", failed,
+                                cases.size(), worst->name, failure.message, csv.string());
+  failure.figures = {{"cases", double(cases.size())}, {"without_result", double(failed)}};
+  return failure;
+}
+
+/// Results of an earlier run of several cases in this folder, by its summary.
+void forget_earlier(const fs::path& out) {
+  std::error_code ignored;
+  const auto summary = read_csv(out / "summary.csv", {"case"},
+                                {"status", "code", "message", "points", "located", "worst_error_95_mm",
+                                 "fre_mean_mm", "tre_mean_mm", "warnings"});
+  if (summary)
+    for (std::size_t row = 0; row < summary->rows(); ++row) {
+      const fs::path name = summary->text(row, "case");
+      if (name.empty() || name != name.filename() || name == "." || name == "..") continue;
+      report::forget_results(out / name);
+      if (fs::is_directory(out / name, ignored) && fs::is_empty(out / name, ignored))
+        fs::remove(out / name, ignored);
+    }
+  forget_files(out, {"summary.csv"});
+}
+
+CommandResult run_several(const RunCasesArguments& arguments, Console& console) {
+  const std::vector<std::string> names = names_of(arguments.cases);
+  const fs::path csv = arguments.run.out / "summary.csv";
+  std::vector<CaseSummary> done;
+  forget_earlier(arguments.run.out);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    RunArguments run = arguments.run;
+    run.folder = arguments.cases[i];
+    run.out = arguments.run.out / names[i];
+    Console silent = console;
+    silent.quiet = true;
+    done.push_back(summary_of(names[i], run_and_write(run, silent)));
+    const CaseSummary& c = done.back();
+    if (auto written = write_file(csv, csv_of(done)); !written) return written;
+    if (console.quiet) continue;
+    console.progress << fmt::format(
+        "[{}/{}] {}: {}\n", i + 1, names.size(), c.name,
+        c.failure       ? fmt::format("{}: {}", code(c.failure->reason), c.failure->message)
+        : c.points == 0 ? fmt::format("calibrated, no points, {} warnings", c.warnings)
+                        : fmt::format("{} of {} points, 95 % error up to {:.3f} mm, {} warnings", c.located,
+                                      c.points, c.worst_error_mm.value_or(0), c.warnings));
+  }
+  if (std::ranges::any_of(done, [](const CaseSummary& c) { return c.failure.has_value(); }))
+    return tl::unexpected<Failure>(gravest(done, csv));
+  if (console.json)
+    console.out << to_text(Json{{"cases", done.size()}, {"summary", csv.string()}}) << '\n';
+  else if (!console.quiet)
+    console.out << fmt::format("\n  {} cases, written to {}\n", done.size(), csv.string());
+  return {};
 }
 
 }  // namespace
 
-void add_run_options(CLI::App* command, RunArguments& arguments, const char* machine_help) {
-  add_fields(command, arguments.options.run, pipeline::run_fields);
-  command->add_option("--machine", arguments.history, machine_help);
-  auto* cache = command->add_option("--cache", arguments.cache,
-                                    "Folder that keeps the distortion maps of plate images (default: "
-                                    "helicarm in the user's cache folder)");
-  command->add_flag("--no-cache", arguments.no_cache, "Fit the maps of plate images anew, and keep none")
-      ->excludes(cache);
-}
-
-Expected<std::optional<calibration::CArmHistory>> history_at(
-    const std::optional<std::filesystem::path>& path) {
-  if (!path) return std::optional<calibration::CArmHistory>();
-  return calibration::history_at(*path).map(
-      [](calibration::CArmHistory history) { return std::optional(std::move(history)); });
-}
-
-Expected<rectification::Method> method_named(const std::string& name) {
-  if (name == "best") return rectification::Method::best;
-  if (name == "paper") return rectification::Method::paper;
-  return fail(Reason::usage, fmt::format("--method: \"{}\" is none of: best, paper", name));
-}
-
-Expected<case_registration::RegisterOptions> options_of(const RunArguments& arguments, Console& console) {
-  return history_at(arguments.history).map([&](std::optional<calibration::CArmHistory> history) {
-    case_registration::RegisterOptions options = arguments.options;
-    options.run.threads = console.threads;
-    options.run.history = std::move(history);
-    if (!arguments.no_cache)
-      options.run.cache = arguments.cache ? arguments.cache : pipeline::user_cache_folder();
-    return options;
-  });
-}
-
-Expected<Measurement> measure(const RunArguments& arguments, Console& console) {
-  return options_of(arguments, console)
-      .and_then([&](const case_registration::RegisterOptions& options) {
-        case_registration::Progress progress;
-        if (!console.quiet)
-          progress.step = [&](const std::string& model, std::string_view step) {
-            if (!model.empty()) console.progress << fmt::format("helicarm: {}: {}\n", model, step);
-          };
-        return measurement_of(arguments.folder, options, progress);
-      })
-      .map([&](Measurement measured) {
-        print_warnings(measured.result.warnings, console);
-        print_notes(measured.result.notes, console);
-        return measured;
-      });
-}
-
-Expected<Measurement> run_and_write(const RunArguments& arguments, Console& console) {
-  return guarded([&] {
-    report::forget_results(arguments.out);
-    if (arguments.history) value_or_throw(calibration::check_history_file(*arguments.history));
-    Measurement measured = value_or_throw(measure(arguments, console));
-    value_or_throw(case_registration::write_models(measured.registration, arguments.out));
-    value_or_throw(report::write_result(measured.result, arguments.out, !arguments.no_report));
-    if (arguments.history && !measured.result.failure)
-      value_or_throw(add_to_c_arm_history(*arguments.history, measured.result, console));
-    return measured;
-  });
-}
-
-CommandResult run_command(const RunArguments& arguments, Console& console) {
-  const auto measured = run_and_write(arguments, console);
-  if (!measured) return tl::unexpected<Failure>(measured.error());
-  const pipeline::Result& result = measured->result;
-  if (result.failure) {
-    if (!console.quiet)
-      print_advice(result, arguments.no_report ? "" : (arguments.out / "report.html").string(),
-                   console.progress);
-    return tl::unexpected<Failure>(*result.failure);
+std::vector<std::string> names_of(const std::vector<fs::path>& cases) {
+  std::vector<std::string> names;
+  for (const fs::path& given : cases) {
+    const fs::path whole = fs::absolute(given).lexically_normal();
+    const bool is_folder = whole.has_filename() && whole.extension() != ".json";
+    const std::string name = (is_folder ? whole : whole.parent_path()).filename().string();
+    names.push_back(name.empty() ? "case" : name);
   }
-  if (console.json)
-    console.out << to_text(pipeline::to_json(result)) << '\n';
-  else if (!console.quiet) {
-    console.out << summary_of(result);
-    if (measured->registration) console.out << "\n  models\n" << summary_of(*measured->registration);
-    console.out << fmt::format("\n  written to {}\n", arguments.out.string());
-  }
-  return {};
+  return distinct(names);
+}
+
+CommandResult run_command(const RunCasesArguments& arguments, Console& console) {
+  if (arguments.cases.size() > 1) return run_several(arguments, console);
+  RunArguments run = arguments.run;
+  run.folder = arguments.cases.front();
+  return run_one_case(run, console);
+}
+
+void add_run(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, group::measure, "run",
+      "Measure a case: cameras with covariances from X-ray images, and from two or more points and tunnels",
+      "helicarm run my-case --out my-result\n"
+      "  helicarm run study/* --out results    each case in results/NAME, all in results/summary.csv");
+  auto& [cases, a] = arguments_of(command, action, run_command);
+  command->add_option("CASE", cases, "Folder that holds case.json; several are run one after the other")
+      ->required();
+  command
+      ->add_option("--out", a.out,
+                   "Folder for result.json, report.html and the overlays; with several cases for a folder of "
+                   "each and summary.csv")
+      ->capture_default_str();
+  add_run_options(command, a,
+                  "The C-arm's history (JSON): used as prior; this case's acquisitions are added");
+  add_fields(command, a.options.search, case_registration::search_fields);
+  command->add_flag("--no-report", a.no_report, "Write result.json only");
 }
 
 }  // namespace helicarm::cli

@@ -2,49 +2,24 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
+#include <vector>
 
-#include "command_line.h"
-#include "helicarm/case_registration/measure_case.h"
+#include "measuring.h"
 
 namespace helicarm::cli {
 
-struct RunArguments {
-  std::filesystem::path folder;  ///< holds case.json
-  std::filesystem::path out = "helicarm-result";
-  case_registration::RegisterOptions options = {};  ///< threads and C-arm history are filled in
-  bool no_report = false;  ///< only result.json, and registration.json with its report
-  std::optional<std::filesystem::path> history = {};  ///< the C-arm's history: read and extended
-  std::optional<std::filesystem::path> cache = {};    ///< of plate images' maps; nothing: the user's
-  bool no_cache = false;
+struct RunCasesArguments {
+  std::vector<std::filesystem::path> cases;  ///< folders that hold case.json, or case files
+  RunArguments run = {};                     ///< without its folder
 };
 
-/// `run_fields`, --machine, --cache and --no-cache.
-void add_run_options(CLI::App* command, RunArguments& arguments, const char* machine_help);
+/// Measures one case as `run_one_case`. Of several, each writes to a folder of its own under `run.out`, and
+/// summary.csv there has a line for each, written anew after each case. A refused or unusable case does not
+/// stop the others; the command then fails with `Reason::cases_failed`.
+CommandResult run_command(const RunCasesArguments& arguments, Console& console);
 
-/// Measures a case and writes result.json, report.html and NAME_overlay.png; of a case with models also
-/// `case_registration::write_models`. A refusal also writes them and then fails with its reason; unusable
-/// input leaves no result.json.
-CommandResult run_command(const RunArguments& arguments, Console& console);
-
-/// Only measures the case, with its findings on `console.progress`; a refusal is in the result.
-Expected<case_registration::Measurement> measure(const RunArguments& arguments, Console& console);
-
-/// As `run_command`, and returns the measurement; prints nothing to `console.out`.
-Expected<case_registration::Measurement> run_and_write(const RunArguments& arguments, Console& console);
-
-/// A C-arm's history from the named file; empty if the file does not exist or none is named.
-Expected<std::optional<calibration::CArmHistory>> history_at(
-    const std::optional<std::filesystem::path>& path);
-
-/// The arguments' options with threads and C-arm history.
-Expected<case_registration::RegisterOptions> options_of(const RunArguments& arguments, Console& console);
-
-/// "best" or "paper"; usage otherwise.
-Expected<rectification::Method> method_named(const std::string& name);
-
-/// Decision, pose, agreement and plan points of each model, for a terminal.
-std::string summary_of(const case_registration::CaseRegistration& registration);
+/// A different name for each case: that of its folder, numbered where it repeats.
+std::vector<std::string> names_of(const std::vector<std::filesystem::path>& cases);
 
 }  // namespace helicarm::cli

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "measuring.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "findings.h"
+#include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/pipeline/c_arm.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/map_cache.h"
+#include "helicarm/pipeline/run_fields.h"
+#include "helicarm/report/earlier_results.h"
+#include "helicarm/report/report.h"
+#include "result_text.h"
+
+namespace helicarm::cli {
+namespace {
+
+using case_registration::Measurement;
+
+/// Adds each image once; nothing if the residuals are inconsistent with the noise model or the views
+/// contradict the history.
+Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pipeline::Result& result,
+                                    Console& console) {
+  const auto growth = pipeline::add_to_record(path, result);
+  if (!growth) return tl::unexpected<Failure>(growth.error());
+  if (!console.quiet)
+    console.progress << (result.calibration->variance_scale > 1
+                             ? fmt::format(
+                                   "helicarm: {}: not added to the C-arm history: residuals are {:.2g} times "
+                                   "the noise model\n",
+                                   path.string(), std::sqrt(result.calibration->variance_scale))
+                             : fmt::format("helicarm: {}: {} earlier acquisitions, {} added\n", path.string(),
+                                           growth->earlier, growth->added));
+  return {};
+}
+
+/// A case whose description excludes an answer (a flat calibrator, for example) is refused like any other.
+Expected<Measurement> measurement_of(const std::filesystem::path& folder,
+                                     const case_registration::RegisterOptions& options,
+                                     const case_registration::Progress& progress) {
+  const auto given = pipeline::read_case(folder);
+  if (given) return case_registration::measure_case(*given, options, progress);
+  if (exit_code(given.error().reason) == 2) return tl::unexpected<Failure>(given.error());
+  Measurement refused;
+  refused.result.options = options.run;
+  refused.result.failure = given.error();
+  return refused;
+}
+
+}  // namespace
+
+void add_run_options(CLI::App* command, RunArguments& arguments, const char* machine_help) {
+  add_fields(command, arguments.options.run, pipeline::run_fields);
+  command->add_option("--machine", arguments.history, machine_help);
+  auto* cache = command->add_option("--cache", arguments.cache,
+                                    "Folder that keeps the distortion maps of plate images (default: "
+                                    "helicarm in the user's cache folder)");
+  command->add_flag("--no-cache", arguments.no_cache, "Fit the maps of plate images anew, and keep none")
+      ->excludes(cache);
+}
+
+Expected<std::optional<calibration::CArmHistory>> history_at(
+    const std::optional<std::filesystem::path>& path) {
+  if (!path) return std::optional<calibration::CArmHistory>();
+  return calibration::history_at(*path).map(
+      [](calibration::CArmHistory history) { return std::optional(std::move(history)); });
+}
+
+Expected<rectification::Method> method_named(const std::string& name) {
+  if (name == "best") return rectification::Method::best;
+  if (name == "paper") return rectification::Method::paper;
+  return fail(Reason::usage, fmt::format("--method: \"{}\" is none of: best, paper", name));
+}
+
+Expected<case_registration::RegisterOptions> options_of(const RunArguments& arguments, Console& console) {
+  return history_at(arguments.history).map([&](std::optional<calibration::CArmHistory> history) {
+    case_registration::RegisterOptions options = arguments.options;
+    options.run.threads = console.threads;
+    options.run.history = std::move(history);
+    if (!arguments.no_cache)
+      options.run.cache = arguments.cache ? arguments.cache : pipeline::user_cache_folder();
+    return options;
+  });
+}
+
+Expected<Measurement> measure(const RunArguments& arguments, Console& console) {
+  return options_of(arguments, console)
+      .and_then([&](const case_registration::RegisterOptions& options) {
+        case_registration::Progress progress;
+        if (!console.quiet)
+          progress.step = [&](const std::string& model, std::string_view step) {
+            if (!model.empty()) console.progress << fmt::format("helicarm: {}: {}\n", model, step);
+          };
+        return measurement_of(arguments.folder, options, progress);
+      })
+      .map([&](Measurement measured) {
+        print_warnings(measured.result.warnings, console);
+        print_notes(measured.result.notes, console);
+        return measured;
+      });
+}
+
+Expected<Measurement> run_and_write(const RunArguments& arguments, Console& console) {
+  return guarded([&] {
+    report::forget_results(arguments.out);
+    if (arguments.history) value_or_throw(calibration::check_history_file(*arguments.history));
+    Measurement measured = value_or_throw(measure(arguments, console));
+    value_or_throw(case_registration::write_models(measured.registration, arguments.out));
+    value_or_throw(report::write_result(measured.result, arguments.out, !arguments.no_report));
+    if (arguments.history && !measured.result.failure)
+      value_or_throw(add_to_c_arm_history(*arguments.history, measured.result, console));
+    return measured;
+  });
+}
+
+CommandResult run_one_case(const RunArguments& arguments, Console& console) {
+  const auto measured = run_and_write(arguments, console);
+  if (!measured) return tl::unexpected<Failure>(measured.error());
+  const pipeline::Result& result = measured->result;
+  if (result.failure) {
+    if (!console.quiet)
+      print_advice(result, arguments.no_report ? "" : (arguments.out / "report.html").string(),
+                   console.progress);
+    return tl::unexpected<Failure>(*result.failure);
+  }
+  if (console.json)
+    console.out << to_text(pipeline::to_json(result)) << '\n';
+  else if (!console.quiet) {
+    console.out << summary_of(result);
+    if (measured->registration) console.out << "\n  models\n" << summary_of(*measured->registration);
+    console.out << fmt::format("\n  written to {}\n", arguments.out.string());
+  }
+  return {};
+}
+
+}  // namespace helicarm::cli
