@@ -37,6 +37,9 @@ std::vector<calibration::HistoryEntry> acquisitions_of(const std::filesystem::pa
 CommandResult c_arm_add_command(const CArmAddArguments& arguments, Console& console) {
   return guarded([&] {
     value_or_throw(calibration::check_history_file(arguments.record));
+    for (const std::filesystem::path& folder : arguments.cases)  // before anything is added
+      if (!std::filesystem::exists(folder))
+        throw BadInput(Reason::missing_file, fmt::format("{}: no such file or folder", folder.string()));
     Json added = Json::array();
     for (const std::filesystem::path& folder : arguments.cases) {
       const auto growth =

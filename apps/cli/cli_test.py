@@ -35,6 +35,10 @@ class CommandLine(SimulatedCase):
         other = self.root / "other"
         self.assertEqual(run("simulate", other, "--seed", 9, "--size", 512).returncode, 0)
         self.assertEqual(run("c-arm", "report", record, "--out", self.root / "arm").returncode, 2)  # no file yet
+        missing = run("c-arm", "add", record, other, self.root / "nowhere")
+        self.assertEqual(missing.returncode, 2)
+        self.assertIn("nowhere", missing.stderr)
+        self.assertFalse(record.exists())  # nothing is added before all are found
         done = run("c-arm", "add", record, other, "--json")
         self.assertEqual(json.loads(done.stdout)["added"][0]["added"], 2, done.stderr)
         self.assertEqual(run("c-arm", "check", record, other).returncode, 3)  # only its own acquisitions
