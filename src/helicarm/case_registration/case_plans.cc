@@ -6,8 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/core/csv.h"
-
 namespace helicarm::case_registration {
 namespace {
 
@@ -21,14 +19,9 @@ constexpr double same_place_mm = 1;  // of a landmark and a planned point, as tw
 /// Whether the model's landmarks hold the point.
 bool is_landmark(const pipeline::CaseModel& model, const PlanPoint& point) {
   if (!model.landmarks) return false;
-  const CsvTable table = value_or_throw(read_csv(*model.landmarks, {"name", "x_mm", "y_mm", "z_mm"}, {}));
-  for (std::size_t row = 0; row < table.rows(); ++row)
-    if (table.text(row, "name") == point.name)
-      return (Eigen::Vector3d(table.number(row, "x_mm"), table.number(row, "y_mm"),
-                              table.number(row, "z_mm")) -
-              point.in_model)
-                 .norm() < same_place_mm;
-  return false;
+  const std::vector<PlanPoint> landmarks = read_landmarks(*model.landmarks);
+  const auto same = std::ranges::find(landmarks, point.name, &PlanPoint::name);
+  return same != landmarks.end() && (same->in_model - point.in_model).norm() < same_place_mm;
 }
 
 void check_points(const Plan& plan, const pipeline::Case& given, const pipeline::CaseModel& model) {

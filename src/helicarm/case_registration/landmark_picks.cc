@@ -8,7 +8,6 @@
 
 #include "helicarm/calibration/centred_view.h"
 #include "helicarm/case_registration/plan.h"
-#include "helicarm/core/csv.h"
 #include "helicarm/geometry/triangulation.h"
 
 namespace helicarm::case_registration {
@@ -127,17 +126,9 @@ std::vector<registration::Landmark> picked_landmarks(const pipeline::CaseModel& 
                                                      const std::vector<RegistrationView>& views) {
   const std::filesystem::path& path = *asked.landmarks;
   std::string missing;
-  refuse_fcsv(path);
-  const CsvTable table = value_or_throw(read_csv(path, {"name", "x_mm", "y_mm", "z_mm"}, {}));
   std::vector<PickedRays> picked;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string name = table.text(row, "name");
-    if (std::ranges::find(picked, name, &PickedRays::name) != picked.end())
-      throw BadInput(Reason::name_clash,
-                     fmt::format("{}: landmark \"{}\" is given twice", path.filename().string(), name));
-    PickedRays rays = rays_of(
-        name, Vector3d(table.number(row, "x_mm"), table.number(row, "y_mm"), table.number(row, "z_mm")),
-        given, loaded, views);
+  for (const auto& [name, in_model] : read_landmarks(path)) {
+    PickedRays rays = rays_of(name, in_model, given, loaded, views);
     if (rays.rays.size() >= 2)
       picked.push_back(std::move(rays));
     else

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/case_registration/fcsv.h"
+#include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
@@ -18,6 +20,14 @@ using Eigen::Vector3d;
 
 constexpr std::size_t most_points = 10000;
 constexpr double farthest_mm = 10000;
+constexpr std::uintmax_t most_plan_bytes = 64u << 20;
+
+void check_place(const PlanPoint& point, const std::string& where) {
+  if (const Vector3d& at = point.in_model; !(at.cwiseAbs().maxCoeff() <= farthest_mm))
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: \"{}\" at ({:g}, {:g}, {:g}) mm, must lie within {:g} mm", where,
+                               point.name, at.x(), at.y(), at.z(), farthest_mm));
+}
 
 /// Slicer's files hold many display settings: only what is used is read, and other keys are allowed.
 class Markup {
@@ -40,9 +50,7 @@ class Markup {
       const Markup point(entry, where_ + ": controlPoints");
       if (point.text("positionStatus", "defined") != "defined") continue;
       points.push_back({point.text("label", ""), point.position().cwiseProduct(to_lps)});
-      if (const Vector3d& at = points.back().in_model; !(at.cwiseAbs().maxCoeff() <= farthest_mm))
-        refuse(fmt::format("\"{}\" at ({:g}, {:g}, {:g}) mm, must lie within {:g} mm", points.back().name,
-                           at.x(), at.y(), at.z(), farthest_mm));
+      check_place(points.back(), where_);
     }
     return points;
   }
@@ -85,23 +93,30 @@ void add_point(Plan& plan, PlanPoint point, const std::string& where) {
   plan.points.push_back(std::move(point));
 }
 
-}  // namespace
-
-void refuse_fcsv(const std::filesystem::path& path) {
-  const auto bytes = read_file(path, std::uintmax_t{1} << 20);
-  if (path.extension() == ".fcsv" || (bytes && bytes->starts_with("# Markups fiducial file")))
-    throw BadInput(
-        Reason::unsupported,
-        fmt::format("{}: Slicer's old list of fiducials (.fcsv) is not read: open it in 3D Slicer; "
-                    "save a plan as markups (.mrk.json), landmarks as a CSV of name,x_mm,y_mm,z_mm",
-                    path.filename().string()));
+Plan plan_of_fcsv(std::string_view bytes, const std::string& origin) {
+  Plan plan;
+  const std::string stem = origin.substr(0, origin.find('.'));
+  for (PlanPoint& point : fcsv_points(bytes, origin)) {
+    if (point.name.empty()) point.name = fmt::format("{}-{}", stem, plan.points.size() + 1);
+    check_place(point, origin);
+    add_point(plan, std::move(point), origin);
+  }
+  return plan;
 }
+
+bool is_json(std::string_view bytes) {
+  const std::size_t first = bytes.find_first_not_of("\xEF\xBB\xBF \t\r\n");
+  return first != std::string_view::npos && bytes[first] == '{';
+}
+
+}  // namespace
 
 Expected<Plan> read_plan(const std::filesystem::path& path) {
   return guarded([&] {
     const std::string origin = path.filename().string();
-    refuse_fcsv(path);
-    const Json json = value_or_throw(read_json(path));
+    const std::string bytes = value_or_throw(read_file(path, most_plan_bytes));
+    if (is_fcsv(path, bytes)) return plan_of_fcsv(bytes, origin);
+    const Json json = value_or_throw(parse_json(bytes, origin));
     if (!json.is_object() || !json.contains("markups") || !json["markups"].is_array())
       throw BadInput(Reason::bad_value,
                      fmt::format("{}: no list \"markups\": not a file of Slicer's markups", origin));
@@ -126,6 +141,22 @@ Expected<Plan> read_plan(const std::filesystem::path& path) {
     }
     return plan;
   });
+}
+
+std::vector<PlanPoint> read_landmarks(const std::filesystem::path& path) {
+  const std::string bytes = value_or_throw(read_file(path, most_plan_bytes));
+  if (is_fcsv(path, bytes) || is_json(bytes)) return value_or_throw(read_plan(path)).points;
+  const CsvTable table = value_or_throw(read_csv(path, {"name", "x_mm", "y_mm", "z_mm"}, {}));
+  std::vector<PlanPoint> landmarks;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string& name = table.text(row, "name");
+    if (std::ranges::find(landmarks, name, &PlanPoint::name) != landmarks.end())
+      throw BadInput(Reason::name_clash,
+                     fmt::format("{}: landmark \"{}\" is given twice", path.filename().string(), name));
+    landmarks.push_back(
+        {name, {table.number(row, "x_mm"), table.number(row, "y_mm"), table.number(row, "z_mm")}});
+  }
+  return landmarks;
 }
 
 }  // namespace helicarm::case_registration

@@ -31,12 +31,14 @@ struct Plan {
   std::vector<PlanTunnel> tunnels;
 };
 
-/// Reads 3D Slicer's markups (.mrk.json): point lists give points, lines give tunnels with points NAME_start
-/// and NAME_end; a line without a name is called as the file. RAS and LAS are converted to LPS, other units
-/// of length to mm. Fails with missing_file, bad_json, not_finite, bad_value, unsupported, name_clash.
+/// Reads 3D Slicer's markups: of a .mrk.json point lists give points, lines give tunnels with points
+/// NAME_start and NAME_end; a line without a name is called as the file. An .fcsv holds points. RAS and LAS
+/// are converted to LPS, other units of length to mm. Fails with missing_file, bad_json, not_finite,
+/// bad_value, bad_size, truncated, unsupported, name_clash.
 Expected<Plan> read_plan(const std::filesystem::path& path);
 
-/// Throws BadInput (unsupported) for Slicer's old list of fiducials (.fcsv), which is not JSON.
-void refuse_fcsv(const std::filesystem::path& path);
+/// Landmarks in a model, mm, each name once: a CSV of name,x_mm,y_mm,z_mm, or the points of Slicer's markups
+/// (.mrk.json, .fcsv). Throws BadInput: as `read_plan`, and unknown_key.
+std::vector<PlanPoint> read_landmarks(const std::filesystem::path& path);
 
 }  // namespace helicarm::case_registration

@@ -55,16 +55,6 @@ TEST(ReadPlan, CoordinateSystemsByNameAndNumber) {
   EXPECT_EQ(plan_with(R"("coordinateSystem": "scanner")").error().reason, Reason::unsupported);
 }
 
-TEST(ReadPlan, AnOldListOfFiducialsIsNamed) {
-  const TemporaryFolder folder;
-  const std::string text = "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n1,2,3\n";
-  ASSERT_TRUE(write_file(folder.path() / "F.fcsv", text));
-  const auto plan = read_plan(folder.path() / "F.fcsv");
-  ASSERT_FALSE(plan);
-  EXPECT_EQ(plan.error().reason, Reason::unsupported);
-  EXPECT_THAT(plan.error().message, testing::HasSubstr(".mrk.json"));
-}
-
 TEST(ReadPlan, APlaceOfTwoNumbersIsRefused) {
   const auto plan = plan_of(R"({"markups": [{"controlPoints": [{"position": [1, 2]}]}]})");
   ASSERT_FALSE(plan);

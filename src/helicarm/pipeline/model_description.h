@@ -53,8 +53,8 @@ void describe_start(Codec& codec, Model& model, const std::filesystem::path& fol
                           "where the registration begins, mm");
   codec.file(
       "landmarks", model.landmarks, folder,
-      "path of a CSV of points, `name,x_mm,y_mm,z_mm` in the model: three or more that are picks in two "
-      "views");
+      "path of a CSV of points, `name,x_mm,y_mm,z_mm` in the model, or of 3D Slicer's markups: three or more "
+      "that are picks in two views");
   codec.check([&](JsonReader& reader) {
     if (model.world_from_model && model.landmarks)
       reader.refuse(Reason::bad_value, "landmarks", "cannot be combined with \"world_from_model\"");
@@ -105,9 +105,11 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
                  "a pose or landmarks; absent, with two views or more: every orientation and position is "
                  "[searched](registration.md#without-a-start)",
                  [&](auto& inner, auto& start) { describe_start(inner, start, folder); });
-  codec.file("plan", model.plan, folder,
-             "path of 3D Slicer's markups (`.mrk.json`): point lists give points, lines give tunnels; "
-             "`coordinateSystem` LPS, RAS or LAS, `coordinateUnits` of length are converted");
+  codec.file(
+      "plan", model.plan, folder,
+      "path of 3D Slicer's markups: `.mrk.json` (point lists give points, lines give tunnels; "
+      "`coordinateSystem` LPS, RAS or LAS, `coordinateUnits` of length are converted) or `.fcsv` (points; "
+      "its `#` lines must state `CoordinateSystem`, LPS, RAS, LAS, 0 or 1, and `columns`)");
   codec.check([&](JsonReader& reader) {
     const auto refuse = [&](const char* key, const char* how) { reader.refuse(Reason::bad_value, key, how); };
     if (model.volume && model.surface) refuse("surface", "cannot be combined with \"volume\"");
