@@ -164,6 +164,67 @@ def pydicom_writes_series(folder, count=COUNT):
     return count, far, off
 
 
+def pydicom_writes_segmentations(folder, count=COUNT):
+    """(files, largest distance in mm, voxels that differ): DICOM segmentations of one to four segments, without empty frames."""
+    pydicom = importlib.import_module("pydicom")
+    random, far, off = np.random.default_rng(7), 0.0, 0
+    digits, Dataset, Sequence = pydicom.valuerep.format_number_as_ds, pydicom.Dataset, pydicom.Sequence
+
+    def group(**values):
+        item = Dataset()
+        for name, value in values.items():
+            setattr(item, name, value)
+        return Sequence([item])
+
+    for n in range(count):
+        datasets, shape, place, _ = ct_datasets(pydicom, random, 4 * n)  # of a gantry that is not tilted
+        labels = random.integers(0, 2 + n % 4, shape)
+        labels[:, :, 0] = labels[:, :, -1] = 1  # the whole extent, which the affine tells
+        dataset = datasets[0]
+        meta = dataset.file_meta
+        meta.MediaStorageSOPClassUID = dataset.SOPClassUID = "1.2.840.10008.5.1.4.1.1.66.4"
+        meta.TransferSyntaxUID = (pydicom.uid.ExplicitVRLittleEndian, pydicom.uid.ImplicitVRLittleEndian,
+                                  pydicom.uid.DeflatedExplicitVRLittleEndian)[n % 3]
+        dataset.is_little_endian, dataset.is_implicit_VR = True, n % 3 == 1
+        axes, spacing = dataset.ImageOrientationPatient, dataset.PixelSpacing
+        for name in ("ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "RescaleSlope", "RescaleIntercept",
+                     "RescaleType", "PixelData"):
+            delattr(dataset, name)
+        dataset.Modality, dataset.SegmentationType = "SEG", "BINARY"
+        dataset.BitsAllocated, dataset.BitsStored, dataset.HighBit, dataset.PixelRepresentation = 1, 1, 0, 0
+        dataset.SegmentSequence = Sequence([group(SegmentNumber=k, SegmentLabel=f"part {k}")[0] for k in range(1, labels.max() + 1)])
+        measures = {"PixelSpacing": spacing}
+        if n % 2:
+            measures["SpacingBetweenSlices"] = digits(float(np.linalg.norm(place[:3, 2])))
+        dataset.SharedFunctionalGroupsSequence = group(PlaneOrientationSequence=group(ImageOrientationPatient=axes),
+                                                       PixelMeasuresSequence=group(**measures))
+        frames, bits = [], []
+        for k in range(1, labels.max() + 1):
+            for z in random.permutation(shape[2]):
+                if (labels[:, :, z] == k).any():
+                    position = [digits(float(x)) for x in place[:3, 2] * z + place[:3, 3]]
+                    frames.append(group(PlanePositionSequence=group(ImagePositionPatient=position),
+                                        SegmentIdentificationSequence=group(ReferencedSegmentNumber=k))[0])
+                    bits.append((labels[:, :, z] == k).T)
+        dataset.PerFrameFunctionalGroupsSequence, dataset.NumberOfFrames = Sequence(frames), len(frames)
+        packed = pydicom.pixel_data_handlers.numpy_handler.pack_bits(np.array(bits).astype(np.uint8).ravel())
+        dataset.PixelData = packed + bytes(len(packed) % 2)
+        dataset["PixelData"].VR = "OB"
+        path = folder / f"s{n}.dcm"
+        dataset.save_as(path, write_like_original=False)
+        peer = pydicom.dcmread(path)
+        assert np.array_equal(peer.pixel_array.reshape(np.shape(bits)), bits)
+        volume = helicarm.read_volume(path)
+        flipped = volume.affine[:3, 2] @ place[:3, 2] < 0
+        expected = place.copy()
+        if flipped:
+            expected[:3, 3] += place[:3, 2] * (shape[2] - 1)
+            expected[:3, 2] *= -1
+        far = max(far, apart(shape, volume.affine, expected))
+        off = max(off, int((volume.array != (labels[:, :, ::-1] if flipped else labels)).sum()))
+    return count, far, off
+
+
 def pydicom_reads_images(folder, count=6):
     """(files, largest difference of a pixel, largest of spacing and distance in mm): simulated X-ray images."""
     pydicom = importlib.import_module("pydicom")
@@ -414,6 +475,7 @@ def is_there(package):
 JUDGES = [
     (nibabel_writes, "nibabel", "NIfTI-1 and NIfTI-2: `.nii`, pairs of `.hdr` and `.img`, each plain or `.gz`, and images in memory", "read", (0.05, 1e-6), ("mm", "of the largest voxel")),
     (pydicom_writes_series, "pydicom", "DICOM CT series, and datasets in memory", "read", (0.005, 0), ("mm", "HU")),
+    (pydicom_writes_segmentations, "pydicom", "DICOM segmentation, BINARY", "read", (0.005, 0), ("mm", "voxels")),
     (pydicom_reads_images, "pydicom", "DICOM X-ray image", "written", (0, 1e-6), ("grey values", "mm")),
     (vtk_writes, "vtk", "STL, PLY, VTP, OBJ, legacy VTK (4.2 and 5.1, strips), and `vtkPolyData` in memory", "read", (1e-3,), ("mm",)),
     (vtk_image, "vtk", "`vtkImageData` in memory", "read", (1e-9, 1e-12), ("mm", "of a voxel")),

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -75,6 +76,17 @@ volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& given,
     throw BadInput(Reason::bad_value,
                    fmt::format("models: \"{}\": \"voxel_mm\" is missing: a TIFF stack needs it", given.name));
   return value_or_throw(volume::tiff_stack(path, *given.voxel_mm, offset_hu));
+}
+
+std::string list_of_segments(const std::map<int, std::string>& segments) {
+  constexpr std::size_t most_named = 20;
+  std::string list;
+  std::size_t named = 0;
+  for (const auto& [number, label] : segments) {
+    if (named++ == most_named) return list + "; ...";
+    list += fmt::format("{} {} \"{}\"", list.empty() ? "; its segments:" : ",", number, label);
+  }
+  return list;
 }
 
 bool has_voxels_of(const volume::Volume& volume, const Eigen::Vector3d& voxel_mm) {
@@ -226,16 +238,21 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& given, const std::op
                                  given.name, given.volume->filename().string()));
     const volume::Volume volume = volume_at(*given.volume, given, given.tiff_offset_hu);
     std::optional<volume::Volume> mask;
+    std::optional<std::map<int, std::string>> segments;
     if (given.mask) {
+      segments = value_or_throw(volume::segments_in(*given.mask));
       mask = volume_at(*given.mask, given, 0);
-      value_or_throw(volume::choose_label(
+      auto chosen = volume::choose_label(
           *mask, given.mask_label,
-          fmt::format("models: \"{}\": {}", given.name, given.mask->filename().string()), "\"mask_label\""));
+          fmt::format("models: \"{}\": {}", given.name, given.mask->filename().string()), "\"mask_label\"");
+      if (!chosen && segments) chosen.error().message += list_of_segments(*segments);
+      value_or_throw(chosen);
     }
     // A stack has no frame of its own: a mask drawn on it in another program brings that program's.
     if (mask && given.voxel_mm && has_voxels_of(*mask, *given.voxel_mm))
       mask->patient_from_voxel = volume.patient_from_voxel;
-    if (mask) volume::onto_grid(*mask, volume);  // another one is refused with the model
+    // Another grid is refused with the model; a segmentation's empty slices may be missing.
+    if (mask) volume::onto_grid(*mask, volume, segments.has_value());
     std::optional<registration::HuWindow> window;
     if (given.window_hu) window = {given.window_hu->x(), given.window_hu->y()};
     registration::Model model = value_or_throw(registration::model_from(given.name, volume, mask, window));

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/case_registration/load.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/volume/write_nrrd.h"
+#include "helicarm/xray/dicom_builder.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -57,6 +59,77 @@ TEST_F(LoadLabelMap, SeveralLabelsWithoutAChoiceAreRefused) {
 TEST_F(LoadLabelMap, ALabelThatIsNotThereIsRefused) {
   model_.mask_label = 4;
   EXPECT_THAT(load_model(model_).error().message, HasSubstr("holds no label 4"));
+}
+
+/// The halves as segments 3 and 8 of a DICOM segmentation, without the slices that are empty.
+class LoadSegmentation : public LoadLabelMap {
+ protected:
+  using Builder = xray::DicomBuilder;
+
+  LoadSegmentation() { model_.mask = folder_.path() / "seg.dcm"; }
+
+  static std::string text(std::uint32_t tag, std::string value) {
+    if (value.size() % 2 != 0) value += ' ';
+    return Builder::element(tag, "DS", value, true);
+  }
+  static std::string word(std::uint32_t tag, int value) {
+    return Builder::element(tag, "US", Builder::number(value, 2), true);
+  }
+  static std::string group(std::uint32_t tag, const std::string& content) {
+    return Builder::element(tag, "SQ", Builder::item(content), true);
+  }
+
+  void write(double first_z) const {
+    std::string frames, bits(32 * 24 * 24 / 8, '\0');
+    int frame = 0;
+    for (const int segment : {3, 8})
+      for (int z = 4; z < 20; ++z, ++frame) {
+        frames +=
+            Builder::item(group(0x00209113, text(0x00200032, fmt::format("0\\0\\{}", first_z + z - 4))) +
+                          group(0x0062000A, word(0x0062000B, segment)));
+        for (int y = 4; y < 20; ++y)
+          for (int x = segment == 3 ? 4 : 12; x < (segment == 3 ? 12 : 20); ++x) {
+            const int bit = (frame * 24 + y) * 24 + x;
+            bits[std::size_t(bit / 8)] = char(bits[std::size_t(bit / 8)] | 1 << bit % 8);
+          }
+      }
+    Builder builder;
+    builder.text(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.66.4").text(0x00620001, "CS", "BINARY");
+    builder.word(0x00280010, 24).word(0x00280011, 24).word(0x00280100, 1).text(0x00280008, "IS", "32");
+    builder.raw(0x00620002, "SQ",
+                Builder::item(word(0x00620004, 3) + text(0x00620005, "Femur")) +
+                    Builder::item(word(0x00620004, 8) + text(0x00620005, "Tibia")));
+    builder.raw(0x52009229, "SQ",
+                Builder::item(group(0x00209116, text(0x00200037, "1\\0\\0\\0\\1\\0")) +
+                              group(0x00289110, text(0x00280030, "1\\1"))));
+    builder.raw(0x52009230, "SQ", frames).raw(0x7FE00010, "OB", bits);
+    EXPECT_TRUE(write_file(*model_.mask, builder.bytes()));
+  }
+};
+
+TEST_F(LoadSegmentation, TheChosenSegmentIsTheBody) {
+  write(4);
+  model_.mask_label = 3;
+  const auto loaded = load_model(model_);
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_NEAR(loaded->model->centre.x(), 7.5, 0.7);
+  model_.mask_label = 8;
+  EXPECT_NEAR(load_model(model_)->model->centre.x(), 15.5, 0.7);
+}
+
+TEST_F(LoadSegmentation, SeveralSegmentsWithoutAChoiceAreNamed) {
+  write(4);
+  const auto refused = load_model(model_);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("\"mask_label\"; its segments: 3 \"Femur\", 8 \"Tibia\""));
+}
+
+TEST_F(LoadSegmentation, OneThatLeavesTheCtIsRefused) {
+  write(10);  // to z = 25
+  model_.mask_label = 3;
+  const auto refused = load_model(model_);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::bad_value);
 }
 
 }  // namespace

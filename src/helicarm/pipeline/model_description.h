@@ -81,7 +81,8 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
       "path of a volume on the same grid; what is not 0 is the body. Of a TIFF stack: another stack, or "
       "a volume with as many voxels of `voxel_mm`");
   codec.integer("mask_label", model.mask_label, 1, volume_label_limit,
-                "label of the body where the mask is a label map; with several labels it must be given");
+                "label of the body where the mask is a label map, or the segment's number in a DICOM "
+                "segmentation; with several of them it must be given");
   codec.vector(
       "window_hu", model.window_hu, hu_range,
       "`[low, high]`: the body's voxels, within the mask if there is one. Without mask and window the "

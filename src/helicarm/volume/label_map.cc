@@ -41,7 +41,7 @@ std::optional<std::map<int, std::size_t>> labels_in(const Volume& volume) {
   return labels;
 }
 
-bool onto_grid(Volume& map, const Volume& ct) {
+bool onto_grid(Volume& map, const Volume& ct, bool may_be_part) {
   constexpr double same_place = 0.1;  // of a voxel
   const Eigen::Affine3d ct_from_map = ct.patient_from_voxel.inverse() * map.patient_from_voxel;
   const Eigen::Matrix3d turn = ct_from_map.linear().array().round().matrix();
@@ -54,13 +54,13 @@ bool onto_grid(Volume& map, const Volume& ct) {
     const Eigen::Vector3d at = last.cwiseProduct(Eigen::Vector3d(corner & 1, corner >> 1 & 1, corner >> 2));
     if (!((ct_from_map * at - (turn * at + first)).cwiseAbs().maxCoeff() < same_place)) return false;
   }
-  // Of the first and the last voxel, which must be corners of the CT.
-  const Eigen::Vector3d a = first, b = turn * last + first;
-  if (a.cwiseMin(b) != Eigen::Vector3d::Zero() ||
-      a.cwiseMax(b) != (ct.size.cast<double>().array() - 1).matrix())
-    return false;
+  // Between the first and the last voxel, which are corners of the CT or, of a part, lie within it.
+  const Eigen::Vector3d low = first.cwiseMin(turn * last + first), high = first.cwiseMax(turn * last + first);
+  const Eigen::Vector3d end = (ct.size.cast<double>().array() - 1).matrix();
+  const bool is_whole = low == Eigen::Vector3d::Zero() && high == end;
+  if (!is_whole && !(may_be_part && low.minCoeff() >= 0 && (end - high).minCoeff() >= 0)) return false;
   map.patient_from_voxel = ct.patient_from_voxel;
-  if (turn.isIdentity()) return true;
+  if (is_whole && turn.isIdentity()) return true;
   const std::ptrdiff_t row = ct.size.x(), slice = row * ct.size.y();
   const auto step = [&](int axis) {
     return std::ptrdiff_t(turn(0, axis)) + row * std::ptrdiff_t(turn(1, axis)) +
@@ -68,7 +68,7 @@ bool onto_grid(Volume& map, const Volume& ct) {
   };
   const std::ptrdiff_t origin =
       std::ptrdiff_t(first.x()) + row * std::ptrdiff_t(first.y()) + slice * std::ptrdiff_t(first.z());
-  std::vector<float> ordered(map.voxels.size());
+  std::vector<float> ordered(std::size_t(slice) * std::size_t(ct.size.z()));
   std::size_t i = 0;
   for (int z = 0; z < map.size.z(); ++z)
     for (int y = 0; y < map.size.y(); ++y)

@@ -22,6 +22,7 @@ using Eigen::Vector3d;
 constexpr std::uintmax_t most_slice_bytes = std::uintmax_t{64} << 20;
 constexpr xray::DicomTag rescale_type{0x00281054, "Rescale Type"};
 constexpr std::string_view enhanced_ct = "1.2.840.10008.5.1.4.1.1.2.1";
+constexpr std::string_view segmentation_of = "1.2.840.10008.5.1.4.1.1.66.4";
 constexpr double most_coordinate_mm = 1e5;
 // Positions are decimal text with few digits; the relative limit allows for more rounding in thick slices.
 constexpr double uneven_mm = 0.1;
@@ -118,9 +119,11 @@ FolderOfSlices find_series(const std::filesystem::path& folder) {
 std::string no_slice(const FolderOfSlices& found, const std::string& origin) {
   std::string message = origin + ": the folder contains no DICOM CT slice";
   for (const auto& [kind, count] : found.other_classes)
-    message += fmt::format(
-        "; {} of SOP class {}", count,
-        kind == enhanced_ct ? "Enhanced CT: convert the file to one file for each slice" : xray::quote(kind));
+    message +=
+        fmt::format("; {} of SOP class {}", count,
+                    kind == enhanced_ct       ? "Enhanced CT: convert the file to one file for each slice"
+                    : kind == segmentation_of ? "Segmentation: as a mask give the file itself, not its folder"
+                                              : xray::quote(kind));
   return message;
 }
 

@@ -52,6 +52,7 @@ Volume read_file_of_voxels(const std::filesystem::path& path) {
   }
   if (bytes.starts_with("\x1f\x8b")) return read_nifti(path, bytes);
   if (is_metaimage(bytes)) return read_metaimage(path, bytes);
+  if (auto segmentation = read_segmentation(path, bytes)) return *std::move(segmentation);
   const std::string_view kind = other_kind(bytes);
   throw BadInput(Reason::not_an_image,
                  fmt::format("{}: {}neither MetaImage, NRRD, NIfTI nor a folder of DICOM slices",

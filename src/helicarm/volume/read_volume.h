@@ -2,22 +2,27 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
+#include <string>
 
 #include "helicarm/volume/volume.h"
 
 namespace helicarm::volume {
 
 /// Reads MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI-1 and NIfTI-2 (.nii, .nii.gz, or either file of a
-/// pair of .hdr and .img, each plain or .gz), detected by content, or a folder with the slices of a DICOM CT
-/// series. Every length in a file is checked before use. Failures name file and field; codes: missing_file,
-/// not_an_image, truncated, bad_size, bad_value, unsupported, not_finite, unknown_key, path_outside,
-/// name_clash.
+/// pair of .hdr and .img, each plain or .gz), or a DICOM segmentation (BINARY; a label map of the slices that
+/// hold a segment), detected by content, or a folder with the slices of a DICOM CT series. Every length in a
+/// file is checked before use. Failures name file and field; codes: missing_file, not_an_image, truncated,
+/// bad_size, bad_value, unsupported, not_finite, unknown_key, path_outside, name_clash.
 Expected<Volume> read_volume(const std::filesystem::path& path);
 
 /// The other file of a NIfTI pair, by the name of one (.hdr, .img, each plain or .gz); nothing for a file of
 /// another name. Fails with missing_file, and with name_clash where it exists both plain and packed.
 Expected<std::optional<std::filesystem::path>> other_of_pair(const std::filesystem::path& path);
+
+/// Numbers and labels of the segments of a DICOM segmentation; nothing for another file or a folder.
+Expected<std::optional<std::map<int, std::string>>> segments_in(const std::filesystem::path& path);
 
 /// Whether a file is named as the voxels of a NIfTI pair (.img, .img.gz).
 bool is_named_as_voxels(const std::filesystem::path& path);

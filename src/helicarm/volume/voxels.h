@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -60,5 +61,7 @@ Volume read_metaimage(const std::filesystem::path& path, std::string_view bytes)
 Volume read_nrrd(const std::filesystem::path& path, std::string_view bytes);
 Volume read_nifti(const std::filesystem::path& path, std::string_view bytes);
 Volume read_ct_series(const std::filesystem::path& folder);
+/// Segment numbers as voxels, in the slices that hold a segment; nothing for another file.
+std::optional<Volume> read_segmentation(const std::filesystem::path& path, std::string_view bytes);
 
 }  // namespace helicarm::volume

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/text.h"
+#include "helicarm/volume/read_volume.h"
+#include "helicarm/volume/voxels.h"
+#include "helicarm/xray/dicom_tags.h"
+
+namespace helicarm::volume {
+namespace {
+
+using Eigen::Vector3d;
+using xray::DicomElements;
+using xray::DicomTag;
+
+constexpr std::string_view segmentation_class = "1.2.840.10008.5.1.4.1.1.66.4";
+constexpr DicomTag segmentation_type{0x00620001, "Segmentation Type"};
+constexpr DicomTag segment_sequence{0x00620002, "Segment Sequence"};
+constexpr DicomTag segment_number{0x00620004, "Segment Number"};
+constexpr DicomTag segment_label{0x00620005, "Segment Label"};
+constexpr DicomTag segment_identification{0x0062000A, "Segment Identification Sequence"};
+constexpr DicomTag referenced_segment{0x0062000B, "Referenced Segment Number"};
+constexpr DicomTag plane_position{0x00209113, "Plane Position Sequence"};
+constexpr DicomTag plane_orientation{0x00209116, "Plane Orientation Sequence"};
+constexpr DicomTag pixel_measures{0x00289110, "Pixel Measures Sequence"};
+constexpr DicomTag slice_thickness{0x00180050, "Slice Thickness"};
+constexpr DicomTag slice_spacing{0x00180088, "Spacing Between Slices"};
+
+constexpr double farthest_coordinate_mm = 1e5, same_slice_mm = 0.01;
+constexpr std::size_t most_group_bytes = std::size_t{64} << 20;
+
+/// A frame shows one segment in one slice. Columns of `axes`: along a row, along a column, mm per pixel.
+struct SegmentFrame {
+  int segment = 0;
+  Vector3d corner;
+  Eigen::Matrix<double, 3, 2> axes;
+  std::optional<double> spacing, thickness;
+  int slice = 0;
+
+  Vector3d normal() const { return axes.col(0).cross(axes.col(1)).normalized(); }
+  double along(const Vector3d& direction) const { return direction.dot(corner); }
+};
+
+std::vector<double> numbers_in(const DicomElements& elements, DicomTag tag, std::size_t count, double low,
+                               double high) {
+  const auto numbers = elements.numbers(tag, count, low, high);
+  if (!numbers) elements.refuse(Reason::bad_value, tag, "is missing");
+  return *numbers;
+}
+
+int word_in(const DicomElements& elements, DicomTag tag, int low) {
+  const auto word = elements.word(tag, "US");
+  if (!word) elements.refuse(Reason::bad_value, tag, "is missing");
+  if (*word < low)
+    elements.refuse(Reason::bad_value, tag, fmt::format("is {}, must be at least {}", *word, low));
+  return *word;
+}
+
+/// The functional group of a frame, or else that of all frames.
+DicomElements group_of(const DicomElements& frame, const DicomElements& shared, DicomTag tag) {
+  for (const DicomElements* of : {&frame, &shared})
+    if (auto items = xray::sequence_items(*of, tag); !items.empty()) return items.front();
+  frame.refuse(Reason::bad_value, tag, "is missing");
+}
+
+SegmentFrame frame_of(const DicomElements& frame, const DicomElements& shared) {
+  SegmentFrame made;
+  made.segment = word_in(group_of(frame, shared, segment_identification), referenced_segment, 1);
+  const auto corner = numbers_in(group_of(frame, shared, plane_position), xray::tags::image_position, 3,
+                                 -farthest_coordinate_mm, farthest_coordinate_mm);
+  const DicomElements orientation = group_of(frame, shared, plane_orientation);
+  const auto turn = numbers_in(orientation, xray::tags::image_orientation, 6, -1.001, 1.001);
+  const DicomElements measures = group_of(frame, shared, pixel_measures);
+  const auto spacing = numbers_in(measures, xray::tags::pixel_spacing, 2, 1e-3, 100);
+  const auto length = [&](DicomTag tag) -> std::optional<double> {
+    const auto value = measures.numbers(tag, 1, 1e-3, 100);
+    return value ? std::optional((*value)[0]) : std::nullopt;
+  };
+  made.spacing = length(slice_spacing);
+  made.thickness = length(slice_thickness);
+  const auto directions = Eigen::Map<const Eigen::Matrix<double, 3, 2>>(turn.data());
+  if (!(directions.transpose() * directions).isIdentity(1e-3))
+    orientation.refuse(Reason::bad_value, xray::tags::image_orientation,
+                       "is not a pair of perpendicular unit vectors");
+  made.corner = Vector3d::Map(corner.data());
+  made.axes.col(0) = directions.col(0) * spacing[1];
+  made.axes.col(1) = directions.col(1) * spacing[0];
+  return made;
+}
+
+/// Refuses what is no BINARY segmentation of uncompressed bits.
+void check_kind(const DicomElements& elements) {
+  if (const auto type = elements.text(segmentation_type); type != "BINARY")
+    elements.refuse(
+        Reason::unsupported, segmentation_type,
+        fmt::format("is {}, must be BINARY: export the segmentation as binary, or as a label map in "
+                    "NRRD or NIfTI",
+                    xray::quote(type)));
+  if (const int bits = word_in(elements, xray::tags::bits_allocated, 1); bits != 1)
+    elements.refuse(Reason::unsupported, xray::tags::bits_allocated, fmt::format("is {}, must be 1", bits));
+  if (!elements.fragments.empty())
+    elements.refuse(Reason::unsupported, xray::tags::pixel_data,
+                    "is compressed: decompress the file, for example with dcmconv or gdcmconv --raw");
+  if (!elements.find(xray::tags::pixel_data))
+    elements.refuse(Reason::bad_value, xray::tags::pixel_data, "is missing");
+}
+
+std::map<int, std::string> segments_of(const DicomElements& elements) {
+  std::map<int, std::string> segments;
+  for (const DicomElements& item : xray::sequence_items(elements, segment_sequence))
+    segments[word_in(item, segment_number, 1)] =
+        without_control_characters(std::string(item.text(segment_label).substr(0, 64)));
+  return segments;
+}
+
+std::vector<SegmentFrame> frames_of(const DicomElements& elements) {
+  const auto count = std::size_t(numbers_in(elements, xray::tags::frames, 1, 1, 1e6)[0]);
+  const auto* groups = elements.find(xray::tags::frame_groups);
+  if (!groups) elements.refuse(Reason::bad_value, xray::tags::frame_groups, "is missing");
+  if (groups->value.size() > most_group_bytes)
+    elements.refuse(Reason::bad_size, xray::tags::frame_groups,
+                    fmt::format("has {} bytes, limit {}", groups->value.size(), most_group_bytes));
+  auto items = xray::sequence_items(elements, xray::tags::frame_groups);
+  if (items.size() != count)
+    elements.refuse(Reason::bad_value, xray::tags::frame_groups,
+                    fmt::format("has {} items, but there are {} frames", items.size(), count));
+  const auto shared = xray::sequence_items(elements, xray::tags::shared_groups);
+  const std::map<int, std::string> segments = segments_of(elements);
+  std::vector<SegmentFrame> frames;
+  for (std::size_t i = 0; i < count; ++i) {
+    items[i].origin = fmt::format("{}: frame {}", elements.origin, i + 1);
+    frames.push_back(frame_of(items[i], shared.empty() ? DicomElements{} : shared.front()));
+    if (!segments.contains(frames.back().segment))
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{}: shows segment {}, which Segment Sequence does not list",
+                                 items[i].origin, frames.back().segment));
+    if (!frames.back().axes.isApprox(frames[0].axes, 1e-3))
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{}: its orientation or pixel spacing differs from the first frame's",
+                                 items[i].origin));
+  }
+  return frames;
+}
+
+/// Distance of two slices: as stated, or the least between frames; of one slice its thickness. Slices without
+/// a segment have no frame.
+double step_of(const std::vector<SegmentFrame>& frames, const std::string& origin) {
+  if (frames[0].spacing) return *frames[0].spacing;
+  const Vector3d normal = frames[0].normal();
+  double least = 0;
+  for (std::size_t i = 1; i < frames.size(); ++i)
+    if (const double gap = frames[i].along(normal) - frames[i - 1].along(normal); gap > same_slice_mm)
+      least = least > 0 ? std::min(least, gap) : gap;
+  if (least > 0) return least;
+  if (frames[0].thickness) return *frames[0].thickness;
+  throw BadInput(
+      Reason::bad_value,
+      origin + ": one slice, without Spacing Between Slices (0018,0088) or Slice Thickness (0018,0050)");
+}
+
+/// Numbers the slices and returns the step between them. Frames are sorted along the normal.
+Vector3d place_frames(std::vector<SegmentFrame>& frames, const std::string& origin) {
+  const Vector3d normal = frames[0].normal(), first = frames[0].corner;
+  const double step = step_of(frames, origin), allowed = std::max(0.1, 0.02 * step);
+  for (SegmentFrame& frame : frames) {
+    const double at = normal.dot(frame.corner - first) / step;
+    if (!(at < max_volume_side))
+      throw BadInput(Reason::bad_size,
+                     fmt::format("{}: slices over {:.4g} mm in steps of {:.4g} mm, limit {} slices", origin,
+                                 at * step, step, max_volume_side));
+    frame.slice = int(std::lround(at));
+    if (std::abs(at - frame.slice) * step > allowed)
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{}: a slice lies {:.4g} mm from the first, no multiple of {:.4g} mm",
+                                 origin, at * step, step));
+  }
+  const int last = frames.back().slice;
+  const Vector3d along = last > 0 ? Vector3d((frames.back().corner - first) / last) : Vector3d(normal * step);
+  for (const SegmentFrame& frame : frames)
+    if (const double off = (first + frame.slice * along - frame.corner).norm(); off > 2 * allowed)
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{}: slice {} is misaligned by {:.4g} mm", origin, frame.slice + 1, off));
+  return along;
+}
+
+/// Adds the bits of a frame, `first` among those of all. Bits are packed from the least significant one on.
+void add_frame(Volume& volume, const SegmentFrame& frame, std::string_view bits, std::size_t first,
+               const std::string& origin) {
+  const std::size_t area = std::size_t(volume.size.x()) * std::size_t(volume.size.y());
+  float* voxels = volume.voxels.data() + area * std::size_t(frame.slice);
+  const auto label = static_cast<float>(frame.segment);
+  for (std::size_t i = 0; i < area; ++i) {
+    const std::size_t bit = first + i;
+    if ((static_cast<unsigned char>(bits[bit / 8]) >> (bit % 8) & 1U) == 0) continue;
+    if (voxels[i] != 0 && voxels[i] != label)
+      throw BadInput(Reason::unsupported,
+                     fmt::format("{}: segments {} and {} overlap in slice {}: export them to one file each",
+                                 origin, voxels[i], frame.segment, frame.slice + 1));
+    voxels[i] = label;
+  }
+}
+
+/// Before the file is walked.
+bool may_be_segmentation(std::string_view bytes) {
+  constexpr std::size_t looked_at = 4000;
+  return xray::looks_like_dicom(bytes) &&
+         bytes.substr(0, looked_at).find(segmentation_class) != std::string_view::npos;
+}
+
+bool is_segmentation_class(const DicomElements& elements) {
+  return elements.text(xray::tags::sop_class) == segmentation_class;
+}
+
+}  // namespace
+
+std::optional<Volume> read_segmentation(const std::filesystem::path& path, std::string_view bytes) {
+  if (!may_be_segmentation(bytes)) return std::nullopt;
+  const std::string origin = path.string();
+  const DicomElements elements = value_or_throw(xray::walk_dicom(bytes, origin));
+  if (!is_segmentation_class(elements)) return std::nullopt;
+  check_kind(elements);
+  std::vector<SegmentFrame> frames = frames_of(elements);
+  std::vector<std::size_t> order(frames.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  const Vector3d normal = frames[0].normal();
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return frames[i].along(normal); });
+  std::vector<SegmentFrame> sorted;
+  for (const std::size_t i : order) sorted.push_back(frames[i]);
+
+  Volume volume;
+  const Vector3d step = place_frames(sorted, origin);
+  const Vector3d size(word_in(elements, xray::tags::columns, 1), word_in(elements, xray::tags::rows, 1),
+                      sorted.back().slice + 1);
+  volume.voxels.resize(value_or_throw(voxel_count(size, origin)));
+  volume.size = size.cast<int>();
+  volume.patient_from_voxel.linear() << sorted[0].axes, step;
+  volume.patient_from_voxel.translation() = sorted[0].corner;
+  const auto area = std::size_t(size.x() * size.y());
+  const std::string_view bits = elements.find(xray::tags::pixel_data)->value;
+  if (bits.size() < (area * frames.size() + 7) / 8)
+    elements.refuse(Reason::truncated, xray::tags::pixel_data,
+                    fmt::format("has {} bytes, {} frames of {} x {} bits need {}", bits.size(), frames.size(),
+                                size.x(), size.y(), (area * frames.size() + 7) / 8));
+  for (std::size_t i = 0; i < order.size(); ++i) add_frame(volume, sorted[i], bits, order[i] * area, origin);
+  return volume;
+}
+
+Expected<std::optional<std::map<int, std::string>>> segments_in(const std::filesystem::path& path) {
+  return guarded([&]() -> std::optional<std::map<int, std::string>> {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
+    const std::string bytes = read_volume_file(path);
+    if (!may_be_segmentation(bytes)) return std::nullopt;
+    const DicomElements elements = value_or_throw(xray::walk_dicom(bytes, path.string()));
+    if (!is_segmentation_class(elements)) return std::nullopt;
+    return segments_of(elements);
+  });
+}
+
+}  // namespace helicarm::volume

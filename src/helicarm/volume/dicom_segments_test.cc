@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/volume/label_map.h"
+#include "helicarm/volume/volume_files_test.h"
+#include "helicarm/volume/voxels.h"
+#include "helicarm/xray/dicom_builder.h"
+
+namespace helicarm::volume {
+namespace {
+
+using Eigen::Vector3d;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using xray::DicomBuilder;
+
+std::string text_element(std::uint32_t tag, const char* vr, std::string value) {
+  if (value.size() % 2 != 0) value += ' ';
+  return DicomBuilder::element(tag, vr, value, true);
+}
+std::string word_element(std::uint32_t tag, int value) {
+  return DicomBuilder::element(tag, "US", DicomBuilder::number(value, 2), true);
+}
+std::string sequence(std::uint32_t tag, std::initializer_list<std::string> items) {
+  std::string all;
+  for (const std::string& item : items) all += DicomBuilder::item(item);
+  return DicomBuilder::element(tag, "SQ", all, true);
+}
+std::string items_of(std::initializer_list<std::string> items) {
+  std::string all;
+  for (const std::string& item : items) all += DicomBuilder::item(item);
+  return all;
+}
+
+std::string segment(int number, const std::string& label) {
+  return word_element(0x00620004, number) + text_element(0x00620005, "LO", label);
+}
+std::string frame(int number, const std::string& position) {
+  return sequence(0x00209113, {text_element(0x00200032, "DS", position)}) +
+         sequence(0x0062000A, {word_element(0x0062000B, number)});
+}
+std::string shared(const std::string& measures = "", const std::string& orientation = "1\\0\\0\\0\\1\\0") {
+  return sequence(0x00209116, {text_element(0x00200037, "DS", orientation)}) +
+         sequence(0x00289110, {measures + text_element(0x00280030, "DS", "0.5\\0.25")});
+}
+
+/// Two segments in slices of 3 x 3 bits: the first at z = 10 and 14, the second at z = 12. Frames follow each
+/// other without padding, from the least significant bit on.
+DicomBuilder two_segments() {
+  DicomBuilder builder;
+  builder.text(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.66.4").text(0x00080060, "CS", "SEG");
+  builder.word(0x00280010, 3).word(0x00280011, 3).text(0x00280008, "IS", "3");
+  builder.word(0x00280100, 1).word(0x00280101, 1).word(0x00280102, 0).text(0x00620001, "CS", "BINARY");
+  builder.raw(0x00620002, "SQ", items_of({segment(1, "Femur"), segment(2, "Tibia")}));
+  builder.raw(0x52009229, "SQ", items_of({shared()}));
+  builder.raw(0x52009230, "SQ",
+              items_of({frame(1, "-3\\4\\10"), frame(1, "-3\\4\\14"), frame(2, "-3\\4\\12")}));
+  // Bits 0 and 8 of the first frame, 1 of the second (bit 10), 4 and 5 of the third (bits 22 and 23).
+  return builder.raw(0x7FE00010, "OB", std::string("\x01\x05\xC0\x00", 4));
+}
+
+class Segments : public VolumeFiles {
+ protected:
+  Expected<Volume> read_seg(const DicomBuilder& builder) const { return read("seg.dcm", builder.bytes()); }
+  void expect_refused(const DicomBuilder& builder, Reason reason, const std::string& words) const {
+    const auto volume = read_seg(builder);
+    ASSERT_FALSE(volume.has_value()) << words;
+    EXPECT_EQ(volume.error().reason, reason) << volume.error().message;
+    EXPECT_THAT(volume.error().message, HasSubstr(words));
+    EXPECT_THAT(volume.error().message, HasSubstr("seg.dcm"));
+  }
+};
+
+TEST_F(Segments, AreALabelMapOfTheSlicesThatHoldThem) {
+  const auto volume = read_seg(two_segments());
+  ASSERT_TRUE(volume.has_value()) << volume.error().message;
+  EXPECT_EQ(volume->size, Eigen::Vector3i(3, 3, 3));
+  EXPECT_THAT(volume->voxels, ElementsAre(1, 0, 0, 0, 0, 0, 0, 0, 1,  //
+                                          0, 0, 0, 0, 2, 2, 0, 0, 0,  //
+                                          0, 1, 0, 0, 0, 0, 0, 0, 0));
+  EXPECT_EQ(volume->patient_from_voxel * Vector3d(1, 1, 1), Vector3d(-2.75, 4.5, 12));
+  const auto segments = segments_in(folder_ / "seg.dcm");
+  ASSERT_TRUE(segments && *segments);
+  EXPECT_THAT(**segments, ElementsAre(testing::Pair(1, "Femur"), testing::Pair(2, "Tibia")));
+  put("a.nii", Nifti().bytes);
+  EXPECT_FALSE(*segments_in(folder_ / "a.nii"));
+}
+
+TEST_F(Segments, EmptySlicesAreFilledUpToTheCt) {
+  Volume ct{{3, 3, 6}, std::vector<float>(54), Eigen::Affine3d::Identity(), {}};
+  ct.patient_from_voxel = Eigen::Translation3d(-3, 4, 18) * Eigen::Scaling(0.25, 0.5, -2.0);
+  auto volume = read_seg(two_segments());
+  ASSERT_TRUE(volume.has_value()) << volume.error().message;
+  EXPECT_FALSE(onto_grid(*volume, ct));
+  ASSERT_TRUE(onto_grid(*volume, ct, true));
+  EXPECT_EQ(volume->size, ct.size);
+  EXPECT_EQ(volume->voxels[0 + 9 * 4], 1);  // z = 10
+  EXPECT_EQ(volume->voxels[4 + 9 * 3], 2);
+  EXPECT_EQ(volume->voxels[1 + 9 * 2], 1);
+  EXPECT_EQ(std::ranges::count(volume->voxels, 0.F), 54 - 5);
+  ct.size.z() = 4;  // z = 12 to 18: a part of the segmentation lies outside
+  auto beyond = read_seg(two_segments());
+  EXPECT_FALSE(onto_grid(*beyond, ct, true));
+}
+
+TEST_F(Segments, GapsAreEmptySlicesWhereTheSpacingIsStated) {
+  const std::string spacing = text_element(0x00180088, "DS", "2");
+  auto apart = two_segments();
+  apart.raw(0x52009229, "SQ", items_of({shared(spacing)}));
+  apart.raw(0x52009230, "SQ",
+            items_of({frame(1, "-3\\4\\10"), frame(1, "-3\\4\\18"), frame(2, "-3\\4\\18")}));
+  const auto volume = read_seg(apart);
+  ASSERT_TRUE(volume.has_value()) << volume.error().message;
+  EXPECT_EQ(volume->size.z(), 5);
+  EXPECT_EQ(volume->voxels[4 + 9 * 4], 2);
+  auto single = two_segments();
+  single.raw(0x52009230, "SQ", items_of({frame(1, "-3\\4\\10")})).text(0x00280008, "IS", "1");
+  expect_refused(single, Reason::bad_value, "one slice, without Spacing Between Slices");
+  single.raw(0x52009229, "SQ", items_of({shared(text_element(0x00180050, "DS", "3"))}));
+  const auto thick = read_seg(single);
+  ASSERT_TRUE(thick.has_value()) << thick.error().message;
+  EXPECT_EQ(thick->patient_from_voxel.linear().col(2), Vector3d(0, 0, 3));
+}
+
+TEST_F(Segments, WhatIsNotReadIsNamed) {
+  expect_refused(two_segments().text(0x00620001, "CS", "FRACTIONAL"), Reason::unsupported,
+                 "Segmentation Type (0062,0001) is \"FRACTIONAL\", must be BINARY");
+  expect_refused(two_segments().word(0x00280100, 8), Reason::unsupported,
+                 "Bits Allocated (0028,0100) is 8, must be 1");
+  expect_refused(two_segments().syntax("1.2.840.10008.1.2.5").fragments({"ab"}), Reason::unsupported,
+                 "is compressed");
+  expect_refused(two_segments().erase(0x7FE00010), Reason::bad_value, "Pixel Data (7FE0,0010) is missing");
+  expect_refused(two_segments().erase(0x52009230), Reason::bad_value, "(5200,9230) is missing");
+  expect_refused(two_segments().raw(0x52009229, "SQ", ""), Reason::bad_value,
+                 "frame 1: Plane Orientation Sequence");
+  expect_refused(two_segments().text(0x00280008, "IS", "4"), Reason::bad_value,
+                 "has 3 items, but there are 4 frames");
+  expect_refused(two_segments().raw(0x7FE00010, "OB", std::string(2, '\1')), Reason::truncated,
+                 "has 2 bytes, 3 frames of 3 x 3 bits need 4");
+  expect_refused(two_segments().word(0x00280010, 65535).word(0x00280011, 65535), Reason::bad_size,
+                 "must be 1 to 16384");
+  expect_refused(two_segments().raw(0x00620002, "SQ", items_of({segment(1, "Femur")})), Reason::bad_value,
+                 "frame 3: shows segment 2, which Segment Sequence does not list");
+  expect_refused(two_segments().raw(0x52009229, "SQ", items_of({shared("", "1\\0\\0\\1\\0\\0")})),
+                 Reason::bad_value, "perpendicular");
+}
+
+TEST_F(Segments, FramesThatDoNotFitAreRefused) {
+  const auto with = [](const std::string& second, int number = 2) {
+    return two_segments().raw(
+        0x52009230, "SQ", items_of({frame(1, "-3\\4\\10"), frame(1, second), frame(number, "-3\\4\\12")}));
+  };
+  expect_refused(with("-3\\4\\15.5"), Reason::bad_value, "lies 5.5 mm from the first, no multiple of 2 mm");
+  expect_refused(with("-2\\4\\14"), Reason::bad_value, "misaligned by");
+  expect_refused(with("-3\\4\\99999"), Reason::bad_size, "limit 16384 slices");
+  // Both at z = 12, with one voxel in common.
+  auto both = with("-3\\4\\12");
+  both.raw(0x7FE00010, "OB", std::string("\x01\x20\xC0\x00", 4));
+  expect_refused(both, Reason::unsupported, "segments 1 and 2 overlap in slice 2");
+}
+
+TEST_F(Segments, TruncationsAndMutationsNeverCrash) {
+  const std::string whole = two_segments().bytes();
+  for (std::size_t at = 128; at < whole.size(); ++at) {
+    std::string other = whole;
+    other[at] = static_cast<char>(other[at] ^ 0x15);
+    for (const std::string& bytes : {whole.substr(0, at), other})
+      guarded([&] { return read_segmentation("seg.dcm", bytes).has_value(); });
+  }
+}
+
+}  // namespace
+}  // namespace helicarm::volume
