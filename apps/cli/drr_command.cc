@@ -17,6 +17,7 @@
 #include "helicarm/pipeline/result.h"
 #include "helicarm/volume/drr.h"
 #include "helicarm/volume/drr_view.h"
+#include "helicarm/volume/hounsfield.h"
 #include "helicarm/volume/read_volume.h"
 
 namespace helicarm::cli {
@@ -62,7 +63,11 @@ CommandResult drr_command(const DrrArguments& arguments, Console& console) {
     if (!arguments.centre_mm.empty() && arguments.centre_mm.size() != 3)
       throw BadInput(Reason::usage, "--centre takes three numbers");
     check_outputs(arguments, console);
-    const volume::Volume volume = value_or_throw(volume::read_volume(arguments.volume));
+    volume::Volume volume = value_or_throw(volume::read_volume(arguments.volume));
+    if (arguments.values == "hu")
+      for (Warning& warning :
+           value_or_throw(volume::check_hounsfield(volume, arguments.volume.filename().string())))
+        volume.warnings.push_back(std::move(warning));
     print_warnings(volume.warnings, console);
     const Vector3d centre =
         arguments.centre_mm.empty() ? volume.centre() : Vector3d::Map(arguments.centre_mm.data());

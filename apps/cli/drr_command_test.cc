@@ -37,6 +37,8 @@ TEST(DrrCommand, LeftAndHeadAgreeWithTheHelp) {
   const auto done = drr_command(arguments, console);
   const std::string raw = *read_file(folder / "a.f32", 9999);
   const auto png = image::decode_png(*read_file(folder / "a.png", 9999), "a.png");
+  arguments.values = "hu";
+  const auto as_mask = drr_command(arguments, console);
   arguments.values = "hounsfield";
   const auto refused = drr_command(arguments, console);
   arguments.values = "raw";
@@ -55,6 +57,7 @@ TEST(DrrCommand, LeftAndHeadAgreeWithTheHelp) {
     std::memcpy(&value, raw.data() + sizeof value * static_cast<std::size_t>(u + 9 * v), sizeof value);
     return value;
   };
+  EXPECT_FALSE(as_mask.has_value());  // 0 and 100 only
   EXPECT_GT(pixel(7, 1), 99);
   EXPECT_EQ(pixel(1, 1), 0);
   EXPECT_EQ(pixel(7, 7), 0);

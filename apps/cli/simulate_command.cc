@@ -12,6 +12,7 @@
 #include "command_line.h"
 #include "helicarm/simulation/rotation.h"
 #include "helicarm/simulation/write_case.h"
+#include "helicarm/volume/hounsfield.h"
 #include "helicarm/volume/read_volume.h"
 #include "named_files.h"
 
@@ -76,10 +77,12 @@ std::shared_ptr<const simulation::CtOptions> ct_from(const SimulateArguments& ar
     throw BadInput(Reason::usage, "simulate: --ct cannot be combined with --kind grid");
   simulation::CtOptions ct;
   ct.volume = value_or_throw(volume::read_volume(arguments.ct));
-  for (const Warning& warning : ct.volume.warnings)
-    console.progress << fmt::format("helicarm: {}: {}\n", code(warning.reason), warning.message);
   const std::filesystem::path whole = std::filesystem::absolute(arguments.ct).lexically_normal();
   ct.name = (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+  for (Warning& warning : value_or_throw(volume::check_hounsfield(ct.volume, ct.name)))
+    ct.volume.warnings.push_back(std::move(warning));
+  for (const Warning& warning : ct.volume.warnings)
+    console.progress << fmt::format("helicarm: {}: {}\n", code(warning.reason), warning.message);
   if (!arguments.ct_centre_mm.empty()) {
     ct.centre = three(arguments.ct_centre_mm, "--ct-centre");
     check_inside(ct.volume, *ct.centre);

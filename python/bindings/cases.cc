@@ -14,6 +14,7 @@
 #include "helicarm/report/report.h"
 #include "helicarm/simulation/truth_json.h"
 #include "helicarm/simulation/write_case.h"
+#include "helicarm/volume/hounsfield.h"
 #include "helicarm/volume/read_volume.h"
 #include "measuring_options.h"
 #include "module.h"
@@ -98,6 +99,7 @@ py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, con
     CtOptions body;
     body.volume = value_or_raise(volume::read_volume(*ct));
     body.name = ct->filename().string();
+    warn(value_or_raise(volume::check_hounsfield(body.volume, body.name)));
     options.ct = std::make_shared<const CtOptions>(std::move(body));
   }
   value_or_raise(check_case_folder(folder));

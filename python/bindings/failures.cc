@@ -36,6 +36,13 @@ void raise(const Failure& failure, const py::object& result) {
   throw py::error_already_set();
 }
 
+void warn(const std::vector<Warning>& warnings) {
+  for (const Warning& warning : warnings) {
+    const std::string text = std::string(code(warning.reason)) + ": " + warning.message;
+    if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  }
+}
+
 py::object python_from(const Json& json) { return py::module_::import("json").attr("loads")(to_text(json)); }
 
 Json json_from(const py::object& value) {

@@ -44,6 +44,9 @@ py::list warning_list(const Warnings& warnings) {
   return list;
 }
 
+/// As Python's own warnings (UserWarning), for what returns nothing that could hold them.
+void warn(const std::vector<Warning>& warnings);
+
 /// The inverse, for pickles.
 std::vector<Warning> warnings_from(const py::list& list);
 

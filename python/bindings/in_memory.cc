@@ -9,6 +9,7 @@
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/registration/model.h"
 #include "helicarm/sweep/sweep.h"
+#include "helicarm/volume/hounsfield.h"
 #include "helicarm/xray/image_file.h"
 #include "measuring_options.h"
 #include "module.h"
@@ -56,6 +57,8 @@ case_registration::GivenModel model_of(const std::string& name, const py::dict& 
     made.model =
         value_or_raise(without_gil([&] { return registration::model_from(name, *held, mask, window); }));
     made.model.warnings = held->warnings;
+    for (Warning& warning : value_or_raise(volume::check_hounsfield(*held, name + ": volume")))
+      made.model.warnings.push_back(std::move(warning));
     if (mask)
       made.model.warnings.insert(made.model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
   }

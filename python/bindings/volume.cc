@@ -11,6 +11,7 @@
 #include "helicarm/image/grey_image.h"
 #include "helicarm/volume/declared.h"
 #include "helicarm/volume/drr.h"
+#include "helicarm/volume/hounsfield.h"
 #include "helicarm/volume/in_memory.h"
 #include "helicarm/volume/read_volume.h"
 #include "module.h"
@@ -63,6 +64,7 @@ py::array array_of(const py::object& self) {
 py::array drrs(const Volume& held, const std::vector<exchange::ImportedMatrix>& cameras,
                std::pair<int, int> shape, const std::string& values, unsigned threads) {
   const bool is_hu = checked_word(values, value_words, "values") == 0;
+  if (is_hu) warn(value_or_raise(volume::check_hounsfield(held, "volume")));
   const auto [height, width] = shape;
   for (const int side : {height, width})
     if (side < 1 || side > int(image::max_image_side))

@@ -33,7 +33,8 @@ def drr(volume, camera, *, shape=None, values="hu", threads=0):
     volume: Volume or what as_volume takes. camera: Camera of the patient frame (LPS, mm) or what as_camera takes, or a list
     of them. shape: (height, width); the cameras' own where None. values: "hu" (water 0.02059 / mm, 0 below -800 HU) or
     "raw". Releases the GIL. Returns (height, width) float32, or (n, height, width) of a list.
-    Raises InputError: bad_value for a source inside the volume, bad_size, usage.
+    Warns (UserWarning, not_hounsfield) of "hu" whose values are hardly Hounsfield units.
+    Raises InputError: bad_value for a source inside the volume and for a mask, bad_size, usage.
     """
     several = isinstance(camera, list)
     cameras = [as_camera(each) for each in (camera if several else [camera])]

@@ -114,6 +114,14 @@ def test_a_drr_is_the_exact_chord_of_a_block():
     refused("usage", "shape", helicarm.drr, volume, (camera.K, camera.R, camera.t))
 
 
+def test_values_that_are_no_hounsfield_units_are_warned_of():
+    voxels = np.random.default_rng(3).integers(0, 256, (6, 6, 6))
+    camera = helicarm.Camera.orbit([2.5, 2.5, 2.5], size=3, pixel_mm=1)
+    with pytest.warns(UserWarning, match="not_hounsfield: volume: values of 0 to 255"):
+        helicarm.drr(helicarm.Volume(voxels, np.eye(4), frame="LPS"), camera)
+    refused("bad_value", "it is a mask", helicarm.drr, helicarm.Volume(voxels > 128, np.eye(4), frame="LPS"), camera)
+
+
 def views_of(folder, frame=1):
     views = {}
     for name in "AB":

@@ -14,6 +14,7 @@
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/rectify.h"
+#include "helicarm/volume/hounsfield.h"
 #include "helicarm/volume/label_map.h"
 #include "helicarm/volume/read_volume.h"
 #include "helicarm/volume/tiff_stack.h"
@@ -257,6 +258,9 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& given, const std::op
     if (given.window_hu) window = {given.window_hu->x(), given.window_hu->y()};
     registration::Model model = value_or_throw(registration::model_from(given.name, volume, mask, window));
     model.warnings = volume.warnings;
+    for (Warning& warning : value_or_throw(volume::check_hounsfield(
+             volume, fmt::format("models: \"{}\": {}", given.name, given.volume->filename().string()))))
+      model.warnings.push_back(std::move(warning));
     if (mask) model.warnings.insert(model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
     if (has_tunnels && (mask || window)) compare(*registration::bone_surface(volume, mask, window), &volume);
     loaded.model = std::move(model);

@@ -119,6 +119,7 @@ constexpr ReasonEntry entries[] = {
     {Reason::seeds_in_one_bone, "seeds_in_one_bone", refused},
     {Reason::bones_in_contact, "bones_in_contact", refused},
     {Reason::bone_cut_off, "bone_cut_off", refused},
+    {Reason::not_hounsfield, "not_hounsfield", refused},
 };
 
 constexpr auto reasons = [] {
@@ -131,7 +132,7 @@ constexpr auto reasons = [] {
 static_assert([] {
   for (std::size_t i = 0; i < reasons.size(); ++i)
     if (reasons[i] != Reason(i)) return false;
-  return reasons.back() == Reason::bone_cut_off;
+  return reasons.back() == Reason::not_hounsfield;
 }());
 
 const ReasonEntry& entry(Reason reason) { return entries[std::size_t(reason)]; }

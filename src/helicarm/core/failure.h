@@ -127,6 +127,8 @@ enum class Reason {
   seeds_in_one_bone,
   bones_in_contact,
   bone_cut_off,
+  // A volume that is taken as a CT.
+  not_hounsfield,
 };
 
 /// Machine-readable code of a reason, e.g. "too_few_fiducials".

@@ -12,6 +12,7 @@
 #include "helicarm/segmentation/bone_mesh.h"
 #include "helicarm/segmentation/bones.h"
 #include "helicarm/segmentation/slices.h"
+#include "helicarm/volume/hounsfield.h"
 #include "helicarm/volume/read_volume.h"
 #include "helicarm/volume/tiff_stack.h"
 #include "helicarm/volume/write_nrrd.h"
@@ -98,6 +99,8 @@ Expected<SegmentAnswer> answer(const SegmentRequest& request, const pipeline::Pr
     made.inputs.push_back(request.ct);
     if (request.label_map) made.inputs.push_back(*request.label_map);
     made.ct = volume_of(request.ct, request, request.tiff_offset_hu);
+    for (Warning& warning : value_or_throw(volume::check_hounsfield(made.ct, made.ct_name)))
+      made.ct.warnings.push_back(std::move(warning));
     made.options = request.options;
     made.of_label_map = request.label_map.has_value();
     if (request.label_map) {

@@ -67,6 +67,12 @@ TEST_F(SegmentFiles, AreAMaskASurfaceAnImageAndFigures) {
   EXPECT_TRUE(image::is_png(*read_file(out_ / "segment.png", 1 << 24)));
 }
 
+TEST_F(SegmentFiles, OfAnImageOfEightBitsWarn) {
+  const Json warnings = written()["warnings"];
+  ASSERT_FALSE(warnings.empty());
+  EXPECT_EQ(warnings[0]["code"], "not_hounsfield");
+}
+
 TEST_F(SegmentFiles, OfAnEarlierRunAreRemoved) {
   written();
   forget_segmentation(out_, request_);
