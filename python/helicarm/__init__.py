@@ -15,10 +15,10 @@ from ._helicarm import (  # noqa: F401
     CArmPrior, Calibration, Calibrator, Camera, DistortionMap, IntrinsicsPrior, LocatedPoint, MeasuredPhantom, Plate,
     Rectification, Result, ResultPoint, Surface, Sweep, Track, ViewPoints, Volume, XrayImage, __version__, bundle,
     add_to_c_arm, c_arm_report, calibrate, check_c_arm, detect, import_camera, import_transform, label, measure, measure_phantom, new_case,
-    read_image, read_surface, read_volume, rectify, run_case, schema, segment, simulate_case, verify_phantom)
+    read_image, read_surface, read_volume, rectify, run_case, schema, simulate_case, verify_phantom)
 from .arrays import as_camera, as_image, as_surface, as_volume  # noqa: F401
 from .cameras import solve  # noqa: F401
-from .data import drr, migration, register, register_sequence, sweep, track  # noqa: F401
+from .data import drr, migration, register, register_sequence, segment, sweep, track  # noqa: F401
 from .errors import HelicarmError, InputError, RefusedError  # noqa: F401
 from .results import install as _install
 from .session import Record, Session  # noqa: F401

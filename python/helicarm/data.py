@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Registration, DRR, sweep and track: of a case's folder, or of arrays in memory."""
 import os
+import pathlib
+import tempfile
 from collections.abc import Mapping
 
 import numpy as np
@@ -45,6 +47,43 @@ def drr(volume, camera, *, shape=None, values="hu", threads=0):
         shape = shapes.pop()
     images = _c._drr(as_volume(volume), cameras, tuple(shape), values, threads)
     return images if several else images[0]
+
+
+def _write_nrrd(path, volume):
+    numbers = [",".join(repr(float(x)) for x in column) for column in volume.affine[:3].T]
+    path.write_bytes(("NRRD0004\ntype: float\ndimension: 3\nspace: left-posterior-superior\n"
+                      f"sizes: {' '.join(map(str, volume.shape))}\nspace directions: ({numbers[0]}) ({numbers[1]}) ({numbers[2]})\n"
+                      f"space origin: ({numbers[3]})\nendian: little\nencoding: raw\n\n").encode()
+                     + volume.array.astype("<f4").tobytes("F"))
+    return path
+
+
+def segment(ct, seeds=None, *, label_map=None, voxel_mm=None, tiff_offset_hu=0.0, **options):
+    """Masks and surfaces of the bones of a CT, by one point on each, as `helicarm segment` makes them.
+
+    segment(ct, seeds={}, *, space="LPS", threshold_hu=None, gap_mm, neck, label_map=None, labels={}, voxel_mm=None,
+    tiff_offset_hu=0, out=None, progress=None)
+      ct, label_map: a file (MetaImage, NRRD, NIfTI-1, TIFF stack with voxel_mm and tiff_offset_hu) or a folder of DICOM
+        slices, or what as_volume takes: a Volume, or an object of nibabel, SimpleITK, ITK or pydicom.
+      seeds: {name: (x, y, z)} in the volume's patient frame, mm; space: of the seeds, "LPS", "RAS" or "LAS". threshold_hu:
+        bone is what has at least this value; None: 200, more in a noisy CT. gap_mm: gaps of the cortex up to twice this
+        width do not open the marrow cavity. neck: parts are one bone where the neck between them has at least this share of
+        the smaller part's radius. label_map, labels: instead of seeds, a label map on the CT's grid and
+        {name: [label, ...]}. out: folder for the masks (NRRD), surfaces (STL), segment.png and segment.json, or None.
+        progress: called with the name of each step; an exception from it ends the work.
+    Returns segment.json (threshold_hu, bones with volume_cm3, surface_cm2, centre_mm, box_mm, cut_off, contacts; warnings,
+    notes) and labels: (z, y, x) bytes with each bone's label, 0 elsewhere; .transpose(2, 1, 0) is on the grid of a Volume.
+    Raises InputError, and RefusedError for a seed on no bone and for two seeds on one.
+    """
+    def is_file(given):
+        return given is None or isinstance(given, (str, os.PathLike))
+
+    if not is_file(ct) and (voxel_mm is not None or tiff_offset_hu):
+        raise InputError("usage", "segment: voxel_mm and tiff_offset_hu are for a TIFF stack; a volume states its own")
+    with tempfile.TemporaryDirectory() as folder:
+        ct, label_map = (given if is_file(given) else _write_nrrd(pathlib.Path(folder) / name, as_volume(given))
+                         for given, name in ((ct, "ct.nrrd"), (label_map, "label_map.nrrd")))
+        return _c.segment(ct, seeds or {}, label_map=label_map, voxel_mm=voxel_mm, tiff_offset_hu=tiff_offset_hu, **options)
 
 
 def _views_of(views):

@@ -17,6 +17,11 @@ _Views = Union[Mapping[str, Tuple[_Image, _Camera]], Sequence[Tuple[_Image, _Cam
 
 def drr(volume: _Volume, camera: Union[_Camera, list[_Camera]], *, shape: Optional[Tuple[int, int]] = None,
         values: str = "hu", threads: int = 0) -> NDArray[np.float32]: ...
+def segment(ct: Union[_Path, _Volume], seeds: Optional[Mapping[str, Sequence[float]]] = None, *, space: str = "LPS",
+            threshold_hu: Optional[float] = None, gap_mm: float = ..., neck: float = ...,
+            label_map: Union[None, _Path, _Volume] = None, labels: Mapping[str, Sequence[int]] = ...,
+            voxel_mm: Optional[Sequence[float]] = None, tiff_offset_hu: float = 0.0, out: Optional[_Path] = None,
+            progress: _Progress = None) -> dict[str, Any]: ...
 @overload
 def register(folder: _Path, *, out: Optional[_Path] = None, method: str = "best", max_error_mm: Optional[float] = None,
              motion_sigma_mm: float = 0, search_mm: float = ..., search_deg: float = ..., threads: int = 0,

@@ -46,6 +46,32 @@ def test_a_label_of_a_map(ct):
         helicarm.segment(path, label_map=labels)
 
 
+def test_a_volume_in_memory_gives_what_its_file_gives(ct):
+    path, labels, _ = ct
+    seeds = {"shin": (0, 0, 104), "thigh": (-1, 0, 150)}
+    of_file, in_memory = (helicarm.segment(given, seeds) for given in (path, helicarm.read_volume(path)))
+    assert (of_file.pop("labels") == in_memory.pop("labels")).all()
+    assert of_file.pop("seconds") > 0 and in_memory.pop("seconds") > 0 and of_file == in_memory
+    by_map = helicarm.segment(helicarm.read_volume(path), label_map=helicarm.read_volume(labels), labels={"thigh": [2]})
+    assert (by_map["labels"] == helicarm.segment(path, label_map=labels, labels={"thigh": [2]})["labels"]).all()
+
+
+def test_a_turned_volume_in_memory_keeps_its_place(ct):
+    volume, turn = helicarm.read_volume(ct[0]), np.array([[0.6, -0.8, 0, 7], [0.8, 0.6, 0, -9], [0, 0, 1, 3], [0, 0, 0, 1]])
+    turned = helicarm.Volume(volume.array, turn @ volume.affine, frame="LPS")
+    seed = np.array([0, 0, 104, 1.0])
+    here, there = helicarm.segment(volume, {"shin": seed[:3]}), helicarm.segment(turned, {"shin": (turn @ seed)[:3]})
+    assert there["bones"][0]["centre_mm"] == pytest.approx((turn @ [*here["bones"][0]["centre_mm"], 1])[:3], abs=1e-3)
+    assert (here["labels"] == there["labels"]).all()
+
+
+def test_what_is_no_volume_is_named(ct):
+    with pytest.raises(helicarm.InputError, match="an array has no place"):
+        helicarm.segment(np.zeros((3, 3, 3)), {"a": (0, 0, 0)})
+    with pytest.raises(helicarm.InputError, match="for a TIFF stack"):
+        helicarm.segment(helicarm.read_volume(ct[0]), {"a": (0, 0, 104)}, tiff_offset_hu=-1024)
+
+
 def test_faults_are_refused(ct):
     path, _, _ = ct
     with pytest.raises(helicarm.RefusedError) as refused:
