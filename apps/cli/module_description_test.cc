@@ -72,7 +72,8 @@ TEST(ModuleDescription, ChoiceOfAHelpThatExplainsEachWord) {
 }
 
 TEST(ModuleWords, ValuesOfAnUntouchedFormAreLeftOut) {
-  EXPECT_THAT(Program().words({"--size", "8", "--depth", "-0.0000010", "--sigma", "", "--kind", "one", "in"}),
+  EXPECT_THAT(Program().words({"--size", "8", "--depth", "-0.0000010000000000000001", "--sigma", "", "--kind",
+                               "one", "in"}),
               ElementsAre("in"));
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 
 #include "module_description.h"
 
@@ -17,12 +18,14 @@ std::string without_blanks(const std::string& text) {
   return first == std::string::npos ? std::string{} : text.substr(first, last - first + 1);
 }
 
+/// Also as a slider gives it back.
 bool is_default(const ModuleParameter& parameter, const std::string& value) {
   const std::string& own = parameter.option->get_default_str();
   double number = 0, of_default = 0;
   return value == own ||
          (parameter.kind != ModuleParameter::Kind::text && CLI::detail::lexical_cast(value, number) &&
-          CLI::detail::lexical_cast(own, of_default) && number == of_default);
+          CLI::detail::lexical_cast(own, of_default) &&
+          std::abs(number - of_default) <= 1e-9 * std::abs(of_default));
 }
 
 /// Values of one field of a form.
@@ -79,12 +82,10 @@ std::vector<std::string> words_of_module(const CLI::App& command, std::span<cons
       ++i;
     else if (is_flag && known == parameters.end())
       own.push_back(word);  // refused by the program, or --help
-    else if (is_flag && known->kind == ModuleParameter::Kind::boolean)
-      own.push_back(known->flag);
-    else if (is_flag && has_value)
-      append(known->flag.empty() ? optional : own, *known, words[++i]);
+    else if (is_flag && (known->kind == ModuleParameter::Kind::boolean || !has_value))
+      own.push_back(known->flag.empty() ? word : known->flag);
     else if (is_flag)
-      own.push_back(known->flag);
+      append(known->flag.empty() ? optional : own, *known, words[++i]);
     else if (place < places.size())
       append(by_place, places[place++], word);
     else

@@ -7,6 +7,7 @@ namespace helicarm::case_registration {
 namespace {
 
 using Eigen::Matrix3d;
+using Eigen::Vector3d;
 using testing::HasSubstr;
 
 RegisteredPoint point_with(const char* name, double sigma_mm, std::optional<double> sigma_in_tool_mm) {
