@@ -160,6 +160,19 @@ TEST_F(Segments, FramesThatDoNotFitAreRefused) {
   expect_refused(both, Reason::unsupported, "segments 1 and 2 overlap in slice 2");
 }
 
+TEST_F(Segments, AnItemThatEndsBeyondItsSequenceIsRefused) {
+  // Without VRs a sequence is not walked with the file.
+  for (const std::uint32_t tag : {0xFFFEE000U, 0x00280010U}) {
+    auto cut = two_segments().syntax("1.2.840.10008.1.2");
+    cut.raw(0x00620002, "SQ", DicomBuilder::tag_bytes(tag) + DicomBuilder::number(1000, 4) + "abcd");
+    cut.raw(0x52009229, "SQ", "").raw(0x52009230, "SQ", items_of({"", "", ""}));
+    const auto volume = read_seg(cut);
+    ASSERT_FALSE(volume.has_value());
+    EXPECT_THAT(volume.error().message,
+                HasSubstr(tag == 0xFFFEE000U ? "1000 bytes announced" : "an item of a sequence"));
+  }
+}
+
 TEST_F(Segments, TruncationsAndMutationsNeverCrash) {
   const std::string whole = two_segments().bytes();
   for (std::size_t at = 128; at < whole.size(); ++at) {

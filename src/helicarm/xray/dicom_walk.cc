@@ -76,8 +76,11 @@ class Walker {
     while (at_ < bytes_.size()) {
       const Header next = header(explicit_vr, bytes_.size());
       if (next.tag == sequence_end) break;
-      into_ = &items.emplace_back(about);
+      // What has no VR is walked here for the first time.
+      if (next.tag != item_tag) refuse(Reason::bad_value, "an item of a sequence was expected");
       const bool delimited = next.length == undefined;
+      if (!delimited) need(next.length, bytes_.size());
+      into_ = &items.emplace_back(about);
       elements(delimited ? bytes_.size() : at_ + next.length, delimited, explicit_vr, 0);
       if (loose_) put_in_order();
     }
