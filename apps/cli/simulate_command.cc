@@ -10,6 +10,9 @@
 #include <fmt/format.h>
 
 #include "command_line.h"
+#include "findings.h"
+#include "helicarm/pipeline/result.h"
+#include "helicarm/simulation/ball_sizes.h"
 #include "helicarm/simulation/rotation.h"
 #include "helicarm/simulation/write_case.h"
 #include "helicarm/volume/hounsfield.h"
@@ -176,7 +179,10 @@ CommandResult simulate_command(const SimulateArguments& arguments, Console& cons
       value_or_throw(simulation::write_case(arguments.folder, made));
       return made;
     }();
-    const Json written = summary(arguments, simulated);
+    const std::vector<Warning> warnings = simulation::ball_size_warnings(simulated);
+    print_warnings(warnings, console);
+    Json written = summary(arguments, simulated);
+    written["warnings"] = pipeline::json_list_of(warnings);
     if (console.json) {
       console.out << to_text(written) << '\n';
       return;

@@ -12,6 +12,7 @@
 #include "helicarm/report/overlay.h"
 #include "helicarm/report/rectified_image.h"
 #include "helicarm/report/report.h"
+#include "helicarm/simulation/ball_sizes.h"
 #include "helicarm/simulation/truth_json.h"
 #include "helicarm/simulation/write_case.h"
 #include "helicarm/volume/hounsfield.h"
@@ -103,11 +104,14 @@ py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, con
     options.ct = std::make_shared<const CtOptions>(std::move(body));
   }
   value_or_raise(check_case_folder(folder));
+  std::vector<Warning> warnings;
   const auto simulated = without_gil([&] {
     return simulate_case(options).and_then([&](const SimulatedCase& made) {
+      warnings = ball_size_warnings(made);
       return write_case(folder, made).map([&] { return truth_json(made); });
     });
   });
+  warn(warnings);
   return python_from(value_or_raise(simulated));
 }
 

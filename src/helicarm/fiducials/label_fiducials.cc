@@ -25,6 +25,7 @@ constexpr std::size_t max_candidates = 30;
 constexpr double paper_systematic = 2e-3;  // of the field radius: residual distortion of a quadratic map
 constexpr double shared_bias_sigma = 0.008;
 constexpr double prediction_reach_px = 4;
+constexpr double least_diameter_px = 3;
 constexpr double tolerance_sigmas = 3.3;      // as for a labelled fiducial
 constexpr double printed_tolerance_mm = 0.3;  // of a printed phantom that has not been measured
 
@@ -183,6 +184,34 @@ bool explains_more(const Labelling& loose, const Failure& without) {
          (matched != without.figures.end() && loose.matched > matched->second);
 }
 
+/// The refusal with how many discs may be the calibrator's balls and how large these are, where most are
+/// missing: then this is why the labels cannot be told.
+Failure with_found(Failure failure, std::size_t found, const phantom::Calibrator& calibrator,
+                   const std::optional<double>& pixel_mm) {
+  constexpr double most_found = 0.6;  // of the balls: with more, a labelling is usually certain
+  const bool of_labels = failure.reason == Reason::ambiguous_labels ||
+                         failure.reason == Reason::calibrator_mismatch ||
+                         failure.reason == Reason::too_few_fiducials;
+  const std::size_t balls = calibrator.balls.size();
+  if (!of_labels || double(found) > most_found * double(balls)) return failure;
+  failure.figures["found"] = double(found);
+  failure.figures["balls"] = double(balls);
+  std::string size;
+  if (pixel_mm) {
+    const auto [least, most] =
+        std::ranges::minmax(calibrator.balls | std::views::transform(&phantom::CalibratorBall::diameter_mm));
+    // On the detector; nearer to the source they are larger.
+    failure.figures["ball_px"] = least / *pixel_mm;
+    size = fmt::format(", which are from {:.1f} ({:g} mm) to {:.1f} px ({:g} mm) wide, or more",
+                       least / *pixel_mm, least, most / *pixel_mm, most);
+    if (least / *pixel_mm < least_diameter_px)
+      size += fmt::format(": below {:g} px they are hardly found", least_diameter_px);
+  }
+  failure.message = fmt::format("only {} discs were found that may be the calibrator's {} balls{}; {}", found,
+                                balls, size, failure.message);
+  return failure;
+}
+
 /// Circles of `--method paper`, as large as the labelled dots.
 std::vector<detection::Dot> circles_like(const std::vector<detection::Dot>& labelled_dots,
                                          const xray::XrayImage& xray_image,
@@ -293,7 +322,9 @@ Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
     else
       labelling_options.tolerance_mm = 0;
   }
-  if (!labelling) return tl::unexpected<Failure>(labelling.error());
+  if (!labelling)
+    return tl::unexpected<Failure>(
+        with_found(std::move(labelling.error()), balls.size(), calibrator, map.rectified_pixel_mm));
 
   LabelledFiducials found;
   found.view = labelling->view;

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/fiducials/label_fiducials.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "helicarm/fiducials/paper_circles.h"
@@ -175,6 +178,29 @@ TEST(LabelFiducials, NoCandidatesAreRefused) {
   const auto found = label_fiducials(xray_image, dots, rectification, sound_case().calibrator, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::too_few_fiducials);
+}
+
+TEST(LabelFiducials, FewCandidatesAreTheReason) {
+  const SimulatedView& view = sound_case().views[0];
+  const xray::XrayImage xray_image = exposure_of(view);
+  const rectification::Rectification rectification =
+      rectification::rectify(xray_image, phantom::plate48(), {}).value();
+  auto dots = dots_in(xray_image);
+  const std::size_t balls = view.balls.size();
+  std::erase_if(*dots.dark, [&](const detection::Dot& dot) {
+    return std::ranges::any_of(
+        view.balls.begin() + 5, view.balls.end(),
+        [&](const simulation::TruePoint& ball) { return (dot.centre_px - ball.raw).norm() < 4; });
+  });
+  const auto found = label_fiducials(xray_image, dots, rectification, sound_case().calibrator, {});
+  ASSERT_FALSE(found);
+  EXPECT_THAT(found.error().message, testing::HasSubstr(fmt::format(
+                                         "that may be the calibrator's {} balls, which are from", balls)));
+  EXPECT_GE(found.error().figures.at("found"), 4);
+  EXPECT_LE(found.error().figures.at("found"), 0.6 * double(balls));
+  EXPECT_EQ(found.error().figures.at("balls"), double(balls));
+  EXPECT_GT(found.error().figures.at("ball_px"), 3);
+  EXPECT_THAT(found.error().message, testing::Not(testing::HasSubstr("hardly found")));
 }
 
 TEST(LabelFiducials, PaperMethodMeasuresWithinAPixelAndAHalf) {

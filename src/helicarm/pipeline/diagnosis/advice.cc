@@ -52,7 +52,15 @@ Advice of_ambiguous_labels(const Result& result) {
        "calibrator.json describes another phantom, or deviates from it by more than its tolerance"},
       "turn the C-arm by 10 to 15 degrees and acquire the view again, with the whole calibrator in the "
       "field"};
-  if (has_figure(*result.failure, "mirror_differs")) {
+  if (has_figure(*result.failure, "found")) {
+    std::swap(advice.causes[0], advice.causes[1]);
+    advice.causes[0] =
+        "most balls were not found: out of the field, behind metal, too faint, or too small for the "
+        "pixels";
+    advice.next =
+        "acquire the view again with the whole calibrator in the field, and with finer pixels or more dose "
+        "where its balls are small or faint in the image";
+  } else if (has_figure(*result.failure, "mirror_differs")) {
     advice.causes.insert(advice.causes.begin(), "it is not known whether the image is stored mirrored");
     advice.next = "state \"mirrored\" of the view in case.json";
   } else if (result.calibrator.tolerance_mm == 0 && has_figure(*result.failure, "runner_up_matched")) {
