@@ -61,11 +61,7 @@ CommandResult c_arm_report_command(const CArmReportArguments& arguments, Console
     if (console.json)
       console.out << to_text(report::to_json(model)) << '\n';
     else
-      console.out << fmt::format(
-          "{} acquisitions; source distance varies by {:.2f} mm over the positions and {:.2f} mm in one, "
-          "principal point by {:.2f} and {:.2f} mm; written to {}\n",
-          model.entries.size(), model.focal.smooth, model.focal.repeat, model.principal.smooth,
-          model.principal.repeat, arguments.out.string());
+      console.out << report::c_arm_text(model) << fmt::format("  written to {}\n", arguments.out.string());
   });
 }
 

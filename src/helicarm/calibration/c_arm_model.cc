@@ -9,6 +9,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "helicarm/calibration/c_arm_variations.h"
 #include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
 
@@ -96,22 +97,29 @@ double log_prior(const CArmVariation& variation, double of_view) {
   return -0.5 * (smooth * smooth + repeat * repeat);
 }
 
-double log_posterior(const CArmModel& model) {
+}  // namespace
+
+double log_likelihood(const CArmModel& model) {
   MatrixXd covariance = covariance_between(model, model.entries, model.entries, true);
   add_noise(covariance, model.entries);
   const VectorXd residual = deviations(model, model.entries);
   const Eigen::LLT<MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
   const VectorXd whitened = factor.matrixL().solve(residual);
-  return -0.5 * whitened.squaredNorm() - factor.matrixLLT().diagonal().array().log().sum() +
-         log_prior(model.focal, model.unknown.focal->of_view) +
+  return -0.5 * whitened.squaredNorm() - factor.matrixLLT().diagonal().array().log().sum();
+}
+
+namespace {
+
+double log_posterior(const CArmModel& model) {
+  return log_likelihood(model) + log_prior(model.focal, model.unknown.focal->of_view) +
          log_prior(model.principal, model.unknown.principal->of_view);
 }
 
 /// One kind's variation of greatest posterior density, on a grid.
 void fit_variation(CArmModel& model, CArmVariation CArmModel::*kind, double of_view) {
-  constexpr std::array smooth{0.06, 0.12, 0.25, 0.5, 1., 2., 4.},
-      repeat{0.012, 0.025, 0.05, 0.1, 0.2, 0.4, 0.8};
+  constexpr std::array smooth{0.06, 0.12, 0.25, 0.5, 1., 2., 4., 8., 16.};
+  constexpr std::array repeat{0.012, 0.025, 0.05, 0.1, 0.2, 0.4, 0.8};
   CArmVariation best = model.*kind;
   double highest = -std::numeric_limits<double>::infinity();
   for (const double s : smooth)

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/calibration/c_arm_variations.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
@@ -101,11 +102,17 @@ std::string summary(const CArmModel& model, std::span<const AcquisitionCheck> le
     html += fmt::format("<div class=\"card\"><b>{}</b><span>{}</span></div>\n", value, what);
   };
   card(fmt::format("{}", model.entries.size()), "acquisitions, the latest");
-  card(fmt::format("{:.2f} mm", model.focal.smooth), "variation of the source distance over the positions");
-  card(fmt::format("{:.2f} mm", model.focal.repeat), "from one acquisition to the next in one position");
-  card(fmt::format("{:.2f} mm", model.principal.smooth),
-       "variation of the principal point over the positions");
-  card(fmt::format("{:.2f} mm", model.principal.repeat), "from one acquisition to the next in one position");
+  const calibration::CArmVariations found = calibration::c_arm_variations(model);
+  const std::string in_one = ", from one acquisition to the next in one position, as standard deviation";
+  card(text_of(found.focal.smooth), "source distance, over the positions, as standard deviation (95 %)");
+  card(text_of(found.focal.repeat), "source distance" + in_one);
+  card(text_of(found.principal.smooth), "principal point, over the positions, as standard deviation (95 %)");
+  card(text_of(found.principal.repeat), "principal point" + in_one);
+  if (found.at_positions)
+    for (int axis = 0; axis < 3; ++axis)
+      card(fmt::format("{:.1f} to {:.1f} mm", found.at_positions->first[axis],
+                       found.at_positions->second[axis]),
+           std::string(intrinsic_titles[std::size_t(axis)]) + ", predicted at the recorded positions");
   card(fmt::format("{} of {}", inside, left_out.size()), "inside the 95 % region predicted by all others");
   return html + "</div>\n";
 }
@@ -154,12 +161,42 @@ Json json_of(std::span<const AcquisitionCheck> acquisitions) {
 
 }  // namespace
 
-Json to_json(const CArmModel& model) {
-  const auto variation = [](const calibration::CArmVariation& of) {
-    return Json{{"smooth", of.smooth}, {"repeat", of.repeat}};
+std::string c_arm_text(const CArmModel& model) {
+  const calibration::CArmVariations found = calibration::c_arm_variations(model);
+  std::string text = fmt::format("{} acquisitions; standard deviations (95 %):\n", model.entries.size());
+  const auto line = [&](const char* what, const calibration::VariationEstimates& of) {
+    text += fmt::format("  {}: over the positions {}; in one position {}\n", what, text_of(of.smooth),
+                        text_of(of.repeat));
   };
-  return {{"focal_mm", variation(model.focal)},
-          {"principal_mm", variation(model.principal)},
+  line("source distance", found.focal);
+  line("principal point", found.principal);
+  if (!found.at_positions)
+    return text + "  no acquisition states its angles: sag is not told from repeatability\n";
+  text += "  predicted at the recorded positions, mm:";
+  for (int axis = 0; axis < 3; ++axis)
+    text += fmt::format("{} {} {:.1f} to {:.1f}", axis == 0 ? "" : ",", intrinsic_names[std::size_t(axis)],
+                        found.at_positions->first[axis], found.at_positions->second[axis]);
+  return text + "\n";
+}
+
+Json to_json(const CArmModel& model) {
+  const calibration::CArmVariations found = calibration::c_arm_variations(model);
+  const auto variation = [](const calibration::VariationEstimates& of) {
+    Json json;
+    for (const auto& [name, one] : {std::pair("smooth", of.smooth), std::pair("repeat", of.repeat)}) {
+      json[name] = one.is_determined() ? Json(one.sigma_mm) : Json();
+      json[std::string(name) + "_95"] = {one.low_mm, one.high_mm ? Json(*one.high_mm) : Json()};
+    }
+    return json;
+  };
+  Json at_positions;
+  if (found.at_positions)
+    for (int axis = 0; axis < 3; ++axis)
+      at_positions[intrinsic_names[std::size_t(axis)]] = {found.at_positions->first[axis],
+                                                          found.at_positions->second[axis]};
+  return {{"focal_mm", variation(found.focal)},
+          {"principal_mm", variation(found.principal)},
+          {"at_positions_mm", at_positions},
           {"acquisitions", json_of(calibration::leave_one_out(model))}};
 }
 

@@ -17,7 +17,11 @@ Table c_arm_table(std::span<const calibration::AcquisitionCheck> acquisitions);
 /// prediction and the sigma of their difference, and chi2.
 std::string c_arm_csv(std::span<const calibration::AcquisitionCheck> acquisitions);
 
-/// Both variations, and each acquisition beside the prediction by all others.
+/// Lines of text: both variations with their intervals, and the range predicted at the positions.
+std::string c_arm_text(const calibration::CArmModel& model);
+
+/// Both variations with their intervals, the range predicted at the positions, and each acquisition beside
+/// the prediction by all others.
 Json to_json(const calibration::CArmModel& model);
 
 /// Chi-square of all acquisitions with its limit, and each acquisition.

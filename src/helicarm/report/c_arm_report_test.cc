@@ -37,6 +37,28 @@ TEST(CArmReport, FilesHoldEveryAcquisition) {
   EXPECT_THAT(csv, HasSubstr("A<B,2026-01-02,90,,1000.9"));
 }
 
+TEST(CArmReport, VariationsHaveIntervals) {
+  const Json json = to_json(model());
+  for (const char* kind : {"focal_mm", "principal_mm"})
+    for (const char* name : {"smooth_95", "repeat_95"})
+      EXPECT_EQ(json[kind][name].size(), 2U) << kind << name;
+  EXPECT_EQ(json["at_positions_mm"]["focal"].size(), 2U);
+  const std::string text = c_arm_text(model());
+  EXPECT_THAT(
+      text, HasSubstr("4 acquisitions; standard deviations (95 %):\n  source distance: over the positions"));
+  EXPECT_THAT(text, HasSubstr("predicted at the recorded positions, mm: focal "));
+}
+
+TEST(CArmReport, OfOneAcquisitionTheVariationsAreNotDetermined) {
+  calibration::CArmModel one = model();
+  one.entries.resize(1);
+  one.entries[0].primary_deg.reset();
+  const Json json = to_json(one);
+  EXPECT_TRUE(json["focal_mm"]["smooth"].is_null());
+  EXPECT_TRUE(json["at_positions_mm"].is_null());
+  EXPECT_THAT(c_arm_text(one), HasSubstr("not determined by these data"));
+}
+
 TEST(CArmReport, WithoutAnglesThereIsNoCurve) {
   calibration::CArmModel without = model();
   for (calibration::HistoryEntry& entry : without.entries) entry.primary_deg.reset();
