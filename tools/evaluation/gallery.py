@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Figures of the documents from simulated cases: PYTHONPATH=build/python tools/evaluation/gallery.py [FOLDER]"""
+import base64
 import json
 import pathlib
+import re
 import sys
 import tempfile
 
@@ -45,8 +47,22 @@ def measured_phantom(out):
     save(helicarm.figures.phantom(measured).figure, out / "phantom-measured.png")
 
 
+def planned_line(knee):
+    """Through the lateral condyle, from the notch's side to the outer cortex."""
+    slab = np.flatnonzero(np.abs(knee.s.ravel() - 18) < 0.5)[0]
+    p, l = np.nonzero(knee.femur_itself[slab])
+    to_mm = lambda i, axis: bone_ct.LOW[axis] + bone_ct.VOXEL_MM * i
+    middle = float(np.median(to_mm(p, 1)))
+    row = l[np.abs(to_mm(p, 1) - middle) < 1]
+    outer = float(to_mm(row.max(), 0)) + 3
+    ends = [(outer - 38, middle - 6, 12.0), (outer, middle, 26.0)]
+    return {"markups": [{"type": "Line", "name": "tunnel", "coordinateSystem": "LPS",
+                         "controlPoints": [{"label": str(i), "position": list(end)} for i, end in enumerate(ends)]}]}
+
+
 def registered_knee(out):
-    """The femur of a modelled knee, registered from a start 8 mm off, over the images that are not its own renderer's."""
+    """The femur of a modelled knee, registered from a start 8 mm off, over the images that are not its own renderer's, and a
+    planned tunnel in slices of its CT."""
     with tempfile.TemporaryDirectory() as name:
         case = pathlib.Path(name) / "case"
         knee = bone_ct.Knee(0)
@@ -58,9 +74,16 @@ def registered_knee(out):
         start[:3, 3] += [5, -5, 4]
         given = json.loads((case / "case.json").read_text())
         given["models"] = [{"name": "femur", "volume": "scan.nrrd", "mask": "femur.nrrd",
-                            "start": {"world_from_model": start.tolist()}}]
+                            "start": {"world_from_model": start.tolist()}, "plan": "plan.mrk.json"}]
+        given["tunnels"] = [{"name": "tunnel", "model": "femur", "diameter_mm": 8}]
+        (case / "plan.mrk.json").write_text(json.dumps(planned_line(knee)))
         (case / "case.json").write_text(json.dumps(given))
-        helicarm.register(case, out=case.with_name("out"))
+        try:
+            helicarm.register(case, out=case.with_name("out"))
+        except helicarm.RefusedError as error:
+            print(error)
+        slices = re.search(r'alt="slices of tunnel" src="data:image/png;base64,([^"]+)"', (case.with_name("out") / "report.html").read_text())
+        (out / "tunnel-slices.png").write_bytes(base64.b64decode(slices[1]))
         figure, axes = plt.subplots(1, 2, figsize=(10, 5))
         for ax, view in zip(axes, given["views"]):
             ax.imshow(plt.imread(case.with_name("out") / f"{view['name']}_overlay.png"))
