@@ -12,7 +12,7 @@ namespace helicarm::calibration {
 namespace {
 
 constexpr double drop_at_95 = 1.92;  // half the 95 % quantile of chi-square with one degree of freedom
-constexpr double none = -std::numeric_limits<double>::infinity();
+constexpr double impossible = -std::numeric_limits<double>::infinity();
 
 /// Standard deviations from 0 on, then by factors of 2.
 std::vector<double> ladder(double of_view, int lowest, int highest) {
@@ -55,7 +55,7 @@ VariationEstimate estimate_of(const std::vector<double>& at, const std::vector<d
 
 VariationEstimates estimates_of(CArmModel model, CArmVariation CArmModel::*kind, double of_view) {
   const std::vector<double> smooth = ladder(of_view, -6, 5), repeat = ladder(of_view, -8, 2);
-  std::vector<double> of_smooth(smooth.size(), none), of_repeat(repeat.size(), none);
+  std::vector<double> of_smooth(smooth.size(), impossible), of_repeat(repeat.size(), impossible);
   for (std::size_t s = 0; s < smooth.size(); ++s)
     for (std::size_t r = 0; r < repeat.size(); ++r) {
       model.*kind = {smooth[s], repeat[r]};
