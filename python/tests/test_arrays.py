@@ -116,6 +116,7 @@ def test_a_drr_is_the_exact_chord_of_a_block():
 
 def test_values_that_are_no_hounsfield_units_are_warned_of():
     voxels = np.random.default_rng(3).integers(0, 256, (6, 6, 6))
+    voxels.flat[:2] = 0, 255
     camera = helicarm.Camera.orbit([2.5, 2.5, 2.5], size=3, pixel_mm=1)
     with pytest.warns(UserWarning, match="not_hounsfield: volume: values of 0 to 255"):
         helicarm.drr(helicarm.Volume(voxels, np.eye(4), frame="LPS"), camera)

@@ -29,7 +29,7 @@ def test_a_result(result):
     assert schema_faults("result", result.to_dict()) == []
 
 
-@pytest.mark.parametrize("kind", ["tunnels", "check"])
+@pytest.mark.parametrize("kind", ["tunnels", "accuracy"])
 def test_a_result_with_tunnels_and_targets(tmp_path, kind):
     helicarm.simulate_case(tmp_path / "case", seed=5, size=512, kind=kind)
     assert schema_faults("result", helicarm.run_case(tmp_path / "case").to_dict()) == []

@@ -52,7 +52,7 @@ WITHOUT = {
 
 
 def program(*arguments):
-    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True)
+    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, encoding="utf-8")
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -168,7 +168,7 @@ def test_a_bundle_is_the_same(case, tmp_path):
 def session(tmp_path_factory):
     """An operation with virtual devices. On a busy machine late poses may stop it: then its record ends there."""
     folder = tmp_path_factory.mktemp("operate")
-    done = subprocess.run([PROGRAM, "operate", "--cases", "1", "--size", "512", "--out", folder, "--quiet"], capture_output=True, text=True)
+    done = subprocess.run([PROGRAM, "operate", "--cases", "1", "--size", "512", "--out", folder, "--quiet"], capture_output=True, encoding="utf-8")
     assert done.returncode in (0, 3), done.stderr
     return next(path.parent for path in folder.rglob("session.log"))
 

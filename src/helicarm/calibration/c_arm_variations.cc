@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
@@ -12,7 +13,6 @@ namespace helicarm::calibration {
 namespace {
 
 constexpr double drop_at_95 = 1.92;  // half the 95 % quantile of chi-square with one degree of freedom
-constexpr double impossible = -std::numeric_limits<double>::infinity();
 
 /// Standard deviations from 0 on, then by factors of 2.
 std::vector<double> ladder(double of_view, int lowest, int highest) {
@@ -28,18 +28,35 @@ double crossing(const std::vector<double>& at, const std::vector<double>& profil
   return i == 0 ? share * at[1] : at[i] * std::pow(at[i + 1] / at[i], share);
 }
 
-/// The vertex of the parabola through the highest step and those beside it.
-double vertex(const std::vector<double>& at, const std::vector<double>& profile, std::size_t best) {
-  if (best < 2 || best + 1 == at.size()) return at[best];
+/// The parabola through the highest step and those beside it, over factors of 2 from that step.
+struct Peak {
+  double at = 0, height = 0;
+  std::optional<double> reach = {};  ///< from there to the ends of the 95 % interval; nothing: no parabola
+};
+
+Peak peak_of(const std::vector<double>& profile, std::size_t best) {
+  if (best < 2 || best + 1 == profile.size()) return {0, profile[best]};
   const double before = profile[best - 1], after = profile[best + 1];
-  const double bend = before - 2 * profile[best] + after;
-  return bend < 0 ? at[best] * std::exp2(0.5 * (before - after) / bend) : at[best];
+  const double slope = 0.5 * (after - before), bend = 0.5 * (before + after) - profile[best];
+  if (!(bend < 0) || !std::isfinite(bend)) return {0, profile[best]};
+  return {-0.5 * slope / bend, profile[best] - 0.25 * slope * slope / bend, std::sqrt(-drop_at_95 / bend)};
+}
+
+double greatest(const std::vector<double>& profile) {
+  return peak_of(profile, std::size_t(std::ranges::max_element(profile) - profile.begin())).height;
 }
 
 VariationEstimate estimate_of(const std::vector<double>& at, const std::vector<double>& profile) {
   const auto best = std::size_t(std::ranges::max_element(profile) - profile.begin());
-  const double level = profile[best] - drop_at_95;
-  VariationEstimate estimate{vertex(at, profile, best), 0, {}};
+  const Peak peak = peak_of(profile, best);
+  const double level = peak.height - drop_at_95;
+  VariationEstimate estimate{at[best] * std::exp2(peak.at), 0, {}};
+  constexpr double most_reach = 1.5;  // beyond, the steps themselves are dense enough
+  if (peak.reach && *peak.reach < most_reach) {
+    estimate.low_mm = at[best] * std::exp2(peak.at - *peak.reach);
+    estimate.high_mm = at[best] * std::exp2(peak.at + *peak.reach);
+    return estimate;
+  }
   for (std::size_t i = best; i-- > 0;)
     if (profile[i] < level) {
       estimate.low_mm = crossing(at, profile, i, level);
@@ -55,14 +72,17 @@ VariationEstimate estimate_of(const std::vector<double>& at, const std::vector<d
 
 VariationEstimates estimates_of(CArmModel model, CArmVariation CArmModel::*kind, double of_view) {
   const std::vector<double> smooth = ladder(of_view, -6, 5), repeat = ladder(of_view, -8, 2);
-  std::vector<double> of_smooth(smooth.size(), impossible), of_repeat(repeat.size(), impossible);
+  std::vector<std::vector<double>> by_smooth(smooth.size(), std::vector<double>(repeat.size())),
+      by_repeat(repeat.size(), std::vector<double>(smooth.size()));
   for (std::size_t s = 0; s < smooth.size(); ++s)
     for (std::size_t r = 0; r < repeat.size(); ++r) {
       model.*kind = {smooth[s], repeat[r]};
-      const double likelihood = std::max(log_likelihood(model), std::numeric_limits<double>::lowest());
-      of_smooth[s] = std::max(of_smooth[s], likelihood);
-      of_repeat[r] = std::max(of_repeat[r], likelihood);
+      by_smooth[s][r] = by_repeat[r][s] =
+          std::max(log_likelihood(model), std::numeric_limits<double>::lowest());
     }
+  std::vector<double> of_smooth, of_repeat;
+  for (const std::vector<double>& row : by_smooth) of_smooth.push_back(greatest(row));
+  for (const std::vector<double>& row : by_repeat) of_repeat.push_back(greatest(row));
   return {estimate_of(smooth, of_smooth), estimate_of(repeat, of_repeat)};
 }
 

@@ -64,6 +64,18 @@ TEST(CArmVariations, WithoutAVariationThereIsAnUpperLimitOnly) {
   }
 }
 
+/// Whatever is estimated, of few and many acquisitions, lies within its own interval.
+TEST(CArmVariations, AnEstimateIsInItsInterval) {
+  for (const int count : {3, 12, 60})
+    for (const double sag_mm : {0.0, 0.5, 4.0, 15.0})
+      for (const double repeat_mm : {0.0, 0.3, 2.0}) {
+        const CArmVariations found = c_arm_variations(record(count, sag_mm, repeat_mm));
+        for (const VariationEstimate& each :
+             {found.focal.smooth, found.focal.repeat, found.principal.smooth, found.principal.repeat})
+          EXPECT_TRUE(holds(each, each.sigma_mm)) << text_of(each) << ", " << count << ", " << sag_mm;
+      }
+}
+
 TEST(CArmVariations, OneAcquisitionDeterminesNone) {
   const CArmVariations found = c_arm_variations(record(1, 0, 0));
   EXPECT_FALSE(found.focal.smooth.is_determined()) << text_of(found.focal.smooth);
