@@ -128,6 +128,7 @@ TEST(RegisteredModels, RefusedOneHasNoTunnelsAndNoPointsInTheImages) {
   ASSERT_EQ(outlines_of(with_registration(model), 0)[0].tunnels.size(), 1u);
   EXPECT_FALSE(outlines_of(with_registration(model), 0)[0].tunnels[0].warns);
   registration::BoneCheck thin{.diameter_mm = 3, .required_mm = 2, .bridge_mm = 1, .drilled_sigma_mm = 0.1};
+  thin.entry = Eigen::Vector3d::Zero();
   model.bone_checks = {thin};
   EXPECT_EQ(outlines_of(with_registration(model), 0)[0].tunnels[0].warns, ink::thin);
   model.bone_checks[0]->bridge_mm = -1;
