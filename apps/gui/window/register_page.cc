@@ -170,11 +170,12 @@ void RegisterPage::show_state(const ApplicationState& state) {
   hand_->setEnabled(can && state.registration);
   from_here_->setEnabled(can && state.nudged);
   says_->setText(words_of(state));
-  const std::vector<RegisteredModel> models = listed_models(state);
+  std::vector<RegisteredModel> models = listed_models(state);
   models_->fill(table_of_models(state, models));
   points_->fill(case_registration::points_table(models));
   tunnels_->fill(case_registration::tunnels_in_bone_table(models));
-  listed_ = models;
+  listed_ = std::move(models);
+  drawn_.first = -1;
   show_slices();
   if (shown_ == state.registration) return;
   shown_ = state.registration;
@@ -194,6 +195,11 @@ void RegisterPage::resizeEvent(QResizeEvent* event) {
 
 void RegisterPage::show_slices() {
   int row = std::max(0, tunnels_->currentRow());
+  // Slices that grow by a scroll bar's width would bring it back.
+  constexpr int least_gain_px = 40;
+  const int gain_px = width() - drawn_.second;
+  if (row == drawn_.first && gain_px >= 0 && gain_px < least_gain_px) return;
+  drawn_ = {row, width()};
   slices_->hide();
   for (const RegisteredModel& model : listed_)
     for (std::size_t i = 0; i < std::min(model.tunnels.size(), model.bone_checks.size()); ++i)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <utility>
 
 #include "gui/scene/scene_values.h"
 #include "gui/window/pages.h"
@@ -34,6 +35,7 @@ class RegisterPage : public Page {
   PageTable *models_, *tunnels_, *points_;
   QLabel* slices_;  ///< of the selected tunnel, or the first
   std::vector<case_registration::RegisteredModel> listed_;
+  std::pair<int, int> drawn_{-1, 0};  ///< row, and width of the page, of the slices that are shown
   QWidget* hand_;
   QComboBox* model_;
   std::array<PoseBox*, 6> by_{};  ///< mm, then degrees
