@@ -49,8 +49,8 @@ TEST(CArmVariations, ALargeSagIsNotCutOff) {
   ASSERT_TRUE(found.principal.smooth.high_mm);
   EXPECT_GT(*found.principal.smooth.high_mm, 10);
   ASSERT_TRUE(found.at_positions);
-  EXPECT_NEAR(found.at_positions->first.z(), -18, 0.4);
-  EXPECT_NEAR(found.at_positions->second.z(), 18, 0.4);
+  EXPECT_NEAR(found.at_positions->first.z(), -18, 0.8);
+  EXPECT_NEAR(found.at_positions->second.z(), 18, 0.8);
   EXPECT_LT(found.at_positions->second.y() - found.at_positions->first.y(), 1);
 }
 

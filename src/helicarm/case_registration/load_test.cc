@@ -23,7 +23,7 @@ class LoadLabelMap : public testing::Test {
     for (int i = 0; i < 24 * 24 * 24; ++i) {
       const int x = i % 24, y = i / 24 % 24, z = i / 576;
       const bool inside = std::min({x, y, z}) >= 4 && std::max({x, y, z}) < 20;
-      bone.push_back(inside ? 250 : 0);
+      bone.push_back(static_cast<std::uint8_t>(inside ? 250 : z));
       labels.push_back(!inside ? 0 : x < 12 ? 3 : 8);
     }
     model_.name = "femur";
