@@ -26,8 +26,8 @@
 #include "helicarm/xray/uid.h"
 #include "helicarm/xray/write_dicom.h"
 #include "image_files.h"
-#include "named_files.h"
 #include "measuring.h"
+#include "named_files.h"
 
 namespace helicarm::cli {
 

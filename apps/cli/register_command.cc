@@ -15,9 +15,9 @@
 #include "helicarm/report/earlier_results.h"
 #include "helicarm/track/model_sequence.h"
 #include "interruption.h"
+#include "measuring.h"
 #include "progress_line.h"
 #include "resumed_sequence.h"
-#include "measuring.h"
 
 namespace helicarm::cli {
 
