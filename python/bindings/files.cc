@@ -106,10 +106,11 @@ the plate, name_clash, bad_value, cannot_write, and as read_image.)");
 
 out: the file (tar.gz). result: result.json of an earlier run, or its folder. run: measure the packed case. Returns {"written",
 "files": {name: bytes}, "left_out"}. Text within the images' pixels stays. Raises InputError.)");
-  module.def("schema", &schema, py::arg("file"),
-             "The JSON Schema of a file that helicarm reads: calibrator, case, machine, plan, plate, "
-             "session. Raises\n"
-             "InputError: usage.");
+  module.def(
+      "schema", &schema, py::arg("file"),
+      "The JSON Schema of a file that helicarm reads (calibrator, case, machine, plan, plate, session) or "
+      "writes\n(registration, result, sweep). Raises "
+      "InputError: usage.");
 }
 
 }  // namespace helicarm::python

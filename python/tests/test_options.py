@@ -49,7 +49,7 @@ def both(tmp_path_factory):
 
 
 def program(*arguments, folder):
-    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, cwd=folder)
+    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, encoding="utf-8", cwd=folder)
     assert done.returncode in (0, 3), done.stderr
     return done.returncode
 

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -44,13 +45,18 @@ TEST(CArmVariations, HoldTheSagAndTheRepeatability) {
 }
 
 TEST(CArmVariations, ALargeSagIsNotCutOff) {
-  const CArmVariations found = c_arm_variations(record(40, 18, 0.05));
+  const CArmModel model = record(40, 18, 0.05);
+  const CArmVariations found = c_arm_variations(model);
   EXPECT_GT(found.principal.smooth.sigma_mm, 5);
   ASSERT_TRUE(found.principal.smooth.high_mm);
   EXPECT_GT(*found.principal.smooth.high_mm, 10);
   ASSERT_TRUE(found.at_positions);
-  EXPECT_NEAR(found.at_positions->first.z(), -18, 0.8);
-  EXPECT_NEAR(found.at_positions->second.z(), 18, 0.8);
+  const IntrinsicsPrediction ends =
+      predict_intrinsics(model, std::vector{model.entries.front(), model.entries.back()});
+  const double sigma_mm = std::sqrt(ends.covariance_mm2(5, 5));
+  EXPECT_LT(sigma_mm, 0.3);
+  EXPECT_NEAR(found.at_positions->first.z(), -18, 3 * sigma_mm);
+  EXPECT_NEAR(found.at_positions->second.z(), 18, 3 * sigma_mm);
   EXPECT_LT(found.at_positions->second.y() - found.at_positions->first.y(), 1);
 }
 

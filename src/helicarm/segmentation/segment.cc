@@ -56,26 +56,43 @@ bool on_bone(const Work& work, const Vector3i& voxel) {
   return work.bone.has(at) && work.bone.values[work.bone.index(at)] != empty;
 }
 
+[[noreturn]] void refuse_one_bone(const Seed& seed, const Seed& other) {
+  throw BadInput({Reason::seeds_in_one_bone,
+                  fmt::format("the seeds {} {} and {} {} are on one bone: between them it is never narrower "
+                              "than {:g} of its radius; leave one out, or raise the threshold where two "
+                              "bones have grown together in the CT",
+                              other.name, text_of(other.point), seed.name, text_of(seed.point), surely_one),
+                  {},
+                  {{"distance_mm", (other.point - seed.point).norm()}}});
+}
+
 /// The regions of the seeds, which must differ.
 std::vector<std::uint32_t> regions_of(const volume::Volume& ct, const Work& work, std::span<const Seed> seeds,
                                       Watershed& regions) {
   std::vector<std::uint32_t> found;
   for (const Seed& seed : seeds) {
     const std::uint32_t region = regions.region_at(work.bone.index(voxel_at(ct, seed.point) - work.first));
-    if (const auto same = std::ranges::find(found, region); same != found.end()) {
-      const Seed& other = seeds[std::size_t(same - found.begin())];
-      throw BadInput(
-          {Reason::seeds_in_one_bone,
-           fmt::format("the seeds {} {} and {} {} are on one bone: between them it is never narrower "
-                       "than {:g} of its radius; leave one out, or raise the threshold where two "
-                       "bones have grown together in the CT",
-                       other.name, text_of(other.point), seed.name, text_of(seed.point), surely_one),
-           {},
-           {{"distance_mm", (other.point - seed.point).norm()}}});
-    }
+    if (const auto same = std::ranges::find(found, region); same != found.end())
+      refuse_one_bone(seed, seeds[std::size_t(same - found.begin())]);
     found.push_back(region);
   }
   return found;
+}
+
+/// Refuses seeds whose bones, once joined, meet over a contact as wide as the bone beside it: the slow waist
+/// of one.
+void check_apart(Parts& parts, std::span<const Seed> seeds, const std::vector<std::uint32_t>& of_seeds) {
+  const auto seed_of = [&](std::uint32_t region) {
+    return std::size_t(
+        std::ranges::find(of_seeds, region, [&](std::uint32_t of) { return parts.regions.root(of); }) -
+        of_seeds.begin());
+  };
+  for (const Neck& neck : parts.regions.necks) {
+    const std::size_t a = seed_of(parts.regions.root(neck.a)), b = seed_of(parts.regions.root(neck.b));
+    if (a != b && std::max(a, b) < seeds.size() &&
+        parts.regions.local_width(neck, parts.depth()) >= surely_one)
+      refuse_one_bone(seeds[std::max(a, b)], seeds[std::min(a, b)]);
+  }
 }
 
 /// The voxel nearest to a point of a bone that is no speck; as text and, in mm, in `figures`.
@@ -169,6 +186,7 @@ Expected<Segmentation> segment(const volume::Volume& ct, std::span<const Seed> s
     check_on_bone(ct, parts, seeds, options.neck);
     const auto of_seeds = regions_of(ct, parts.work, seeds, parts.regions);
     const auto narrowest = join_regions(parts, of_seeds, options.neck);
+    check_apart(parts, seeds, of_seeds);
     progress.begin("label");
     std::vector<std::uint8_t> label_of(parts.regions.joined.size(), 0);
     Segmentation made = labelled(ct, parts, seeds, of_seeds, label_of);

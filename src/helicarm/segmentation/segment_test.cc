@@ -69,6 +69,7 @@ TEST(Segment, TheWaistOfAShaftIsNoJoint) {
   EXPECT_NEAR(made->bones[0].box.min().z(), -52, 1.1);
   EXPECT_EQ(made->bones[0].left_out_cm3, 0);
   EXPECT_THAT(made->warnings, IsEmpty());
+  EXPECT_EQ(refusal_of(ct, {{"ulna", {0, 0, 47}}, {"again", {0, 0, -47}}}).reason, Reason::seeds_in_one_bone);
 }
 
 TEST(Segment, AirInTheMarrowWhereTheVolumeCutsABone) {

@@ -94,6 +94,9 @@ Expected<StatedGeometry> read_sidecar(const fs::path& path) {
     stated.primary_deg = reader.optional_number("primary_deg", {-360, 360});
     stated.secondary_deg = reader.optional_number("secondary_deg", {-360, 360});
     reader.finish();
+    if (stated.primary_deg.has_value() != stated.secondary_deg.has_value())
+      reader.refuse(Reason::bad_value, stated.primary_deg ? "secondary_deg" : "primary_deg",
+                    "is missing: the positioner's angles are stated together, 0 where it is not tilted");
     return stated;
   });
 }

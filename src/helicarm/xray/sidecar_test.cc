@@ -83,19 +83,27 @@ TEST_F(Sidecar, StatesTheAnglesOfAnImageFile) {
 
 TEST_F(Sidecar, AnAngleMustAgreeWithTheFileButForWholeTurns) {
   write("a.dcm", DicomBuilder().text(0x00181510, "DS", "30 ").bytes());
-  write("a.dcm.json", R"({"primary_deg": -330.4})");
+  write("a.dcm.json", R"({"primary_deg": -330.4, "secondary_deg": 0})");
   EXPECT_EQ(read("a.dcm").value().acquisition.primary_angle_deg, 30);
-  write("a.dcm.json", R"({"primary_deg": 32})");
+  write("a.dcm.json", R"({"primary_deg": 32, "secondary_deg": 0})");
   const auto refused = read("a.dcm");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::bad_value);
   EXPECT_THAT(refused.error().message, testing::HasSubstr("a.dcm.json: \"primary_deg\" is 32"));
 }
 
+TEST_F(Sidecar, OneAngleWithoutTheOtherIsRefused) {
+  write_png("a.png");
+  write("a.json", R"({"primary_deg": 30})");
+  const auto refused = read("a.png");
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, testing::HasSubstr("a.json: \"secondary_deg\": is missing"));
+}
+
 TEST_F(Sidecar, OneAngleIsNotThatOfSeveralFrames) {
   write("a.dcm",
         DicomBuilder().text(0x00280008, "IS", "2").pixels(std::vector<std::uint16_t>(2 * 48, 100)).bytes());
-  write("a.dcm.json", R"({"primary_deg": 30})");
+  write("a.dcm.json", R"({"primary_deg": 30, "secondary_deg": 0})");
   const auto refused = read_xray_image(folder_.path() / "a.dcm", "AP", 1);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message, testing::HasSubstr("one angle for the 2 images of a.dcm"));
