@@ -160,12 +160,11 @@ void describe_model(Output& output, const RegisteredModel& model, const std::vec
       "tunnels", [&] { return tunnels_of(model); }, "as in [result.json](#resultjson)",
       [](auto& row, const CheckedTunnel& planned) {
         pipeline::describe_tunnel(row, planned.tunnel);
-        row.object("bone_check", planned.bone_check.has_value(),
-                   "[the tunnel against the bone](#bone_check), see below", [&](auto& check) {
-                     static const registration::BoneCheck none{};
-                     registration::describe_bone_check(check,
-                                                       planned.bone_check ? *planned.bone_check : none);
-                   });
+        row.object_of("bone_check", planned.bone_check,
+                      "[the tunnel against the bone](#bone_check), see below",
+                      [](auto& check, const registration::BoneCheck& of) {
+                        registration::describe_bone_check(check, of);
+                      });
       });
   output.value("seconds", found.seconds, "wall-clock time");
 }

@@ -183,10 +183,15 @@ class OutputJson {
   void object(const char* key, bool is_set, const char*, Describe&& describe) {
     json[key] = is_set ? written(describe) : Json(nullptr);
   }
+  /// Of an optional: `describe(output, value)`.
+  template <output::Optional T, class Describe>
+  void object_of(const char* key, const T& value, const char* help, Describe&& describe) {
+    object(key, value.has_value(), help, [&](OutputJson& row) { describe(row, *value); });
+  }
   /// Likewise, of a key that is written only where `present`.
-  template <class Describe>
-  void object_where(bool present, const char* key, bool is_set, const char* help, Describe&& describe) {
-    if (present) object(key, is_set, help, describe);
+  template <output::Optional T, class Describe>
+  void object_where(bool present, const char* key, const T& value, const char* help, Describe&& describe) {
+    if (present) object_of(key, value, help, describe);
   }
   /// A list of objects: `describe(output, item)`. `items` is a range, an optional one, or a function that
   /// returns one.
@@ -241,9 +246,14 @@ class OutputSchema {
   void object(const char* key, bool, const char* help, Describe&& describe) {
     add(key, output::or_null(described(describe)), help);
   }
-  template <class Describe>
-  void object_where(bool, const char* key, bool is_set, const char* help, Describe&& describe) {
-    object(key, is_set, help, describe);
+  template <output::Optional T, class Describe>
+  void object_of(const char* key, const T&, const char* help, Describe&& describe) {
+    const output::Required<T> value{};
+    object(key, false, help, [&](OutputSchema& row) { describe(row, value); });
+  }
+  template <output::Optional T, class Describe>
+  void object_where(bool, const char* key, const T& value, const char* help, Describe&& describe) {
+    object_of(key, value, help, describe);
     json["required"].erase(json["required"].size() - 1);
   }
   template <class Items, class Describe>

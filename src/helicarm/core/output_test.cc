@@ -48,10 +48,8 @@ void describe(Output& output, const Sample& sample) {
   output.value("centre", sample.centre, "position");
   output.value(
       "rows", [&] { return sample.rows; }, "matrix");
-  output.object("ball", sample.ball.has_value(), "the one", [&](auto& row) {
-    static const Ball none{};
-    describe_ball(row, sample.ball ? *sample.ball : none);
-  });
+  output.object_of("ball", sample.ball, "the one",
+                   [](auto& row, const Ball& ball) { describe_ball(row, ball); });
   output.list("balls", sample.balls, "all", [](auto& row, const Ball& ball) { describe_ball(row, ball); });
   output.value_where(sample.n > 3, "more", sample.n, "of more than three");
   output.map(

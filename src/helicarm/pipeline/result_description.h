@@ -40,10 +40,8 @@ void describe_verdict(Output& output, const std::optional<Failure>& failure, boo
   static constexpr std::array<std::string_view, 2> words{"ok", "refused"};
   output.word(
       "status", [&] { return words[is_refused ? 1 : 0]; }, words, "");
-  output.object("failure", failure.has_value(), "`null`, or why it was refused", [&](auto& row) {
-    static const Failure none{};
-    describe_failure(row, failure ? *failure : none);
-  });
+  output.object_of("failure", failure, "`null`, or why it was refused",
+                   [](auto& row, const Failure& why) { describe_failure(row, why); });
 }
 template <class Output>
 void describe_verdict(Output& output, const std::optional<Failure>& failure) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "helicarm/calibration/calibrated_view.h"
 #include "helicarm/core/output.h"
@@ -46,6 +47,16 @@ void describe_parameters(Output& output, const calibration::CalibratedView& view
     sigma.value(
         "rotation_deg", [&] { return sigmas<3>(view.covariance.block<3, 3>(4, 4) * deg2); },
         "about the camera's axes");
+  });
+}
+
+/// "parameters" of a view; null without a covariance.
+template <class Output>
+void describe_parameters(Output& output, const std::optional<calibration::CalibratedView>& view,
+                         const char* help) {
+  output.object("parameters", view && !view->covariance.isZero(0), help, [&](auto& row) {
+    static const calibration::CalibratedView none{};
+    describe_parameters(row, view ? *view : none);
   });
 }
 

@@ -25,10 +25,7 @@ void describe_camera(Output& output, const std::optional<CalibratedView>& camera
   output.value("dof", if_set(camera, &CalibratedView::dof), "expectation of `chi2`");
   output.value("projection", if_set(camera, [](const CalibratedView& of) { return of.view.projection(); }),
                "of the best estimate, as in [result.json](#resultjson); `null` if refused");
-  output.object("parameters", camera && !camera->covariance.isZero(0), "likewise", [&](auto& row) {
-    static const CalibratedView none{};
-    pipeline::describe_parameters(row, camera ? *camera : none);
-  });
+  pipeline::describe_parameters(output, camera, "likewise");
   output.object("intrinsics", camera.has_value(), "likewise", [&](auto& row) {
     const auto number = [&](const char* key, double Intrinsics::*which) {
       row.value(
@@ -63,10 +60,8 @@ void describe_frame(Output& output, const SweepFrame& frame) {
       "`warn`: its residuals, or its distance from the path, are larger than usual; the covariance is "
       "inflated "
       "where residuals are");
-  output.object("failure", frame.failure.has_value(), "of a refused image", [&](auto& row) {
-    static const Failure none{};
-    pipeline::describe_failure(row, frame.failure ? *frame.failure : none);
-  });
+  output.object_of("failure", frame.failure, "of a refused image",
+                   [](auto& row, const Failure& why) { pipeline::describe_failure(row, why); });
   output.object("angle_deg", frame.primary_angle_deg || frame.secondary_angle_deg,
                 "as the file states; `null`: not stated", [&](auto& row) {
                   row.value("primary", frame.primary_angle_deg, "");
@@ -160,10 +155,8 @@ void describe_sweep(Output& output, const Sweep& sweep) {
                "by which the standard deviations of the ball centres were multiplied, from all residuals");
   output.list("frames", sweep.frames, "in the order of the case; see below",
               [](auto& row, const SweepFrame& frame) { describe_frame(row, frame); });
-  output.object("path", sweep.path.has_value(), "see below", [&](auto& row) {
-    static const SweepPath none{};
-    describe_path(row, sweep.path ? *sweep.path : none, sweep);
-  });
+  output.object_of("path", sweep.path, "see below",
+                   [&](auto& row, const SweepPath& path) { describe_path(row, path, sweep); });
   output.value(
       "acquisitions", [&] { return calibration::acquisitions_json(sweep.acquisitions); },
       "as in [result.json](#resultjson), of up to 40 images, evenly spaced over the run");
