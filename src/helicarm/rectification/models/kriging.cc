@@ -43,25 +43,18 @@ VectorXd basis_row(const Vector2d& t, int order, const MatrixX2d& knots, double 
   return row;
 }
 
-/// The kernels at the knots of every dot, column by column.
-MatrixXd kernels_of_dots(const PlateDots& dots, const MatrixX2d& knots, double length) {
-  MatrixXd kernels(dots.raw.rows(), knots.rows());
-  const auto places = Eigen::Map<const Eigen::Matrix2Xd>(dots.points.front().data(), 2, kernels.rows());
-  const Eigen::ArrayXd x = places.row(0).transpose(), y = places.row(1).transpose();
-  for (Index k = 0; k < knots.rows(); ++k) {
-    const Eigen::ArrayXd s =
-        ((x - knots(k, 0)).square() + (y - knots(k, 1)).square()).sqrt() * (std::sqrt(3.0) / length);
-    kernels.col(k) = (1 + s) * (-s).exp();
-  }
-  return kernels;
-}
-
-/// `basis_row` of every dot.
+/// `basis_row` of every dot, column by column.
 MatrixXd rows_of_dots(const PlateDots& dots, int order, const MatrixX2d& knots, double length) {
   const Index terms = term_count(order);
   MatrixXd rows(dots.raw.rows(), terms + knots.rows());
   rows.leftCols(terms) = rows_for(dots, [&](const Vector2d& t) { return monomials(t, order); });
-  rows.rightCols(knots.rows()) = kernels_of_dots(dots, knots, length);
+  const auto places = Eigen::Map<const Eigen::Matrix2Xd>(dots.points.front().data(), 2, rows.rows());
+  const Eigen::ArrayXd x = places.row(0).transpose(), y = places.row(1).transpose();
+  for (Index k = 0; k < knots.rows(); ++k) {
+    const Eigen::ArrayXd s =
+        ((x - knots(k, 0)).square() + (y - knots(k, 1)).square()).sqrt() * (std::sqrt(3.0) / length);
+    rows.col(terms + k) = (1 + s) * (-s).exp();
+  }
   return rows;
 }
 
@@ -82,69 +75,29 @@ struct Roughness {
   double misfit = std::numeric_limits<double>::infinity();  ///< -2 log of the restricted likelihood
 };
 
-/// Weighted monomials of the dots and their products with one another and with the raw places, from which an
-/// affine part, which every order has, is taken.
-struct TrendProducts {
-  MatrixXd columns;  ///< of the highest order: a lower one's are the first of them
-  MatrixXd gram;
-  MatrixX2d raw, by_raw;
-};
-
-TrendProducts trend_products(const PlateDots& dots, int highest) {
-  constexpr Index affine = term_count(1);
-  const VectorXd root = dots.weights.cwiseSqrt();
-  TrendProducts trend;
-  trend.columns =
-      root.asDiagonal() * rows_for(dots, [&](const Vector2d& t) { return monomials(t, highest); });
-  trend.gram = geometry::gram(trend.columns);
-  trend.raw = root.asDiagonal() * dots.raw;
-  const MatrixXd coefficients = geometry::solve_spd(trend.gram.topLeftCorner<affine, affine>(),
-                                                    trend.columns.leftCols<affine>().transpose() * trend.raw)
-                                    .solution;
-  trend.raw -= trend.columns.leftCols<affine>() * coefficients;
-  trend.by_raw = trend.columns.transpose() * trend.raw;
-  return trend;
-}
-
-/// Products of the weighted kernels of one length, which serve the trends of every order.
-struct KernelProducts {
-  double length = 0;
-  MatrixXd whitens;  ///< the covariance of the knots
-  MatrixXd of_kernels, by_trend;
-  MatrixX2d by_raw;
-};
-
-std::optional<KernelProducts> kernel_products(const PlateDots& dots, const MatrixX2d& knots, double length,
-                                              const TrendProducts& trend) {
-  const auto whitens = geometry::whitening(gram_of(knots, length));
-  if (!whitens) return std::nullopt;
-  const MatrixXd kernels = dots.weights.cwiseSqrt().asDiagonal() * kernels_of_dots(dots, knots, length);
-  return KernelProducts{length, *whitens, geometry::gram(kernels), kernels.transpose() * trend.columns,
-                        kernels.transpose() * trend.raw};
-}
-
-/// Restricted likelihood (Patterson and Thompson 1971) of a remainder of one length, with the trend of so
-/// many terms projected out, maximised over gains; the dots' own sigmas are accepted within a factor of 1.5.
-Roughness roughness_of(const PlateDots& data, const KernelProducts& kernels, const TrendProducts& trend,
-                       Index terms) {
+/// Restricted likelihood (Patterson and Thompson 1971) of a remainder of one length, with the trend projected
+/// out, maximised over gains; the dots' own sigmas are accepted within a factor of 1.5.
+Roughness roughness_of(const PlateDots& data, const MatrixXd& rows, const MatrixXd& gram, double length) {
   constexpr double log_variance_sigma = 0.8;
-  const Index knots = kernels.whitens.rows();
-  const auto orthonormal = geometry::whitening(trend.gram.topLeftCorner(terms, terms));
-  if (!orthonormal) return {};
-  // In the orthonormal columns of the trend.
-  const MatrixXd shared = *orthonormal * kernels.by_trend.leftCols(terms).transpose();
-  const MatrixX2d taken = *orthonormal * trend.by_raw.topRows(terms);
-  const MatrixXd left = kernels.of_kernels - shared.transpose() * shared;
-  const double left_energy = trend.raw.squaredNorm() - taken.squaredNorm();
+  const Index knots = gram.rows();
+  const VectorXd root = data.weights.cwiseSqrt();
+  const MatrixXd weighted = root.asDiagonal() * rows;
+  const Index terms = rows.cols() - knots;
+  const MatrixXd trend = geometry::orthonormal_columns(weighted.leftCols(terms));
+  const auto whitens = geometry::whitening(gram);
+  if (!whitens) return {};
+  MatrixXd kernels = weighted.rightCols(knots);
+  kernels -= trend * (trend.transpose() * kernels);
+  MatrixX2d raw = root.asDiagonal() * data.raw;
+  raw -= trend * (trend.transpose() * raw);
   const geometry::SymmetricEigen modes =
-      geometry::symmetric_eigen(kernels.whitens * left * kernels.whitens.transpose());
-  const MatrixX2d along =
-      modes.vectors.transpose() * (kernels.whitens * (kernels.by_raw - shared.transpose() * taken));
-  const double freedom = 2.0 * double(trend.raw.rows() - terms);
+      geometry::symmetric_eigen(*whitens * geometry::gram(kernels) * whitens->transpose());
+  const MatrixX2d along = modes.vectors.transpose() * (*whitens * (kernels.transpose() * raw));
+  const double freedom = 2.0 * double(rows.rows() - terms);
   Roughness best;
   for (double gain = 1e-2; gain < 1e6; gain *= 1.5) {
     // y' (I + gain K K')^-1 y and log det (I + gain K K') for both axes, in the eigenbasis of K'K.
-    double energy = left_energy;
+    double energy = raw.squaredNorm();
     double log_determinant = 0;
     for (Index k = 0; k < knots; ++k) {
       const double raised = 1 + gain * std::max(0.0, modes.values[k]);
@@ -164,17 +117,17 @@ Roughness roughness_of(const PlateDots& data, const KernelProducts& kernels, con
       x -= std::clamp((freedom - pull + normal_prior * (x - std::log(data.variance))) / (pull + normal_prior),
                       -1.0, 1.0);
     }
-    if (misfit(x) < best.misfit) best = {kernels.length, gain, std::exp(x), misfit(x)};
+    if (misfit(x) < best.misfit) best = {length, gain, std::exp(x), misfit(x)};
   }
   return best;
 }
 
 /// Universal kriging. Length, strength and dot noise maximise the restricted likelihood.
-ModelFit fit_order(const PlateDots& dots, int order, const MatrixX2d& knots,
-                   const std::vector<KernelProducts>& lengths, const TrendProducts& trend) {
+ModelFit fit_order(const PlateDots& dots, int order, const MatrixX2d& knots) {
   Roughness best;
-  for (const KernelProducts& kernels : lengths) {
-    const Roughness roughness = roughness_of(dots, kernels, trend, term_count(order));
+  for (const double length : {0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.1, 1.6, 2.2}) {
+    const Roughness roughness =
+        roughness_of(dots, rows_of_dots(dots, order, knots, length), gram_of(knots, length), length);
     if (roughness.misfit < best.misfit) best = roughness;
   }
   if (!(best.length > 0)) return {};
@@ -200,12 +153,8 @@ ModelFit kriging_fit(const PlateDots& dots, std::optional<int> order) {
   const int highest = n > 200 ? std::min(highest_order(n), 5) : cubic;
   if (highest_order(n) < order.value_or(cubic)) return {};
   const MatrixX2d knots = thinned(dots.points);
-  const TrendProducts trend = trend_products(dots, order.value_or(highest));
-  std::vector<KernelProducts> lengths;
-  for (const double length : {0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.1, 1.6, 2.2})
-    if (auto products = kernel_products(dots, knots, length, trend)) lengths.push_back(*std::move(products));
   return simplest_good(order.value_or(cubic), order.value_or(highest),
-                       [&](int o) { return fit_order(dots, o, knots, lengths, trend); });
+                       [&](int o) { return fit_order(dots, o, knots); });
 }
 
 }  // namespace
