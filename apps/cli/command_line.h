@@ -8,6 +8,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -69,26 +71,49 @@ std::optional<double> number_for(const Field<Options>& field, const std::string&
   return std::nullopt;
 }
 
+/// The option of a field that has a flag, with its help and limits; `take` gets the number stated.
+template <class Options, class Take>
+CLI::Option* add_field(CLI::App* command, const Field<Options>& field, Take take, const std::string& help) {
+  const auto check = [&field](const std::string& word) -> std::string {
+    const auto number = number_for(field, word);
+    return number && check_number(field, number, "") ? ""
+                                                     : fmt::format("{} is not {}", word, limits_of(field));
+  };
+  return command
+      ->add_option_function<std::string>(
+          std::string(field.flag),
+          [&field, take](const std::string& word) { take(number_for(field, word)); }, help)
+      ->type_name(field.words.empty() ? "NUMBER" : "WORD")
+      ->check(CLI::Validator(check, limits_of(field)));
+}
+
 /// Options for the fields that have a flag, with help, limits and defaults.
 template <class Options, std::size_t count>
 void add_fields(CLI::App* command, Options& options, const std::array<Field<Options>, count>& fields) {
   for (const Field<Options>& field : fields) {
     if (field.flag.empty()) continue;
-    const auto check = [&field](const std::string& word) -> std::string {
-      const auto number = number_for(field, word);
-      return number && check_number(field, number, "") ? ""
-                                                       : fmt::format("{} is not {}", word, limits_of(field));
-    };
-    auto* option = command->add_option_function<std::string>(
-        std::string(field.flag),
-        [&](const std::string& word) { field.set(options, number_for(field, word)); },
+    auto* option = add_field(
+        command, field, [&](std::optional<double> number) { field.set(options, number); },
         std::string(field.help));
-    option->type_name(field.words.empty() ? "NUMBER" : "WORD")
-        ->check(CLI::Validator(check, limits_of(field)));
     if (const auto value = field.get(options))
       option->default_str(field.words.empty() ? fmt::format("{:.12g}", *value)
                                               : std::string(field.words[std::size_t(*value)]));
   }
+}
+
+/// Numbers that a command line states in place of a file's.
+template <class Options>
+using Overrides = std::vector<std::pair<const Field<Options>*, std::optional<double>>>;
+
+/// Options without defaults for the fields that have a flag.
+template <class Options, std::size_t count>
+void add_overrides(CLI::App* command, Overrides<Options>& overrides, const char* file,
+                   const std::array<Field<Options>, count>& fields) {
+  for (const Field<Options>& field : fields)
+    if (!field.flag.empty())
+      add_field(
+          command, field, [&](std::optional<double> number) { overrides.emplace_back(&field, number); },
+          fmt::format("{}; overrides \"{}\" of {}", field.help, field.name, file));
 }
 
 /// A command whose arguments live as long as its callback.

@@ -62,24 +62,14 @@ void add_run_options(CLI::App* command, RunArguments& arguments, const char* mac
       ->excludes(cache);
 }
 
-Expected<std::optional<calibration::CArmHistory>> history_at(
-    const std::optional<std::filesystem::path>& path) {
-  if (!path) return std::optional<calibration::CArmHistory>();
-  return calibration::history_at(*path).map(
-      [](calibration::CArmHistory history) { return std::optional(std::move(history)); });
-}
-
-Expected<rectification::Method> method_named(const std::string& name) {
-  if (name == "best") return rectification::Method::best;
-  if (name == "paper") return rectification::Method::paper;
-  return fail(Reason::usage, fmt::format("--method: \"{}\" is none of: best, paper", name));
-}
-
 Expected<case_registration::RegisterOptions> options_of(const RunArguments& arguments, Console& console) {
-  return history_at(arguments.history).map([&](std::optional<calibration::CArmHistory> history) {
+  return guarded([&] {
     case_registration::RegisterOptions options = arguments.options;
     options.run.threads = console.threads;
-    options.run.history = std::move(history);
+    if (arguments.history)
+      options.run.history = value_or_throw(arguments.extends_history
+                                               ? calibration::history_at(*arguments.history)
+                                               : calibration::read_history(*arguments.history));
     if (!arguments.no_cache)
       options.run.cache = arguments.cache ? arguments.cache : pipeline::user_cache_folder();
     return options;
@@ -106,11 +96,12 @@ Expected<Measurement> measure(const RunArguments& arguments, Console& console) {
 Expected<Measurement> run_and_write(const RunArguments& arguments, Console& console) {
   return guarded([&] {
     report::forget_results(arguments.out);
-    if (arguments.history) value_or_throw(calibration::check_history_file(*arguments.history));
+    if (arguments.history && arguments.extends_history)
+      value_or_throw(calibration::check_history_file(*arguments.history));
     Measurement measured = value_or_throw(measure(arguments, console));
     value_or_throw(case_registration::write_models(measured.registration, arguments.out));
     value_or_throw(report::write_result(measured.result, arguments.out, !arguments.no_report));
-    if (arguments.history && !measured.result.failure)
+    if (arguments.history && arguments.extends_history && !measured.result.failure)
       value_or_throw(add_to_c_arm_history(*arguments.history, measured.result, console));
     return measured;
   });

@@ -15,7 +15,8 @@ struct RunArguments {
   std::filesystem::path out = "helicarm-result";
   case_registration::RegisterOptions options = {};  ///< threads and C-arm history are filled in
   bool no_report = false;  ///< only result.json, and registration.json with its report
-  std::optional<std::filesystem::path> history = {};  ///< the C-arm's history: read and extended
+  std::optional<std::filesystem::path> history = {};  ///< the C-arm's history
+  bool extends_history = false;  ///< by this case's acquisitions; a missing file is then a new history
   std::optional<std::filesystem::path> cache = {};    ///< of plate images' maps; nothing: the user's
   bool no_cache = false;
 };
@@ -34,15 +35,8 @@ Expected<case_registration::Measurement> measure(const RunArguments& arguments, 
 /// As `run_one_case`, and returns the measurement; prints nothing to `console.out`.
 Expected<case_registration::Measurement> run_and_write(const RunArguments& arguments, Console& console);
 
-/// A C-arm's history from the named file; empty if the file does not exist or none is named.
-Expected<std::optional<calibration::CArmHistory>> history_at(
-    const std::optional<std::filesystem::path>& path);
-
 /// The arguments' options with threads and C-arm history.
 Expected<case_registration::RegisterOptions> options_of(const RunArguments& arguments, Console& console);
-
-/// "best" or "paper"; usage otherwise.
-Expected<rectification::Method> method_named(const std::string& name);
 
 /// Decision, pose, agreement and plan points of each model, for a terminal.
 std::string summary_of(const case_registration::CaseRegistration& registration);

@@ -34,9 +34,8 @@ struct NavigateArguments {
   std::filesystem::path plan;
   std::filesystem::path out = "session";
   std::filesystem::path picks;  ///< awaited after the images; empty: those of the plan
-  std::optional<double> plan_age_s, max_error_mm, motion_sigma_mm;  ///< override the plan's
-  std::optional<std::string> method;                                ///< overrides the plan's
-  std::optional<std::filesystem::path> history;                     ///< the C-arm's, read only
+  Overrides<operation::OperationPlan> overrides;  ///< of the plan
+  std::optional<std::filesystem::path> history;   ///< the C-arm's, read only
   receiver::ReceiverOptions receiver;
   bool yes = false;  ///< confirm every order automatically: for rehearsals
 };
@@ -308,11 +307,8 @@ void carry_out(const operation::OperationPlan& plan, const NavigateArguments& ar
 
 /// What the command line states instead of the plan.
 void put_options(const NavigateArguments& arguments, operation::OperationPlan& plan) {
-  plan.limits.age_s = arguments.plan_age_s.value_or(plan.limits.age_s);
-  plan.max_error_mm = arguments.max_error_mm.value_or(plan.max_error_mm);
-  plan.motion_sigma_mm = arguments.motion_sigma_mm.value_or(plan.motion_sigma_mm);
-  if (arguments.method) plan.method = value_or_throw(method_named(*arguments.method));
-  if (arguments.history) plan.history = value_or_throw(calibration::read_history(*arguments.history));
+  for (const auto& [field, number] : arguments.overrides) field->set(plan, number);
+  if (arguments.history) plan.measuring.run.history = value_or_throw(calibration::read_history(*arguments.history));
 }
 
 }  // namespace
@@ -323,7 +319,7 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     operation::OperationPlan plan = value_or_throw(
         operation::plan_from(value_or_throw(read_json(arguments.plan)), arguments.plan.string()));
     put_options(arguments, plan);
-    plan.threads = console.threads;
+    plan.measuring.run.threads = console.threads;
     check_before_images(plan, arguments);
     StopSignal stop;
     value_or_throw(make_private_folder(arguments.out));
@@ -353,17 +349,7 @@ void add_navigate(CLI::App& app, Action& action) {
       "JSON file with \"picks\" as in case.json; it may be written after the images have arrived");
   command->add_option("--address", a.receiver.address, "Address to listen on for images")
       ->capture_default_str();
-  constexpr auto& age = field_named<operation::OperationPlan>(operation::plan_fields, "plan_stale_s");
-  command
-      ->add_option("--plan-age", a.plan_age_s,
-                   "Age in s at which an unconfirmed plan expires; overrides the plan's plan_stale_s")
-      ->check(within(age.range.low, age.range.high));
-  add_number(command, field_named<pipeline::RunOptions>(pipeline::run_fields, "max_error_mm"),
-             a.max_error_mm);
-  add_number(command, field_named<pipeline::RunOptions>(pipeline::run_fields, "motion_sigma_mm"),
-             a.motion_sigma_mm);
-  command->add_option("--method", a.method, "best, or paper: the published recipe; overrides the plan's")
-      ->type_name("WORD");
+  add_overrides(command, a.overrides, "the plan", operation::plan_fields);
   command->add_option("--machine", a.history, "The C-arm's history (JSON), read only");
   add_fields(command, a.receiver, receiver::receiver_fields);
   command->add_option("--title", a.receiver.negotiation.title, "Application entity title of this receiver")

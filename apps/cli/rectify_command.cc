@@ -15,6 +15,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/image/png.h"
 #include "helicarm/pipeline/result.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/rectification/displacement_field.h"
 #include "helicarm/rectification/distortion_model.h"
 #include "helicarm/rectification/inpaint.h"
@@ -40,7 +41,7 @@ struct RectifyArguments {
   std::optional<std::filesystem::path> points;  ///< CSV: u_px,v_px
   std::optional<double> test_grid_mm;           ///< pitch of the grid of 3.1
   std::filesystem::path out = "helicarm-rectified";
-  std::string method = "best";
+  rectification::Method method = rectification::Method::best;
   std::optional<std::string> model;  ///< distortion model; nothing: automatic
   bool inverse = false;              ///< points: rectified -> raw
   bool stages = false;               ///< also the images of the paper's Fig. 2
@@ -116,7 +117,7 @@ void rectify_image(const RectifyArguments& arguments, Console& console) {
   const xray::XrayImage xray_image = read(arguments.images.front(), arguments, console);
   const rectification::Rectification r = value_or_throw(rectification::rectify(
       xray_image, plate_from(*arguments.plate),
-      {value_or_throw(method_named(arguments.method)), {}, arguments.model.value_or("")}));
+      {arguments.method, {}, arguments.model.value_or("")}));
   print_warnings(r.warnings, console);
   std::string residuals = "u_px,v_px,residual_px\n";
   for (std::size_t i = 0; i < r.plate_dots.size(); ++i)
@@ -269,9 +270,9 @@ CommandResult rectify_command(const RectifyArguments& arguments, Console& consol
   return guarded([&] {
     const RectifyArguments& a = arguments;
     if (!a.images.empty() && !a.points && !a.test_grid_mm) forget(a);
-    if (a.stages && (!a.plate || a.method != "paper"))
+    if (a.stages && (!a.plate || a.method != rectification::Method::paper))
       throw BadInput(Reason::usage, "rectify: --stages is of IMAGE --plate --method paper");
-    if (a.model && (!a.plate || a.method == "paper"))
+    if (a.model && (!a.plate || a.method == rectification::Method::paper))
       throw BadInput(Reason::usage, "rectify: --model is of IMAGE --plate --method best");
     if (a.field && (a.images.empty() || a.test_grid_mm))
       throw BadInput(Reason::usage, "rectify: --field is of IMAGE --plate and of IMAGE... --map");
@@ -314,9 +315,11 @@ void add_rectify(CLI::App& app, Action& action) {
   command->add_flag("--keep-patient", a.keep_patient,
                     "Written images keep the patient and the study of theirs, to be stored with it (default: "
                     "neither name nor dates nor UIDs)");
-  command->add_option("--method", a.method, "best, or paper: Hough circles and a quadratic")
-      ->type_name("WORD")
-      ->capture_default_str();
+  add_field(
+      command, field_named<pipeline::RunOptions>(pipeline::run_fields, "method"),
+      [&](std::optional<double> number) { a.method = rectification::Method(int(*number)); },
+      "best, or paper: Hough circles and a quadratic")
+      ->default_str(std::string(word(a.method)));
   command
       ->add_option("--model", a.model,
                    "Distortion model, with --method best: " + rectification::model_names() +

@@ -169,6 +169,7 @@ void add_run(CLI::App& app, Action& action) {
                    "Folder for result.json, report.html and the overlays; with several cases for a folder of "
                    "each and summary.csv")
       ->capture_default_str();
+  a.extends_history = true;
   add_run_options(command, a,
                   "The C-arm's history (JSON): used as prior; this case's acquisitions are added");
   add_fields(command, a.options.search, case_registration::search_fields);

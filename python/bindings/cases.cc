@@ -39,7 +39,8 @@ case_registration::Measurement run(const std::filesystem::path& folder, const st
                                    const std::optional<std::filesystem::path>& history,
                                    const py::object& cache, const py::object& progress) {
   const case_registration::RegisterOptions options = measuring_options(
-      "run_case", method, max_error_mm, motion_sigma_mm, search_mm, search_deg, threads, history, cache);
+      "run_case", method, max_error_mm, motion_sigma_mm, search_mm, search_deg, threads, history, cache,
+      true);
   if (history) value_or_raise(calibration::check_history_file(*history));
   const RunHooks hooks = run_hooks(progress);
   case_registration::Measurement measured = value_or_raise(without_gil([&] {
@@ -141,7 +142,7 @@ void add_result_points(py::module_& module) {
       .def_readonly("name", &Point::name)
       .def_property_readonly(
           "source",
-          [](const Point& p) { return p.source == localization::PointSource::pick ? "pick" : "target"; })
+          [](const Point& p) { return word(p.source); })
       .def_property_readonly(
           "xyz_mm", of_place([](const guidance::PointInFrames& g) -> py::object {
             return read_only(rows_array<3>({g.in_calibrator}, true));
@@ -279,7 +280,7 @@ void add_cases(py::module_& module) {
   const pipeline::RunOptions& usual = searched.run;
   module.def(
       "run_case", &run, py::arg("folder"), py::kw_only(),
-      py::arg("method") = std::string(pipeline::method_words[std::size_t(usual.method)]),
+      py::arg("method") = std::string(word(usual.method)),
       py::arg("max_error_mm") = usual.max_error_mm, py::arg("motion_sigma_mm") = usual.motion_sigma_mm,
       py::arg("search_mm") = searched.search.shift_mm, py::arg("search_deg") = searched.search.turn_deg,
       py::arg("threads") = usual.threads, py::arg("history") = py::none(), py::arg("cache") = true,

@@ -14,7 +14,7 @@ case_registration::RegisterOptions measuring_options(const char* function, const
                                                      double motion_sigma_mm, double search_mm,
                                                      double search_deg, unsigned threads,
                                                      const std::optional<std::filesystem::path>& history,
-                                                     const py::object& cache) {
+                                                     const py::object& cache, bool extends_history) {
   case_registration::RegisterOptions options;
   options.run.method = method_of(method);
   for (const auto& field : pipeline::run_fields) {
@@ -32,7 +32,9 @@ case_registration::RegisterOptions measuring_options(const char* function, const
     options.run.cache = cache.cast<bool>() ? pipeline::user_cache_folder() : std::nullopt;
   else
     options.run.cache = cache.cast<std::filesystem::path>();
-  if (history) options.run.history = value_or_raise(calibration::history_at(*history));
+  if (history)
+    options.run.history = value_or_raise(extends_history ? calibration::history_at(*history)
+                                                         : calibration::read_history(*history));
   return options;
 }
 

@@ -94,7 +94,7 @@ py::array dots(const rectification::Rectification& r) {
 }  // namespace
 
 rectification::Method method_of(const std::string& word) {
-  return rectification::Method(checked_word(word, pipeline::method_words, "method"));
+  return rectification::Method(checked_word(word, rectification::method_words, "method"));
 }
 
 namespace {
@@ -227,7 +227,7 @@ void add_rectification(py::module_& module) {
       });
   module.def(
       "rectify", &rectified, py::arg("image"), py::arg("plate"), py::kw_only(),
-      py::arg("method") = std::string(pipeline::method_words[std::size_t(pipeline::RunOptions{}.method)]),
+      py::arg("method") = std::string(word(pipeline::RunOptions{}.method)),
       py::arg("model") = py::none(),
       R"(Finds the plate in an image and fits the distortion map (2.1, Eq. 1-3).
 

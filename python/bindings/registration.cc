@@ -184,7 +184,7 @@ void add_registration(py::module_& module) {
   const case_registration::RegisterOptions defaults;
   module.def(
       "register", &register_models, py::arg("folder"), py::kw_only(), py::arg("out") = py::none(),
-      py::arg("method") = std::string(pipeline::method_words[std::size_t(defaults.run.method)]),
+      py::arg("method") = std::string(word(defaults.run.method)),
       py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
       py::arg("search_mm") = defaults.search.shift_mm, py::arg("search_deg") = defaults.search.turn_deg,
       py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(), py::arg("cache") = true,
@@ -206,7 +206,7 @@ void add_registration(py::module_& module) {
   module.def(
       "register_sequence", &register_sequence, py::arg("folder"), py::arg("frames"), py::kw_only(),
       py::arg("out") = py::none(), py::arg("resume") = false,
-      py::arg("method") = std::string(pipeline::method_words[std::size_t(defaults.run.method)]),
+      py::arg("method") = std::string(word(defaults.run.method)),
       py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
       py::arg("search_mm") = defaults.search.shift_mm, py::arg("search_deg") = defaults.search.turn_deg,
       py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(), py::arg("cache") = true,

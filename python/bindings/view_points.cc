@@ -288,7 +288,7 @@ Raises InputError: bad_value, not_finite, usage; RefusedError: not_seen for raw 
       });
   module.def(
       "label", &labelled, py::arg("image"), py::arg("calibrator"), py::arg("map") = py::none(), py::kw_only(),
-      py::arg("mirrored") = py::none(), py::arg("method") = std::string(pipeline::method_words[0]),
+      py::arg("mirrored") = py::none(), py::arg("method") = std::string(rectification::method_words[0]),
       R"(Finds a calibrator's balls in an image, labels them and measures their centres, as run_case does (2.3.4).
 
 map: the Rectification of this image, the DistortionMap of a plate's own image, or None for a flat panel. mirrored:

@@ -93,10 +93,10 @@ Expected<void> write_pdf_report(const pipeline::Result& result, const std::files
     writer.setResolution(300);
     writer.setTitle(ReportWords::tr("helicarm report"));
     writer.setCreator("helicarm " HELICARM_VERSION);
-    const QString method = result.options.method == rectification::Method::paper ? "paper" : "best";
+    const std::string method(word(result.options.method));
     PdfLayout layout(writer,
                      ReportWords::tr("helicarm %1, method %2 · research instrument, not a medical device")
-                         .arg(HELICARM_VERSION, method));
+                         .arg(HELICARM_VERSION, method.c_str()));
     draw_summary(result, layout);
     draw_views(result, layout);
     draw_tables(result, layout);

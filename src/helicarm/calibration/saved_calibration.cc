@@ -7,6 +7,7 @@
 #include "helicarm/geometry/decomposition.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
+#include "helicarm/rectification/rectify.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -32,7 +33,7 @@ CalibratedView view_from(JsonReader& reader) {
   view.dlt = geometry::factors_from_projection(projection);
   view.reprojection_rms_px = reader.optional_number("reprojection_rms_px", any_number).value_or(0);
   view.dof = int(reader.optional_number("dof", {0, 1e6}).value_or(0));
-  view.by_paper = reader.has("method") && reader.choice("method", {"best", "paper"}) == 1;
+  view.by_paper = reader.has("method") && reader.choice("method", {rectification::method_words[0], rectification::method_words[1]}) == 1;
   return view;
 }
 
@@ -143,7 +144,7 @@ Json to_json(const SavedCalibration& calibration) {
                   {"camera_from_calibrator", geometry::json_rows(view.view.camera_from_world.matrix())},
                   {"reprojection_rms_px", view.reprojection_rms_px},
                   {"dof", view.dof},
-                  {"method", view.by_paper ? "paper" : "best"},
+                  {"method", rectification::method_words[view.by_paper ? 1 : 0]},
                   {"rectification", nullptr},
                   {"fiducials", Json::array()}};
     if (const auto& map = calibration.maps[i])

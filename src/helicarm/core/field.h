@@ -80,6 +80,19 @@ constexpr auto bound(Field<typename detail::OptionsOf<decltype(first)>::type> fi
   return field;
 }
 
+/// A field of one part's options as a field of the whole that holds them, by the same name, limits and help.
+template <auto first, auto... rest, class Part>
+constexpr auto bound_as(const Field<Part>& part) {
+  return bound<first, rest...>({.name = part.name,
+                                .label = part.label,
+                                .flag = part.flag,
+                                .unit = part.unit,
+                                .range = part.range,
+                                .step = part.step,
+                                .help = part.help,
+                                .words = part.words});
+}
+
 /// The field of this name; an unknown name is a compile error in a constant expression.
 template <class Options>
 constexpr const Field<Options>& field_named(std::span<const Field<Options>> fields, std::string_view name) {

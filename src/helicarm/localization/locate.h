@@ -26,7 +26,10 @@ struct PointObservation {
   Eigen::Matrix3d anchor_covariance = Eigen::Matrix3d::Zero();
 };
 
+/// A person's mark, or a ball or wire that the program finds.
 enum class PointSource { pick, target };
+inline constexpr std::array<std::string_view, 2> source_words{"pick", "target"};
+constexpr std::string_view word(PointSource source) { return source_words[std::size_t(source)]; }
 
 /// A located point. Its anchor is the frame in which it is at rest between the acquisitions: the calibrator
 /// or a bone.

@@ -9,7 +9,7 @@ namespace helicarm::localization {
 Json point_json(const std::string& name, PointSource source, Reason reason) {
   Json json;
   json["name"] = name;
-  json["source"] = source == PointSource::pick ? "pick" : "target";
+  json["source"] = word(source);
   json["xyz_mm"] = nullptr;
   json["frame"] = "calibrator";
   for (const char* key : {"covariance_mm2", "ray_gap_mm", "predicted_mm", "error_95_mm"}) json[key] = nullptr;

@@ -161,7 +161,7 @@ Expected<void> check_digests(const fs::path& folder, const Digests& files) {
 
 Expected<pipeline::Result> measure_case(const pipeline::Case& given, const OperationPlan& plan,
                                         const std::optional<pipeline::Result>& earlier) {
-  return pipeline::measure_again(earlier, given, run_options(plan));
+  return pipeline::measure_again(earlier, given, measuring_options(plan).run);
 }
 
 Json without_timing(Json result) {

@@ -134,11 +134,9 @@ Expected<CaseRegistration> register_models(const OperationPlan& plan, const pipe
   return guarded([&] {
     if (!measured.calibration) throw BadInput(Reason::usage, "no measurement yet");
     const pipeline::Case with_models = with_models_of(plan, given);
-    case_registration::RegisterOptions options;
-    options.run = run_options(plan);
     return value_or_throw(case_registration::register_loaded(
-        with_models, case_registration::views_of_calibration(with_models, *measured.calibration), options,
-        progress));
+        with_models, case_registration::views_of_calibration(with_models, *measured.calibration),
+        measuring_options(plan), progress));
   });
 }
 

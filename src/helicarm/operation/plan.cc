@@ -113,13 +113,9 @@ Expected<std::vector<pipeline::Pick>> picks_of(const OperationPlan& plan, const 
   return pipeline::picks_from(picks, origin, views, plan.bones);
 }
 
-pipeline::RunOptions run_options(const OperationPlan& plan) {
-  pipeline::RunOptions options;
-  options.method = plan.method;
-  options.max_error_mm = plan.max_error_mm;
-  options.motion_sigma_mm = plan.motion_sigma_mm;
-  options.history = plan.history;
-  options.threads = plan.threads;
+case_registration::RegisterOptions measuring_options(const OperationPlan& plan) {
+  case_registration::RegisterOptions options = plan.measuring;
+  options.run.max_error_mm = plan.max_error_mm;
   return options;
 }
 

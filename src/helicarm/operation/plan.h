@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "helicarm/calibration/c_arm_history.h"
+#include "helicarm/case_registration/register_case.h"
 #include "helicarm/core/json.h"
 #include "helicarm/devices/robot/plan_approach.h"
 #include "helicarm/devices/tracker/check_point.h"
@@ -106,18 +106,17 @@ struct OperationPlan {
   std::vector<PlannedTunnel> tunnels;
   std::vector<PlannedCheck> check_points;
   std::vector<pipeline::Pick> picks;  ///< may be set after the acquisition
-  double max_error_mm = 2;            ///< limit of a point's 95 % error for robot motion
-  rectification::Method method = rectification::Method::best;
-  double motion_sigma_mm = 0;                       ///< as pipeline::RunOptions::motion_sigma_mm
-  std::optional<calibration::CArmHistory> history;  ///< of the C-arm, used as prior
+  double max_error_mm = 2;            ///< limit of a point's 95 % error for robot motion: there is always one
+  /// The other options of the measurement and of the models' registration; `threads` and `cache` are not in
+  /// the file.
+  case_registration::RegisterOptions measuring = {};
   PlanLimits limits;
   std::vector<pipeline::CaseModel> models = {};  ///< registered after the measurement
   std::filesystem::path folder = {};             ///< of the plan's files
-  unsigned threads = 0;                          ///< 0: all cores; of this computer, not in the file
 };
 
-/// Of the plan's measurements.
-pipeline::RunOptions run_options(const OperationPlan& plan);
+/// Of the plan's measurements, with its limit.
+case_registration::RegisterOptions measuring_options(const OperationPlan& plan);
 
 /// Strict; fails as JsonReader and `picks_of`, and with name_clash for two tunnels or facets of one name.
 /// `folder`: of the models' files; that of `origin` unless given.

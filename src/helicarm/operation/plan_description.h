@@ -190,9 +190,11 @@ void describe_lists(Codec& codec, Plan& plan, const std::string& origin) {
 template <class Codec, class Plan>
 void describe_options(Codec& codec, Plan& plan, const std::string& origin) {
   describe_field(codec, "max_error_mm", plan.max_error_mm, false);
-  codec.choice("method", plan.method, pipeline::method_words,
+  codec.choice("method", plan.measuring.run.method, rectification::method_words,
                "of rectification, as the option of `run`; `navigate --method` overrides it");
-  describe_field(codec, "motion_sigma_mm", plan.motion_sigma_mm, false);
+  describe_field(codec, "motion_sigma_mm", plan.measuring.run.motion_sigma_mm, false);
+  describe_field(codec, "search_mm", plan.measuring.search.shift_mm, false);
+  describe_field(codec, "search_deg", plan.measuring.search.turn_deg, false);
   codec.custom(
       "machine", false, {{"type", "object"}},
       "the content of a C-arm's history, used as prior; `navigate --machine FILE` puts it there, and the "
@@ -200,9 +202,12 @@ void describe_options(Codec& codec, Plan& plan, const std::string& origin) {
       [&](JsonReader& reader) {
         if constexpr (!std::is_const_v<Plan>)
           if (const Json& history = reader.raw("machine"); !history.is_null())
-            plan.history = value_or_throw(calibration::history_from_json(history, origin + ": machine"));
+            plan.measuring.run.history = value_or_throw(calibration::history_from_json(history, origin + ": machine"));
       },
-      [&] { return plan.history ? std::optional(calibration::to_json(*plan.history)) : std::nullopt; });
+      [&] {
+        const auto& history = plan.measuring.run.history;
+        return history ? std::optional(calibration::to_json(*history)) : std::nullopt;
+      });
   describe_field(codec, "plan_stale_mm", plan.limits.distance_mm, false);
   describe_field(codec, "plan_stale_deg", plan.limits.turn_deg, false);
   describe_field(codec, "plan_stale_s", plan.limits.age_s, false);

@@ -3,25 +3,43 @@
 
 #include <array>
 
+#include "helicarm/case_registration/register_fields.h"
 #include "helicarm/core/field.h"
 #include "helicarm/operation/plan.h"
 
 namespace helicarm::operation {
 
-/// The plan's numbers that a user may set; the limits of plan.json.
-inline constexpr std::array<Field<OperationPlan>, 14> plan_fields{
+namespace description {
+
+/// An option of a run, for the plan's measurements.
+template <auto member>
+constexpr Field<OperationPlan> run_field(std::string_view name) {
+  return bound_as<&OperationPlan::measuring, &case_registration::RegisterOptions::run, member>(
+      field_named<pipeline::RunOptions>(pipeline::run_fields, name));
+}
+
+/// An option of a registration, for the plan's models.
+template <auto member>
+constexpr Field<OperationPlan> search_field(std::string_view name) {
+  return bound_as<&OperationPlan::measuring, &case_registration::RegisterOptions::search, member>(
+      field_named<case_registration::SearchRange>(case_registration::search_fields, name));
+}
+
+}  // namespace description
+
+/// The plan's options that a user may set, the limits of plan.json; those with a flag can be stated for one
+/// operation.
+inline constexpr std::array<Field<OperationPlan>, 17> plan_fields{
     bound<&OperationPlan::max_error_mm>({.name = "max_error_mm",
                                          .label = "Limit of a point's error",
+                                         .flag = "--max-error",
                                          .unit = "mm",
                                          .range = {1e-6, 1000},
                                          .help = "The robot uses no point with a larger 95 % error"}),
-    bound<&OperationPlan::motion_sigma_mm>(
-        {.name = "motion_sigma_mm",
-         .label = "Motion of an untracked bone",
-         .unit = "mm",
-         .range = {0, 100},
-         .help =
-             "Standard deviation per axis of the motion of a bone without poses between the acquisitions"}),
+    description::run_field<&pipeline::RunOptions::method>("method"),
+    description::run_field<&pipeline::RunOptions::motion_sigma_mm>("motion_sigma_mm"),
+    description::search_field<&case_registration::SearchRange::shift_mm>("search_mm"),
+    description::search_field<&case_registration::SearchRange::turn_deg>("search_deg"),
     bound<&OperationPlan::limits, &PlanLimits::distance_mm>(
         {.name = "plan_stale_mm",
          .label = "Motion since planning",
@@ -37,6 +55,7 @@ inline constexpr std::array<Field<OperationPlan>, 14> plan_fields{
     bound<&OperationPlan::limits, &PlanLimits::age_s>(
         {.name = "plan_stale_s",
          .label = "Age of a plan",
+         .flag = "--plan-age",
          .unit = "s",
          .range = {1, 600},
          .help = "A plan not confirmed within this time expires"}),

@@ -69,27 +69,29 @@ TEST(Plan, AModelThatMovesWithNoBoneGuidesNothing) {
 
 TEST(Plan, OptionsOfTheMeasurementsLeadThroughTheFile) {
   OperationPlan given = plan();
-  given.method = rectification::Method::paper;
-  given.motion_sigma_mm = 0.4;
-  given.history = calibration::CArmHistory{
+  given.measuring.run.method = rectification::Method::paper;
+  given.measuring.run.motion_sigma_mm = 0.4;
+  given.measuring.search = {40, 60};
+  given.measuring.run.history = calibration::CArmHistory{
       {{"digest", "AP", {1000, 1, -2}, Eigen::Vector3d(4, 5, 6).asDiagonal().toDenseMatrix()}}};
   const auto read = plan_from(to_json(given), "plan.json");
   ASSERT_TRUE(read) << read.error().message;
-  const pipeline::RunOptions options = run_options(*read);
+  const auto [options, search] = measuring_options(*read);
   EXPECT_EQ(options.method, rectification::Method::paper);
   EXPECT_EQ(options.max_error_mm, 2);
   EXPECT_EQ(options.motion_sigma_mm, 0.4);
+  EXPECT_EQ(search, (case_registration::SearchRange{40, 60}));
   ASSERT_TRUE(options.history);
   EXPECT_EQ(options.history->entries.front().image, "digest");
 }
 
 TEST(Plan, OptionsOfEarlierPlansAreTheUsualOnes) {
   Json json = to_json(plan());
-  for (const char* key : {"method", "motion_sigma_mm", "machine"}) json.erase(key);
+  for (const char* key : {"method", "motion_sigma_mm", "search_mm", "search_deg", "machine"}) json.erase(key);
   const auto read = plan_from(json, "plan.json");
   ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->method, rectification::Method::best);
-  EXPECT_FALSE(read->history);
+  EXPECT_EQ(read->measuring.run.method, rectification::Method::best);
+  EXPECT_FALSE(read->measuring.run.history);
 }
 
 TEST(Plan, HandHeldDrillTakesThePlaceOfTheRobot) {

@@ -35,8 +35,6 @@ namespace {
 
 using output::if_set;
 
-constexpr std::array<std::string_view, 2> source_words{"pick", "target"};
-
 std::vector<std::pair<std::string, fiducials::ImagePoint>> seen_by_view(
     const PointResult& point, const std::vector<ViewResult>& views) {
   std::vector<std::pair<std::string, fiducials::ImagePoint>> seen;
@@ -71,8 +69,7 @@ void describe_point(Output& output, const PointResult& point, const Result& resu
   const auto& place = point.place;
   output.value("name", point.name, "of a pick or a target of the calibrator");
   output.word(
-      "source", [&] { return source_words[point.source == localization::PointSource::pick ? 0 : 1]; },
-      source_words, "");
+      "source", [&] { return word(point.source); }, localization::source_words, "");
   output.value("xyz_mm", if_set(place, &PointInFrames::in_calibrator),
                "at the time of the first view; `null` if not located");
   output.value("frame", "calibrator", "of `xyz_mm`");
@@ -247,8 +244,7 @@ void describe_timing(Output& output, const Timing& timing) {
 template <class Output>
 void describe_options(Output& output, const RunOptions& options) {
   output.word(
-      "method", [&] { return method_words[options.method == rectification::Method::paper ? 1 : 0]; },
-      method_words, "");
+      "method", [&] { return word(options.method); }, rectification::method_words, "");
   output.value("max_error_mm", options.max_error_mm, "limit of a point's error; `null`: none");
   output.value("motion_sigma_mm", options.motion_sigma_mm, "of a bone without poses");
   output.value("threads", options.threads, "0: all cores");

@@ -9,8 +9,6 @@
 
 namespace helicarm::pipeline {
 
-inline constexpr std::array<std::string_view, 2> method_words{"best", "paper"};
-
 /// Options of a run. `--threads` is a flag of all commands.
 inline constexpr std::array<Field<RunOptions>, 4> run_fields{
     bound<&RunOptions::method>({.name = "method",
@@ -18,7 +16,7 @@ inline constexpr std::array<Field<RunOptions>, 4> run_fields{
                                 .range = {0, 1},
                                 .step = 1,
                                 .help = "best, or paper: the published recipe",
-                                .words = method_words}),
+                                .words = rectification::method_words}),
     bound<&RunOptions::max_error_mm>({.name = "max_error_mm",
                                       .label = "Limit of a point's error",
                                       .flag = "--max-error",

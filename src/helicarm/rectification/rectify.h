@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "helicarm/detection/image_dots.h"
@@ -14,6 +16,8 @@
 namespace helicarm::rectification {
 
 enum class Method { best, paper };
+inline constexpr std::array<std::string_view, 2> method_words{"best", "paper"};
+constexpr std::string_view word(Method method) { return method_words[std::size_t(method)]; }
 
 /// The distortion map of one image, and which of its dots are the plate's.
 struct Rectification {

@@ -37,8 +37,7 @@ std::vector<ExportedPoint> exported_points(const pipeline::Result& result) {
   std::vector<ExportedPoint> points;
   for (const pipeline::PointResult& point : result.points)
     if (point.place)
-      points.push_back(
-          {point.name, point.source == localization::PointSource::pick ? "pick" : "target", &*point.place});
+      points.push_back({point.name, word(point.source), &*point.place});
   for (const pipeline::ModelPoint& point : result.model_points)
     points.push_back({point.name, "plan", &point.place});
   return points;

@@ -20,7 +20,7 @@ std::string report_html(const pipeline::Result& result) {
   return page_html(
       "helicarm report", "helicarm", body,
       fmt::format(", method {}. Units: mm and px; pixel (0, 0) is the centre of the top-left pixel.",
-                  result.options.method == rectification::Method::paper ? "paper" : "best"));
+                  word(result.options.method)));
 }
 
 Expected<void> write_report(const pipeline::Result& result, const std::filesystem::path& folder) {

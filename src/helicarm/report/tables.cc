@@ -2,11 +2,11 @@
 #include "helicarm/report/tables.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
 
+#include "helicarm/fiducials/status_words.h"
 #include "helicarm/pipeline/outcome.h"
 #include "helicarm/report/markup.h"
 
@@ -77,9 +77,9 @@ Cell measured(const ViewFiducial& row, double value, int digits) {
 }
 
 Cell status_of(const ViewFiducial& row) {
-  constexpr std::array names = {"used", "occluded", "outside", "rejected", "not found"};
-  return {names[static_cast<std::size_t>(row.fiducial->status)],
-          row.fiducial->status != fiducials::FiducialStatus::used};
+  std::string status(fiducials::word(row.fiducial->status));
+  std::ranges::replace(status, '_', ' ');
+  return {std::move(status), row.fiducial->status != fiducials::FiducialStatus::used};
 }
 
 Cell dots_of(const pipeline::ViewResult* view) {
@@ -197,7 +197,7 @@ Table points_table(const std::vector<pipeline::PointResult>& points) {
           {{words("Point", "Name of the point"), [](const Point& p) { return Cell{p.name}; }},
            {words("Kind", "pick: marked by a person; target: a ball or wire that the program finds"),
             [](const Point& p) {
-              return Cell{p.source == localization::PointSource::pick ? "pick" : "target"};
+              return Cell{std::string(word(p.source))};
             }}},
           points),
       positions_table(points));
