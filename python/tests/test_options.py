@@ -125,3 +125,21 @@ def test_register_and_export_answer_as_run(both, tmp_path, name):
         for point in result["points"]:
             if point["xyz_mm"]:
                 assert float(rows[point["name"]]["x_mm"]) == pytest.approx(point["xyz_mm"][0], abs=1e-6)
+
+
+@pytest.mark.parametrize("command", ["export", "predict", "register"])
+def test_a_history_that_is_only_read_must_exist(both, tmp_path, command):
+    case, _ = both
+    words = {"predict": ["--at", "0,0,40"]}.get(command, ["--out", tmp_path / "out"])
+    done = subprocess.run([PROGRAM, command, str(case), "--machine", "absent.json", *map(str, words)],
+                          capture_output=True, encoding="utf-8", cwd=tmp_path)
+    assert done.returncode == 2 and "missing_file" in done.stderr and "absent.json" in done.stderr
+
+
+def test_register_refuses_an_absent_history_and_run_case_begins_it(both, tmp_path):
+    case, _ = both
+    with pytest.raises(helicarm.InputError) as refused:
+        helicarm.register(case, history=tmp_path / "absent.json")
+    assert refused.value.reason == "missing_file"
+    helicarm.run_case(case, history=tmp_path / "new.json")
+    assert (tmp_path / "new.json").exists()
