@@ -27,14 +27,14 @@ namespace {
 
 /// One simulated case on disk, made once.
 const pipeline::Case& simulated_case() {
-  static const pipeline::Case given = [] {
+  static const pipeline::Case the_case = [] {
     const auto folder = std::filesystem::temp_directory_path() / "helicarm_benchmark_case";
     simulation::SimulationOptions options;
     const auto simulated = value_or_throw(simulation::simulate_case(options));
     value_or_throw(simulation::write_case(folder, simulated));
     return value_or_throw(pipeline::read_case(folder));
   }();
-  return given;
+  return the_case;
 }
 
 const xray::XrayImage& xray_image() {
@@ -144,23 +144,23 @@ BENCHMARK(calibrate_views)->Arg(2)->Arg(10)->Arg(50)->Arg(100)->Arg(400)->Unit(b
 void locate_ten_picks(benchmark::State& state) {
   pipeline::RunOptions options;
   options.threads = 1;
-  pipeline::Case given = simulated_case();
+  pipeline::Case the_case = simulated_case();
   const auto calibration =
-      std::make_shared<const pipeline::CaseCalibration>(pipeline::calibrate_case(given, options).value());
-  given.calibrator.targets.clear();
-  given.picks.clear();
-  const Eigen::Vector3d centre = phantom::middle_of(given.calibrator);
+      std::make_shared<const pipeline::CaseCalibration>(pipeline::calibrate_case(the_case, options).value());
+  the_case.calibrator.targets.clear();
+  the_case.picks.clear();
+  const Eigen::Vector3d centre = phantom::middle_of(the_case.calibrator);
   for (int point = 0; point < 10; ++point)
-    for (std::size_t view = 0; view < given.views.size(); ++view) {
+    for (std::size_t view = 0; view < the_case.views.size(); ++view) {
       const Eigen::Vector2d uv = calibration->views[view].view.project(
           centre + Eigen::Vector3d(2.0 * point - 9, 3.0 * (point % 3), 1.5 * (point % 4)));
       pipeline::Pick pick;
       pick.name = "point " + std::to_string(point);
-      pick.view = given.views[view].name;
+      pick.view = the_case.views[view].name;
       pick.uv_raw = calibration->images[view].rectification.map.raw_from_rectified(uv);
-      given.picks.push_back(pick);
+      the_case.picks.push_back(pick);
     }
-  for (auto _ : state) benchmark::DoNotOptimize(pipeline::locate_case(given, calibration, options));
+  for (auto _ : state) benchmark::DoNotOptimize(pipeline::locate_case(the_case, calibration, options));
 }
 BENCHMARK(locate_ten_picks)->Unit(benchmark::kMillisecond);
 

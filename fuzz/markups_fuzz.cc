@@ -12,7 +12,7 @@ void run(std::string_view bytes) {
     check(point.in_model.allFinite() && point.in_model.cwiseAbs().maxCoeff() <= 10000, "points are near");
     check(!point.name.empty() && !holds_control_character(point.name), "a point has a name");
   }
-  for (const case_registration::PlanTunnel& tunnel : plan->tunnels)
+  for (const case_registration::MarkupLine& tunnel : plan->tunnels)
     check(tunnel.start < plan->points.size() && tunnel.end < plan->points.size(), "a tunnel names points");
 }
 

@@ -90,12 +90,12 @@ double from_ray(const Eigen::Vector3d& point, const geometry::Ray& ray) {
   return (point - ray.origin).cross(ray.direction).norm();
 }
 
-BiplaneImageTest biplane_test_of(const pipeline::Case& given, const phantom::Calibrator& udcsc,
+BiplaneImageTest biplane_test_of(const pipeline::Case& the_case, const phantom::Calibrator& udcsc,
                                  rectification::Method method) {
   pipeline::RunOptions options;
   options.method = method;
   options.threads = 1;
-  const pipeline::Result result = value_or_throw(pipeline::measure(given, options));
+  const pipeline::Result result = value_or_throw(pipeline::measure(the_case, options));
   if (result.failure) return {1, no_errors, no_errors, no_errors};
   std::vector<double> fre, centre, on_udcsc;
   for (const pipeline::ViewResult& view : result.views)
@@ -103,11 +103,11 @@ BiplaneImageTest biplane_test_of(const pipeline::Case& given, const phantom::Cal
       if (ball.status == fiducials::FiducialStatus::used)
         fre.push_back(
             from_ray(ball.centre_in_calibrator, geometry::ray_through(view.calibrated->view, ball.uv)));
-  const auto error_of = [&](const std::string& name, const Eigen::Vector3d& place, auto& errors) {
+  const auto error_of = [&](const std::string& name, const Eigen::Vector3d& position, auto& errors) {
     const auto point = std::ranges::find(result.points, name, &pipeline::PointResult::name);
     if (point != result.points.end() && point->place)
       if (const guidance::Place* in_femur = point->place->in("femur"))
-        errors.push_back((in_femur->point() - place).norm());
+        errors.push_back((in_femur->point() - position).norm());
   };
   for (const phantom::CalibratorBall& ball : udcsc.balls)
     error_of(ball.label, ball.centre_in_calibrator, on_udcsc);
@@ -132,9 +132,9 @@ void run_test(const BiplaneImagesOptions& options, std::size_t number, std::span
   std::filesystem::remove_all(folder, ignored);  // of an earlier run
   RandomStream random(options.seed, bench_stream, number);
   write_biplane_case(folder, simulated, options, random);
-  const pipeline::Case given = value_or_throw(pipeline::read_case(folder));
+  const pipeline::Case the_case = value_or_throw(pipeline::read_case(folder));
   for (const rectification::Method method : {rectification::Method::paper, rectification::Method::best})
-    put_record(biplane_test_of(given, simulated.calibrator, method), out);
+    put_record(biplane_test_of(the_case, simulated.calibrator, method), out);
   if (number > 0) std::filesystem::remove_all(folder, ignored);
 }
 

@@ -35,7 +35,7 @@ phantom::Calibrator design_of(const CalibrationStudyOptions& options) {
 }
 
 /// The calibrator as made.
-phantom::Calibrator made(phantom::Calibrator calibrator, double tolerance_mm, RandomStream& random) {
+phantom::Calibrator manufactured(phantom::Calibrator calibrator, double tolerance_mm, RandomStream& random) {
   const auto off = [&]() -> Eigen::Vector3d {
     return tolerance_mm * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
   };
@@ -45,24 +45,24 @@ phantom::Calibrator made(phantom::Calibrator calibrator, double tolerance_mm, Ra
 }
 
 /// Picks in place of the check targets.
-void click_targets(pipeline::Case& given, const simulation::SimulatedCase& simulated, double sigma_px,
+void click_targets(pipeline::Case& the_case, const simulation::SimulatedCase& simulated, double sigma_px,
                    RandomStream& random) {
-  given.calibrator.targets.clear();
+  the_case.calibrator.targets.clear();
   for (const simulation::SimulatedView& view : simulated.views)
     for (const simulation::TruePoint& target : view.targets)
-      given.picks.push_back({target.name, view.true_view.name,
-                             target.raw + sigma_px * Eigen::Vector2d(random.normal(), random.normal()),
-                             pipeline::Snap::none, 3, sigma_px, std::nullopt});
+      the_case.picks.push_back({target.name, view.true_view.name,
+                                target.raw + sigma_px * Eigen::Vector2d(random.normal(), random.normal()),
+                                pipeline::Snap::none, 3, sigma_px, std::nullopt});
 }
 
-CalibrationTest measured(const pipeline::Case& given, const phantom::Calibrator& design,
+CalibrationTest measured(const pipeline::Case& the_case, const phantom::Calibrator& design,
                          rectification::Method method) {
   CalibrationTest test{1, 0, unmeasured, unmeasured, unmeasured, unmeasured, {}};
   test.targets.fill(unmeasured);
   pipeline::RunOptions options;
   options.method = method;
   options.threads = 1;
-  const pipeline::Result result = value_or_throw(pipeline::measure(given, options));
+  const pipeline::Result result = value_or_throw(pipeline::measure(the_case, options));
   if (result.failure) return test;
   test.refused = 0;
   const localization::Statistics& fre = result.accuracy.fre_mm;
@@ -83,17 +83,17 @@ void run_calibration_test(const CalibrationStudyOptions& options, std::size_t nu
   simulated.seed = seed_of_case(options, number);
   simulated.size = options.size_px;
   simulated.threads = 1;
-  if (options.tolerance_mm > 0) simulated.calibrator = made(design, options.tolerance_mm, bench);
+  if (options.tolerance_mm > 0) simulated.calibrator = manufactured(design, options.tolerance_mm, bench);
   const auto folder = options.folder / fmt::format("calibration.partial-{}", number);
   std::error_code ignored;
   std::filesystem::remove_all(folder, ignored);  // incomplete case of a killed run
   const auto scene = value_or_throw(simulation::simulate_case(simulated));
   value_or_throw(simulation::write_case(folder, scene));
-  pipeline::Case given = value_or_throw(pipeline::read_case(folder));
-  if (options.tolerance_mm > 0) given.calibrator = design;
-  if (options.click_sigma_px > 0) click_targets(given, scene, options.click_sigma_px, bench);
+  pipeline::Case the_case = value_or_throw(pipeline::read_case(folder));
+  if (options.tolerance_mm > 0) the_case.calibrator = design;
+  if (options.click_sigma_px > 0) click_targets(the_case, scene, options.click_sigma_px, bench);
   for (const rectification::Method method : {rectification::Method::paper, rectification::Method::best})
-    put_record(measured(given, design, method), out);
+    put_record(measured(the_case, design, method), out);
   std::filesystem::remove_all(folder, ignored);
 }
 

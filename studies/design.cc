@@ -55,8 +55,8 @@ std::vector<Eigen::Vector3d> places_of(DesignSurface surface, const Shares& shar
 phantom::Calibrator calibrator_of(std::string name, std::vector<Eigen::Vector3d> places) {
   std::ranges::sort(places, {}, [](const Eigen::Vector3d& p) { return p.z(); });
   phantom::Calibrator calibrator{std::move(name), {}, {}};
-  for (const auto& place : places)
-    calibrator.balls.push_back({fmt::format("B{}", calibrator.balls.size() + 1), place, design_ball_mm});
+  for (const auto& position : places)
+    calibrator.balls.push_back({fmt::format("B{}", calibrator.balls.size() + 1), position, design_ball_mm});
   return calibrator;
 }
 
@@ -93,8 +93,8 @@ class Judge {
     const std::size_t count = places.size();
     std::vector<SimdPoint> balls;
     SimdPixels exact, pixels;
-    for (const auto& place : places) {
-      balls.push_back({simd(place.x()), simd(place.y()), simd(place.z())});
+    for (const auto& position : places) {
+      balls.push_back({simd(position.x()), simd(position.y()), simd(position.z())});
       for (std::size_t view = 0; view < 2; ++view)
         exact.of_view[view][balls.size() - 1] = lane_views_.project(view, balls.back());
     }

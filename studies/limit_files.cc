@@ -64,10 +64,10 @@ Json limit_json(const std::vector<LimitRow>& rows, const LimitOptions& options) 
 template <class Value>
 report::Chart chart_of(const std::vector<LimitRow>& rows, const std::string& model, Value value) {
   report::Chart chart{model, "noise of ball centres, px per axis", {}};
-  for (const std::string& place : names_of(rows, &LimitRow::place)) {
-    report::ChartSeries series{place};
+  for (const std::string& position : names_of(rows, &LimitRow::place)) {
+    report::ChartSeries series{position};
     for (const LimitRow& row : rows)
-      if (row.model == model && row.place == place && row.balls == charted_balls && row.point_exact) {
+      if (row.model == model && row.place == position && row.balls == charted_balls && row.point_exact) {
         series.points.push_back({double(series.points.size()), value(row)});
         if (chart.series.empty()) chart.x_names.push_back(fmt::format("{:g}", row.sigma_px));
       }

@@ -48,8 +48,8 @@ struct LocationTrials {
                                             model.calibrate({pixels.of_view[1], count})};
       const auto drawn = std::min<std::size_t>(simd_width, end - first);
       for (std::size_t i = 0; i < map.points.size(); ++i) {
-        const Eigen::Vector3d& place = map.points[i].place;
-        const SimdPoint target{simd(place.x()), simd(place.y()), simd(place.z())};
+        const Eigen::Vector3d& position = map.points[i].place;
+        const SimdPoint target{simd(position.x()), simd(position.y()), simd(position.z())};
         SimdPixel bare[2], noisy[2];
         for (std::size_t view = 0; view < 2; ++view) {
           const auto [u, v] =
@@ -79,10 +79,10 @@ std::vector<Eigen::Vector3d> balls_of(const LocationOptions& options) {
   return balls;
 }
 
-SeenIn seen_in(const std::array<geometry::View, 2>& views, const Eigen::Vector3d& place) {
+SeenIn seen_in(const std::array<geometry::View, 2>& views, const Eigen::Vector3d& position) {
   const auto holds = [&](const geometry::View& view) {
-    const Eigen::Array2d pixel = view.project(place);
-    return view.depth(place) > 0 && (pixel >= -0.5).all() && (pixel < image_px - 0.5).all();
+    const Eigen::Array2d pixel = view.project(position);
+    return view.depth(position) > 0 && (pixel >= -0.5).all() && (pixel < image_px - 0.5).all();
   };
   return SeenIn((holds(views[0]) ? 1 : 0) + (holds(views[1]) ? 2 : 0));
 }
@@ -100,8 +100,8 @@ LocationMap empty_map(const LocationOptions& options) {
       for (int column = -reach; column <= reach; ++column) {
         const Eigen::Vector3d out =
             plane == TargetPlane::xoy ? Eigen::Vector3d(column, row, 0) : Eigen::Vector3d(column, 0, row);
-        const Eigen::Vector3d place = map.centre + options.step_mm * out;
-        map.points.push_back({plane, place, seen_in(views, place), 0, 0, 0, 0});
+        const Eigen::Vector3d position = map.centre + options.step_mm * out;
+        map.points.push_back({plane, position, seen_in(views, position), 0, 0, 0, 0});
       }
   return map;
 }

@@ -33,11 +33,12 @@ SmallStudy small(const char* name, std::size_t blocks, std::size_t stop, std::si
   options.seed = 4;
   const auto bytes = [options](const EngineOptions& engine, const Ranks& ranks,
                                const std::filesystem::path& folder) {
-    Options given = options;  // NOLINT(performance-unnecessary-copy-initialization): some have a folder
-    if constexpr (requires { given.folder; }) given.folder = folder;
-    const auto answer = study(given, engine, ranks).value();
+    Options quick_options =
+        options;  // NOLINT(performance-unnecessary-copy-initialization): some have a folder
+    if constexpr (requires { quick_options.folder; }) quick_options.folder = folder;
+    const auto answer = study(quick_options, engine, ranks).value();
     if (!ranks.leads()) return std::string();
-    const StudyFiles files = files_of(answer, given);
+    const StudyFiles files = files_of(answer, quick_options);
     return files.csv + to_text(files.json) + files.svg + files.summary;
   };
   return {name, blocks, stop, bytes};

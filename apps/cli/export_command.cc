@@ -41,7 +41,7 @@ CommandResult export_command(const ExportArguments& arguments, Console& console)
           Reason::usage,
           fmt::format("{}: holds a result; give the folder of the case instead, which is then measured again",
                       folder.string()));
-    const pipeline::Result result = value_or_throw(measure(arguments.run, console)).result;
+    const pipeline::Result result = value_or_throw(measured_case(arguments.run, console)).result;
     const auto written = value_or_throw(report::write_exports(result, arguments.run.out, kinds));
     if (console.json) {
       Json files = Json::array();

@@ -96,8 +96,8 @@ DrillDisplay::~DrillDisplay() {
   if (open_) console_.progress << '\n' << std::flush;
 }
 
-void guide_by_hand(const operation::PlannedTunnel& tunnel, operation::Operation& operation, LineInput& input,
-                   const Ending& ending, Console& console) {
+void guide_by_hand(const operation::OperationTunnel& tunnel, operation::Operation& operation,
+                   LineInput& input, const Ending& ending, Console& console) {
   const std::string name = without_control_characters(tunnel.name);
   for (;;) {
     ending.check();

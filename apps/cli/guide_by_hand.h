@@ -30,8 +30,8 @@ class DrillDisplay {
 
 /// Guides the drill until a line is entered, and verifies it in its tunnel. After plan_stale the check points
 /// are touched and guidance begins again. Throws BadInput as `Operation::guide` and `verify_drilled`.
-void guide_by_hand(const operation::PlannedTunnel& tunnel, operation::Operation& operation, LineInput& input,
-                   const Ending& ending, Console& console);
+void guide_by_hand(const operation::OperationTunnel& tunnel, operation::Operation& operation,
+                   LineInput& input, const Ending& ending, Console& console);
 
 /// One line: distance, angle, depth with their standard deviations, and the decision.
 std::string words_of(const operation::Guidance& guidance);

@@ -41,12 +41,12 @@ Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pip
 Expected<Measurement> measurement_of(const std::filesystem::path& folder,
                                      const case_registration::RegisterOptions& options,
                                      const case_registration::Progress& progress) {
-  const auto given = pipeline::read_case(folder);
-  if (given) return case_registration::measure_case(*given, options, progress);
-  if (exit_code(given.error().reason) == 2) return tl::unexpected<Failure>(given.error());
+  const auto the_case = pipeline::read_case(folder);
+  if (the_case) return case_registration::measure_case(*the_case, options, progress);
+  if (exit_code(the_case.error().reason) == 2) return tl::unexpected<Failure>(the_case.error());
   Measurement refused;
   refused.result.options = options.run;
-  refused.result.failure = given.error();
+  refused.result.failure = the_case.error();
   return refused;
 }
 
@@ -67,16 +67,16 @@ Expected<case_registration::RegisterOptions> options_of(const RunArguments& argu
     case_registration::RegisterOptions options = arguments.options;
     options.run.threads = console.threads;
     if (arguments.history)
-      options.run.history = value_or_throw(arguments.extends_history
-                                               ? calibration::history_at(*arguments.history)
-                                               : calibration::read_history(*arguments.history));
+      options.run.history =
+          value_or_throw(arguments.extends_history ? calibration::history_at(*arguments.history)
+                                                   : calibration::read_history(*arguments.history));
     if (!arguments.no_cache)
       options.run.cache = arguments.cache ? arguments.cache : pipeline::user_cache_folder();
     return options;
   });
 }
 
-Expected<Measurement> measure(const RunArguments& arguments, Console& console) {
+Expected<Measurement> measured_case(const RunArguments& arguments, Console& console) {
   return options_of(arguments, console)
       .and_then([&](const case_registration::RegisterOptions& options) {
         case_registration::Progress progress;
@@ -98,7 +98,7 @@ Expected<Measurement> run_and_write(const RunArguments& arguments, Console& cons
     report::forget_results(arguments.out);
     if (arguments.history && arguments.extends_history)
       value_or_throw(calibration::check_history_file(*arguments.history));
-    Measurement measured = value_or_throw(measure(arguments, console));
+    Measurement measured = value_or_throw(measured_case(arguments, console));
     value_or_throw(case_registration::write_models(measured.registration, arguments.out));
     value_or_throw(report::write_result(measured.result, arguments.out, !arguments.no_report));
     if (arguments.history && arguments.extends_history && !measured.result.failure)

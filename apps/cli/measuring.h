@@ -17,7 +17,7 @@ struct RunArguments {
   bool no_report = false;  ///< only result.json, and registration.json with its report
   std::optional<std::filesystem::path> history = {};  ///< the C-arm's history
   bool extends_history = false;  ///< by this case's acquisitions; a missing file is then a new history
-  std::optional<std::filesystem::path> cache = {};    ///< of plate images' maps; nothing: the user's
+  std::optional<std::filesystem::path> cache = {};  ///< of plate images' maps; nothing: the user's
   bool no_cache = false;
 };
 
@@ -30,7 +30,7 @@ void add_run_options(CLI::App* command, RunArguments& arguments, const char* mac
 CommandResult run_one_case(const RunArguments& arguments, Console& console);
 
 /// Only measures the case, with its findings on `console.progress`; a refusal is in the result.
-Expected<case_registration::Measurement> measure(const RunArguments& arguments, Console& console);
+Expected<case_registration::Measurement> measured_case(const RunArguments& arguments, Console& console);
 
 /// As `run_one_case`, and returns the measurement; prints nothing to `console.out`.
 Expected<case_registration::Measurement> run_and_write(const RunArguments& arguments, Console& console);

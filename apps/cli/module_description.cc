@@ -182,7 +182,7 @@ std::string label_of(const ModuleParameter& parameter) {
   return label;
 }
 
-std::string xml_of(const ModuleParameter& parameter, int& place) {
+std::string xml_of(const ModuleParameter& parameter, int& index) {
   const bool is_file = parameter.kind == Kind::file || parameter.kind == Kind::folder;
   const char* tag = tag_of(parameter.kind);
   std::string xml = fmt::format("    <{}>\n", tag) + element("name", parameter.name, 3);
@@ -198,16 +198,16 @@ std::string xml_of(const ModuleParameter& parameter, int& place) {
         "      <constraints>\n        <minimum>{}</minimum>\n        <maximum>{}</maximum>\n"
         "        <step>{}</step>\n      </constraints>\n",
         plain(*parameter.low), plain(*parameter.high), plain(step_of(parameter)));
-  if (parameter.by_place) xml += element("index", std::to_string(place++), 3);
+  if (parameter.by_place) xml += element("index", std::to_string(index++), 3);
   return xml + fmt::format("    </{}>\n", tag);
 }
 
 std::string group_of(const char* label, const char* what, const std::vector<ModuleParameter>& parameters,
-                     int& place, bool is_advanced = false) {
+                     int& index, bool is_advanced = false) {
   if (parameters.empty()) return {};
   std::string xml = is_advanced ? "  <parameters advanced=\"true\">\n" : "  <parameters>\n";
   xml += element("label", label) + element("description", what);
-  for (const ModuleParameter& parameter : parameters) xml += xml_of(parameter, place);
+  for (const ModuleParameter& parameter : parameters) xml += xml_of(parameter, index);
   return xml + "  </parameters>\n";
 }
 
@@ -271,10 +271,10 @@ std::string module_description(const CLI::App& command) {
       element("description", command.get_description() + ".\nResearch instrument, not a medical device.", 1) +
       element("version", HELICARM_VERSION, 1) + element("documentation-url", "", 1) +
       element("license", "Apache-2.0", 1) + element("contributor", "The helicarm maintainers", 1);
-  int place = 0;
-  xml += group_of("Data", "What the command works on", arguments, place);
-  xml += group_of("Options", "Options of the command", options, place);
-  xml += group_of("Program", "Options of every command", general, place, true);
+  int index = 0;
+  xml += group_of("Data", "What the command works on", arguments, index);
+  xml += group_of("Options", "Options of the command", options, index);
+  xml += group_of("Program", "Options of every command", general, index, true);
   return xml + "</executable>\n";
 }
 

@@ -71,7 +71,7 @@ std::vector<std::string> words_of_module(const CLI::App& command, std::span<cons
   while (root->get_parent()) root = root->get_parent();
   std::ranges::move(parameters_of(*root), std::back_inserter(parameters));  // after the command's own
   std::vector<std::string> own, by_place, optional;                         // optional arguments come last
-  std::size_t place = 0;
+  std::size_t index = 0;
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
     const bool is_flag = word.starts_with("--");
@@ -86,8 +86,8 @@ std::vector<std::string> words_of_module(const CLI::App& command, std::span<cons
       own.push_back(known->flag.empty() ? word : known->flag);
     else if (is_flag)
       append(known->flag.empty() ? optional : own, *known, words[++i]);
-    else if (place < places.size())
-      append(by_place, places[place++], word);
+    else if (index < places.size())
+      append(by_place, places[index++], word);
     else
       by_place.push_back(word);
   }

@@ -33,7 +33,7 @@ namespace helicarm::cli {
 struct NavigateArguments {
   std::filesystem::path plan;
   std::filesystem::path out = "session";
-  std::filesystem::path picks;  ///< awaited after the images; empty: those of the plan
+  std::filesystem::path picks;                    ///< awaited after the images; empty: those of the plan
   Overrides<operation::OperationPlan> overrides;  ///< of the plan
   std::optional<std::filesystem::path> history;   ///< the C-arm's, read only
   receiver::ReceiverOptions receiver;
@@ -63,7 +63,7 @@ void check_before_images(const operation::OperationPlan& plan, const NavigateArg
     refuse(Reason::missing_file,
            fmt::format("\"plate\": {}: no such file", (plan.folder / *plan.plate).string()));
   if (!arguments.picks.empty()) return;
-  for (const operation::PlannedTunnel& tunnel : plan.tunnels)
+  for (const operation::OperationTunnel& tunnel : plan.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end})
       if (!tunnel.of_model && std::ranges::find(plan.picks, end, &pipeline::Pick::name) == plan.picks.end())
         refuse(Reason::bad_value, fmt::format("tunnel \"{}\": \"{}\" is not a pick", tunnel.name, end));
@@ -164,7 +164,7 @@ bool is_near(const robot::RobotLink& robot, const robot::RobotState& rest) {
 
 /// To a tunnel and back to where the tool was. After a stop (`Operation::plan_again`) the person at the
 /// terminal may unlock the robot, bring the tool back and have the tunnel planned again.
-void go_to(const operation::PlannedTunnel& tunnel, operation::Operation& operation, robot::RobotLink& robot,
+void go_to(const operation::OperationTunnel& tunnel, operation::Operation& operation, robot::RobotLink& robot,
            const fs::path& out, Consent& consent, LineInput& input, const Ending& ending, Console& console) {
   const robot::RobotState rest = value_or_throw(robot.wait_connected(std::chrono::seconds(5)));
   std::optional<robot::RobotOrder> begun;  // the tool is on its way by this order, or there
@@ -276,7 +276,7 @@ void drive_robot(const operation::OperationPlan& plan, const NavigateArguments& 
   value_or_throw(operation.register_robot(
       [&](const robot::RobotOrder& order) { return consent(order, [&] { return operation.recorded(); }); },
       consent.again()));
-  for (const operation::PlannedTunnel& tunnel : plan.tunnels)
+  for (const operation::OperationTunnel& tunnel : plan.tunnels)
     go_to(tunnel, operation, robot, arguments.out, consent, input, ending, console);
 }
 
@@ -299,7 +299,7 @@ void carry_out(const operation::OperationPlan& plan, const NavigateArguments& ar
   print_points(operation.result(), console);
   if (!plan.models.empty()) register_models(arguments, operation, input, ending, console);
   if (plan.drill)
-    for (const operation::PlannedTunnel& tunnel : plan.tunnels)
+    for (const operation::OperationTunnel& tunnel : plan.tunnels)
       guide_by_hand(tunnel, operation, input, ending, console);
   else
     drive_robot(plan, arguments, operation, devices.robot(), input, ending, console);
@@ -308,7 +308,8 @@ void carry_out(const operation::OperationPlan& plan, const NavigateArguments& ar
 /// What the command line states instead of the plan.
 void put_options(const NavigateArguments& arguments, operation::OperationPlan& plan) {
   for (const auto& [field, number] : arguments.overrides) field->set(plan, number);
-  if (arguments.history) plan.measuring.run.history = value_or_throw(calibration::read_history(*arguments.history));
+  if (arguments.history)
+    plan.measuring.run.history = value_or_throw(calibration::read_history(*arguments.history));
 }
 
 }  // namespace

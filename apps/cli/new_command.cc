@@ -79,23 +79,23 @@ void ask(pipeline::NewCaseOptions& options, const std::vector<pipeline::Inspecte
   if (!line.empty()) options.plate = line;
 }
 
-void print(const pipeline::NewCase& made, const std::filesystem::path& out, Console& console) {
+void print(const pipeline::NewCase& draft, const std::filesystem::path& out, Console& console) {
   const std::string file = (out / "case.json").string();
   const std::vector<std::string> next{fmt::format("helicarm pick {}", out.string()),
                                       fmt::format("helicarm run {}", out.string())};
   if (console.json) {
-    Json json = {{"case", file}, {"findings", made.findings}, {"warnings", Json::array()}, {"next", next}};
-    for (const Warning& warning : made.warnings)
+    Json json = {{"case", file}, {"findings", draft.findings}, {"warnings", Json::array()}, {"next", next}};
+    for (const Warning& warning : draft.warnings)
       json["warnings"].push_back(
           {{"code", code(warning.reason)}, {"view", warning.view}, {"message", warning.message}});
     console.out << to_text(json) << '\n';
     return;
   }
-  for (const std::string& finding : made.findings) console.out << "  " << finding << '\n';
+  for (const std::string& finding : draft.findings) console.out << "  " << finding << '\n';
   console.out << fmt::format(
       "\n  written to {}{}\n  Next:\n    {}    picks points; --csv FILE takes them from a table\n    {}    "
       "measures the case\n",
-      file, made.copies.empty() ? "" : " with copies of the files, patient data included", next[0], next[1]);
+      file, draft.copies.empty() ? "" : " with copies of the files, patient data included", next[0], next[1]);
 }
 
 }  // namespace
@@ -114,11 +114,11 @@ CommandResult new_command(const NewArguments& arguments, Console& console) {
       images.push_back(inspected(pipeline::new_image_from(word), console));
     pipeline::name_views(images);
     ask(options, images, console);
-    const pipeline::NewCase made =
+    const pipeline::NewCase draft =
         value_or_throw(pipeline::new_case(std::move(images), options, arguments.out));
-    value_or_throw(pipeline::write_new_case(made, arguments.out));
-    print_warnings(made.warnings, console);
-    print(made, arguments.out, console);
+    value_or_throw(pipeline::write_new_case(draft, arguments.out));
+    print_warnings(draft.warnings, console);
+    print(draft, arguments.out, console);
   });
 }
 

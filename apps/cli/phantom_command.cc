@@ -201,14 +201,14 @@ phantom_calibration::PhantomOptions options_of(const PhantomArguments& arguments
 /// A case whose calibrator allows no answer is refused like any other.
 phantom_calibration::PhantomResult measured(const PhantomArguments& arguments, const Console& console) {
   const phantom_calibration::PhantomOptions options = options_of(arguments, console);
-  const auto given = sweep::read_phantom_case(arguments.name_or_file);
-  if (!given && exit_code(given.error().reason) == 3) {
+  const auto the_case = sweep::read_phantom_case(arguments.name_or_file);
+  if (!the_case && exit_code(the_case.error().reason) == 3) {
     phantom_calibration::PhantomResult refused;
-    refused.failure = given.error();
+    refused.failure = the_case.error();
     return refused;
   }
-  if (!given) throw BadInput(given.error());
-  return value_or_throw(phantom_calibration::measure_phantom(*given, options));
+  if (!the_case) throw BadInput(the_case.error());
+  return value_or_throw(phantom_calibration::measure_phantom(*the_case, options));
 }
 
 void print(const phantom_calibration::PhantomResult& result, const std::filesystem::path& out,
@@ -236,12 +236,12 @@ void print(const phantom_calibration::PhantomResult& result, const std::filesyst
 }
 
 /// The measured calibrator must not replace the nominal file, which the case reads.
-void refuse_own_calibrator(const std::filesystem::path& given, const std::filesystem::path& out) {
-  const auto json = read_json(pipeline::case_file(given));
+void refuse_own_calibrator(const std::filesystem::path& case_name, const std::filesystem::path& out) {
+  const auto json = read_json(pipeline::case_file(case_name));
   if (!json || !json->is_object() || !json->value("calibrator", Json()).is_string()) return;
   std::error_code ignored;
   const std::filesystem::path nominal =
-      pipeline::folder_of_case(given) / (*json)["calibrator"].get<std::string>();
+      pipeline::folder_of_case(case_name) / (*json)["calibrator"].get<std::string>();
   if (std::filesystem::equivalent(nominal, out / "calibrator.json", ignored))
     throw BadInput(Reason::usage,
                    fmt::format("--out {}: its calibrator.json is the nominal file of the case: "
@@ -285,9 +285,9 @@ void print(const phantom_calibration::PhantomVerification& result, Console& cons
 
 void verify(const PhantomArguments& arguments, Console& console) {
   if (arguments.out) forget_files(*arguments.out, {"result.json", "report.html"});
-  const pipeline::Case given = value_or_throw(pipeline::read_case(arguments.name_or_file));
+  const pipeline::Case the_case = value_or_throw(pipeline::read_case(arguments.name_or_file));
   phantom_calibration::PhantomVerification result =
-      value_or_throw(phantom_calibration::verify_phantom(given, console.threads));
+      value_or_throw(phantom_calibration::verify_phantom(the_case, console.threads));
   result.date = phantom_calibration::today();
   if (arguments.history && !result.balls.empty())
     value_or_throw(phantom_calibration::add_to_history(*arguments.history, result));

@@ -38,23 +38,23 @@ namespace {
 constexpr double most_points_per_edge = 201;
 
 Eigen::Vector3d place_from(const std::string& word) {
-  Eigen::Vector3d place;
+  Eigen::Vector3d position;
   const char* at = word.data();
   const char* const end = at + word.size();
   for (int k = 0; k < 3; ++k) {
-    const auto [next, error] = std::from_chars(at, end, place(k));
+    const auto [next, error] = std::from_chars(at, end, position(k));
     const bool separated = k == 2 ? next == end : next != end && *next == ',';
-    if (error != std::errc() || !separated || !(std::abs(place(k)) <= 1e4))
+    if (error != std::errc() || !separated || !(std::abs(position(k)) <= 1e4))
       throw BadInput(Reason::usage, fmt::format("--at: \"{}\" is not x,y,z in mm within 10000", word));
     at = next + 1;
   }
-  return place;
+  return position;
 }
 
-Json prediction(const Eigen::Vector3d& place, const calibration::Calibration& calibration,
+Json prediction(const Eigen::Vector3d& position, const calibration::Calibration& calibration,
                 const PredictArguments& arguments) {
-  Json json{{"xyz_mm", {place.x(), place.y(), place.z()}}};
-  const auto covariance = localization::predict_covariance(place, arguments.sigma_px, calibration,
+  Json json{{"xyz_mm", {position.x(), position.y(), position.z()}}};
+  const auto covariance = localization::predict_covariance(position, arguments.sigma_px, calibration,
                                                            arguments.run.options.run.motion_sigma_mm);
   if (!covariance) {
     json["decision"] = "refuse";
@@ -89,24 +89,24 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
                                  arguments.step_mm, arguments.half_mm, most_points_per_edge));
     std::vector<Eigen::Vector3d> places;
     for (const std::string& word : arguments.at) places.push_back(place_from(word));
-    const pipeline::Case given = value_or_throw(pipeline::read_case(arguments.run.folder));
-    if (given.views.size() < 2)
+    const pipeline::Case the_case = value_or_throw(pipeline::read_case(arguments.run.folder));
+    if (the_case.views.size() < 2)
       throw BadInput(Reason::too_few_views,
                      "one view locates no point: the case needs a second view, of another direction");
-    const Eigen::Vector3d middle = phantom::middle_of(given.calibrator);
+    const Eigen::Vector3d middle = phantom::middle_of(the_case.calibrator);
     if (places.empty()) places.push_back(middle);
     const pipeline::RunOptions options = value_or_throw(options_of(arguments.run, console)).run;
-    const auto calibrated = pipeline::calibrate_case(given, options);
+    const auto calibrated = pipeline::calibrate_case(the_case, options);
     if (!calibrated) throw BadInput(calibrated.error().failure);
     const calibration::Calibration& calibration = *calibrated;
 
     Json points = Json::array();
     std::vector<Warning> notes;
-    for (const Eigen::Vector3d& place : places) {
-      points.push_back(prediction(place, calibration, arguments));
+    for (const Eigen::Vector3d& position : places) {
+      points.push_back(prediction(position, calibration, arguments));
       notes.push_back(localization::unobservable_motion(
-          fmt::format("{:g},{:g},{:g}", place.x(), place.y(), place.z()), place, calibration.views.front(),
-          arguments.run.options.run.motion_sigma_mm));
+          fmt::format("{:g},{:g},{:g}", position.x(), position.y(), position.z()), position,
+          calibration.views.front(), arguments.run.options.run.motion_sigma_mm));
     }
     print_warnings(calibrated->warnings, console);
     if (arguments.map)

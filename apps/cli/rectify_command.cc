@@ -116,8 +116,7 @@ void write_stages(const xray::XrayImage& xray_image, const rectification::Rectif
 void rectify_image(const RectifyArguments& arguments, Console& console) {
   const xray::XrayImage xray_image = read(arguments.images.front(), arguments, console);
   const rectification::Rectification r = value_or_throw(rectification::rectify(
-      xray_image, plate_from(*arguments.plate),
-      {arguments.method, {}, arguments.model.value_or("")}));
+      xray_image, plate_from(*arguments.plate), {arguments.method, {}, arguments.model.value_or("")}));
   print_warnings(r.warnings, console);
   std::string residuals = "u_px,v_px,residual_px\n";
   for (std::size_t i = 0; i < r.plate_dots.size(); ++i)
@@ -185,9 +184,9 @@ void map_points(const RectifyArguments& arguments, Console& console) {
   const CsvTable table = value_or_throw(read_csv(*arguments.points, {"u_px", "v_px"}, {}));
   Json points = Json::array();
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const Eigen::Vector2d given{table.number(row, "u_px"), table.number(row, "v_px")};
-    const auto mapped = arguments.inverse ? rectification::raw_in_image(map, given)
-                                          : rectification::rectified_in_image(map, given);
+    const Eigen::Vector2d uv{table.number(row, "u_px"), table.number(row, "v_px")};
+    const auto mapped =
+        arguments.inverse ? rectification::raw_in_image(map, uv) : rectification::rectified_in_image(map, uv);
     points.push_back(mapped ? Json{{"u", mapped->x()}, {"v", mapped->y()}}
                             : Json{{"u", nullptr}, {"v", nullptr}});
   }

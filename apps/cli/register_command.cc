@@ -63,7 +63,7 @@ void print(const RegisteredModel& model, std::ostream& out) {
 void follow(const RegisterArguments& arguments, const case_registration::RegisterOptions& options,
             const case_registration::Progress& steps, Console& console) {
   const auto range = value_or_throw(case_registration::frame_range_from(arguments.frames));
-  const auto given =
+  const auto the_case =
       value_or_throw(pipeline::read_case(arguments.run.folder, pipeline::Purpose::registration));
   ProgressLine progress(console);
   Interruption interruption;
@@ -75,7 +75,7 @@ void follow(const RegisterArguments& arguments, const case_registration::Registe
   const auto sequence = [&] {
     try {
       return value_or_throw(track::follow_models(
-          given, range, options,
+          the_case, range, options,
           {.out = arguments.run.out, .resume = arguments.resume, .on_note = noted(console)}, on_frame,
           steps));
     } catch (const Interruption::Requested&) {
@@ -122,9 +122,9 @@ CommandResult register_command(const RegisterArguments& arguments, Console& cons
         console.progress << fmt::format("helicarm: {}{}{}\n", model, model.empty() ? "" : ": ", step);
       };
     if (!arguments.frames.empty()) return follow(arguments, options, progress, console);
-    const auto given =
+    const auto the_case =
         value_or_throw(pipeline::read_case(arguments.run.folder, pipeline::Purpose::registration));
-    const auto result = value_or_throw(case_registration::register_case(given, options, progress));
+    const auto result = value_or_throw(case_registration::register_case(the_case, options, progress));
     value_or_throw(case_registration::write_registration(result, arguments.run.out));
     print_warnings(result.warnings, console);
     for (const RegisteredModel& model : result.models) {

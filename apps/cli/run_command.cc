@@ -139,8 +139,8 @@ CommandResult run_several(const RunCasesArguments& arguments, Console& console) 
 
 std::vector<std::string> names_of(const std::vector<fs::path>& cases) {
   std::vector<std::string> names;
-  for (const fs::path& given : cases) {
-    const fs::path whole = fs::absolute(given).lexically_normal();
+  for (const fs::path& case_folder : cases) {
+    const fs::path whole = fs::absolute(case_folder).lexically_normal();
     const bool is_folder = whole.has_filename() && whole.extension() != ".json";
     const std::string name = (is_folder ? whole : whole.parent_path()).filename().string();
     names.push_back(name.empty() ? "case" : name);

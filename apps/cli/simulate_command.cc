@@ -175,9 +175,9 @@ CommandResult simulate_command(const SimulateArguments& arguments, Console& cons
         value_or_throw(simulation::write_run(arguments.folder, run));
         return std::move(run.images);
       }
-      auto made = value_or_throw(simulation::simulate_case(options));
-      value_or_throw(simulation::write_case(arguments.folder, made));
-      return made;
+      auto images = value_or_throw(simulation::simulate_case(options));
+      value_or_throw(simulation::write_case(arguments.folder, images));
+      return images;
     }();
     const std::vector<Warning> warnings = simulation::ball_size_warnings(simulated);
     print_warnings(warnings, console);

@@ -86,9 +86,10 @@ using GivenOptions = std::vector<std::pair<std::string_view, bool>>;
 
 /// Fields that differ from their default.
 template <class Options, std::size_t count>
-void add_given(GivenOptions& given, const Options& options, const std::array<Field<Options>, count>& fields) {
+void add_given(GivenOptions& stated, const Options& options,
+               const std::array<Field<Options>, count>& fields) {
   for (const Field<Options>& field : fields)
-    given.emplace_back(field.flag, field.get(options) != field.get(Options{}));
+    stated.emplace_back(field.flag, field.get(options) != field.get(Options{}));
 }
 
 template <std::size_t count, class Options>
@@ -100,13 +101,13 @@ std::vector<std::string_view> flags_of(std::vector<std::string_view> flags,
 
 /// An option that this study does not have is an error.
 void only(const StudyArguments& a, const std::vector<std::string_view>& known) {
-  GivenOptions given{{"--balls", !a.balls.empty()},           {"--sigma", !a.sigmas.empty()},
-                     {"--reading", !a.readings.empty()},      {"--fle", a.fle.has_value()},
-                     {"--origin", !a.origin.empty()},         {"--draws", a.draws.has_value()},
-                     {"--calibrator", !a.calibrator.empty()}, {"--surface", !a.surface.empty()}};
-  add_given(given, a.biplane, study::biplane_fields);
-  add_given(given, a.calibration, study::calibration_fields);
-  for (const auto& [option, is_given] : given)
+  GivenOptions stated{{"--balls", !a.balls.empty()},           {"--sigma", !a.sigmas.empty()},
+                      {"--reading", !a.readings.empty()},      {"--fle", a.fle.has_value()},
+                      {"--origin", !a.origin.empty()},         {"--draws", a.draws.has_value()},
+                      {"--calibrator", !a.calibrator.empty()}, {"--surface", !a.surface.empty()}};
+  add_given(stated, a.biplane, study::biplane_fields);
+  add_given(stated, a.calibration, study::calibration_fields);
+  for (const auto& [option, is_given] : stated)
     if (is_given && std::ranges::count(known, option) == 0)
       refuse(fmt::format("{} has no {}; its options are: {}", a.name, option,
                          known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", "))));

@@ -47,10 +47,10 @@ CommandResult sweep_command(const SweepArguments& arguments, Console& console) {
     sweep::SweepOptions options;
     if (!arguments.path.empty()) options.path = value_or_throw(sweep::path_kind(arguments.path));
     options.threads = console.threads;
-    const auto given = value_or_throw(sweep::read_sweep_case(arguments.folder));
+    const auto the_case = value_or_throw(sweep::read_sweep_case(arguments.folder));
     ProgressLine progress(console);
     const sweep::Sweep result =
-        value_or_throw(sweep::run_sweep(given, options, [&](double share) { progress.notify(share); }));
+        value_or_throw(sweep::run_sweep(the_case, options, [&](double share) { progress.notify(share); }));
     value_or_throw(sweep::write_sweep(result, arguments.out));
     print_warnings(result.warnings, console);
     if (console.json) {

@@ -23,23 +23,23 @@ struct TrackArguments {
 };
 namespace {
 
-std::string summary_of(const track::Sequence& sequence, const track::TrackCase& given) {
+std::string summary_of(const track::Sequence& sequence, const track::TrackCase& the_case) {
   std::array<int, 4> counts{};
   for (const auto& frame : sequence.markers)
     for (const track::TrackedMarker& marker : frame) ++counts[std::size_t(marker.status)];
   std::string text = fmt::format("  {} frames, {} with all {} markers tracked\n", sequence.frames.size(),
-                                 sequence.complete, given.markers.size());
+                                 sequence.complete, the_case.markers.size());
   text += fmt::format("  places: {} tracked, {} by one view, {} predicted, {} lost; {} exchanges repaired\n",
                       counts[0], counts[1], counts[2], counts[3], sequence.repaired);
-  for (std::size_t k = 1; k < given.views.size(); ++k)
+  for (std::size_t k = 1; k < the_case.views.size(); ++k)
     if (sequence.delays[k].is_known)
       text += fmt::format("  delay of {}: {:.4f} frames, standard deviation {:.4f}\n",
-                          given.views[k].images.name, sequence.delays[k].frames, sequence.delays[k].sigma);
-  for (std::size_t b = 0; b < given.bodies.size(); ++b) {
+                          the_case.views[k].images.name, sequence.delays[k].frames, sequence.delays[k].sigma);
+  for (std::size_t b = 0; b < the_case.bodies.size(); ++b) {
     int decisions[3] = {};
     for (const track::TrackedBody& frame : sequence.bodies[b].frames) ++decisions[int(frame.decision)];
     text += fmt::format("  {}: {} accepted, {} warned, {} refused; markers deviate by {:.3f} mm per axis\n",
-                        given.bodies[b].name, decisions[0], decisions[1], decisions[2],
+                        the_case.bodies[b].name, decisions[0], decisions[1], decisions[2],
                         sequence.bodies[b].deviation_mm);
   }
   return text;
@@ -61,8 +61,8 @@ CommandResult track_command(const TrackArguments& arguments, Console& console) {
       }
       throw BadInput(failure);
     };
-    const auto given = track::read_track_case(arguments.folder, range);
-    if (!given) refuse(given.error());
+    const auto the_case = track::read_track_case(arguments.folder, range);
+    if (!the_case) refuse(the_case.error());
     ProgressLine progress(console);
     Interruption interruption;
     int followed = 0;
@@ -73,7 +73,7 @@ CommandResult track_command(const TrackArguments& arguments, Console& console) {
     };
     const auto sequence = [&] {
       try {
-        return track::run_track(*given, range,
+        return track::run_track(*the_case, range,
                                 {.out = arguments.out, .resume = arguments.resume, .on_note = noted(console)},
                                 on_frame);
       } catch (const Interruption::Requested&) {
@@ -85,12 +85,12 @@ CommandResult track_command(const TrackArguments& arguments, Console& console) {
       }
     }();
     if (!sequence) refuse(sequence.error());
-    value_or_throw(track::write_track(*sequence, *given, arguments.out));
+    value_or_throw(track::write_track(*sequence, *the_case, arguments.out));
     print_warnings(sequence->warnings, console);
     if (console.json)
-      console.out << to_text(track::to_json(*sequence, *given)) << '\n';
+      console.out << to_text(track::to_json(*sequence, *the_case)) << '\n';
     else if (!console.quiet)
-      console.out << summary_of(*sequence, *given)
+      console.out << summary_of(*sequence, *the_case)
                   << fmt::format("  {:.1f} s, {:.1f} frames/s\n\n  written to {}\n", sequence->seconds,
                                  double(sequence->frames.size()) / sequence->seconds, arguments.out.string());
     if (sequence->failure) {

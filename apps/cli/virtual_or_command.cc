@@ -72,18 +72,19 @@ std::string ports_of(VirtualDevices& virtual_or) {
 std::string execute(const std::string& line, VirtualDevices& virtual_or,
                     const virtual_devices::ImageReceiver& receiver) {
   std::istringstream said(line);
-  std::string verb, what, how;
+  std::string verb, what, state;
   said >> verb >> what;
   if (verb == "shoot") {
-    said >> how;
-    value_or_throw(virtual_devices::shoot(virtual_or.simulated_scene(), what, receiver, fault_of_shot(how)));
+    said >> state;
+    value_or_throw(
+        virtual_devices::shoot(virtual_or.simulated_scene(), what, receiver, fault_of_shot(state)));
     return "shot " + what;
   }
   if (verb == "fault") {
-    said >> how;
-    if (how != "on" && how != "off") throw BadInput(Reason::usage, "fault NAME on or off");
-    value_or_throw(virtual_or.set_fault(what, how == "on"));
-    return fmt::format("{} {}", what, how);
+    said >> state;
+    if (state != "on" && state != "off") throw BadInput(Reason::usage, "fault NAME on or off");
+    value_or_throw(virtual_or.set_fault(what, state == "on"));
+    return fmt::format("{} {}", what, state);
   }
   const bool bone = what == "femur" || what == "tibia";
   if (verb == "move" || verb == "bump") {

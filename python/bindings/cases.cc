@@ -38,14 +38,14 @@ case_registration::Measurement run(const std::filesystem::path& folder, const st
                                    double search_mm, double search_deg, unsigned threads,
                                    const std::optional<std::filesystem::path>& history,
                                    const py::object& cache, const py::object& progress) {
-  const case_registration::RegisterOptions options = measuring_options(
-      "run_case", method, max_error_mm, motion_sigma_mm, search_mm, search_deg, threads, history, cache,
-      true);
+  const case_registration::RegisterOptions options =
+      measuring_options("run_case", method, max_error_mm, motion_sigma_mm, search_mm, search_deg, threads,
+                        history, cache, true);
   if (history) value_or_raise(calibration::check_history_file(*history));
   const RunHooks hooks = run_hooks(progress);
   case_registration::Measurement measured = value_or_raise(without_gil([&] {
-    return pipeline::read_case(folder).and_then([&](const pipeline::Case& given) {
-      return case_registration::measure_case(given, options, progress_of(hooks));
+    return pipeline::read_case(folder).and_then([&](const pipeline::Case& the_case) {
+      return case_registration::measure_case(the_case, options, progress_of(hooks));
     });
   }));
   if (measured.result.failure) raise(*measured.result.failure, py::cast(measured));
@@ -107,9 +107,9 @@ py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, con
   value_or_raise(check_case_folder(folder));
   std::vector<Warning> warnings;
   const auto simulated = without_gil([&] {
-    return simulate_case(options).and_then([&](const SimulatedCase& made) {
-      warnings = ball_size_warnings(made);
-      return write_case(folder, made).map([&] { return truth_json(made); });
+    return simulate_case(options).and_then([&](const SimulatedCase& images) {
+      warnings = ball_size_warnings(images);
+      return write_case(folder, images).map([&] { return truth_json(images); });
     });
   });
   warn(warnings);
@@ -140,9 +140,7 @@ void add_result_points(py::module_& module) {
   py::class_<Point>(module, "ResultPoint",
                     "A pick or check target of a case: its position, or why it was not located.")
       .def_readonly("name", &Point::name)
-      .def_property_readonly(
-          "source",
-          [](const Point& p) { return word(p.source); })
+      .def_property_readonly("source", [](const Point& p) { return word(p.source); })
       .def_property_readonly(
           "xyz_mm", of_place([](const guidance::PointInFrames& g) -> py::object {
             return read_only(rows_array<3>({g.in_calibrator}, true));
@@ -279,8 +277,7 @@ void add_cases(py::module_& module) {
   const case_registration::RegisterOptions searched;
   const pipeline::RunOptions& usual = searched.run;
   module.def(
-      "run_case", &run, py::arg("folder"), py::kw_only(),
-      py::arg("method") = std::string(word(usual.method)),
+      "run_case", &run, py::arg("folder"), py::kw_only(), py::arg("method") = std::string(word(usual.method)),
       py::arg("max_error_mm") = usual.max_error_mm, py::arg("motion_sigma_mm") = usual.motion_sigma_mm,
       py::arg("search_mm") = searched.search.shift_mm, py::arg("search_deg") = searched.search.turn_deg,
       py::arg("threads") = usual.threads, py::arg("history") = py::none(), py::arg("cache") = true,
@@ -296,13 +293,14 @@ folder that keeps the distortion maps of plate images, True for the user's cache
 called with the name of each stage (read, rectify, detect, label, calibrate, locate) before it begins; an exception
 from it ends the run, and Ctrl-C does between two views. Releases the GIL. Returns a Result.
 Raises InputError; RefusedError with .result, which holds all that was computed until then.)");
-  const simulation::SimulationOptions made;
+  const simulation::SimulationOptions usual_simulation;
   module.def(
-      "simulate_case", &simulate, py::arg("folder"), py::kw_only(), py::arg("seed") = made.seed,
-      py::arg("kind") = std::string(simulation::word(made.kind)), py::arg("preset") = py::none(),
-      py::arg("size") = made.size, py::arg("bits") = made.bits, py::arg("knee") = made.knee,
-      py::arg("faults") = std::vector<std::string>(), py::arg("views") = std::vector<std::string>(),
-      py::arg("ct") = py::none(), py::arg("threads") = made.threads,
+      "simulate_case", &simulate, py::arg("folder"), py::kw_only(), py::arg("seed") = usual_simulation.seed,
+      py::arg("kind") = std::string(simulation::word(usual_simulation.kind)), py::arg("preset") = py::none(),
+      py::arg("size") = usual_simulation.size, py::arg("bits") = usual_simulation.bits,
+      py::arg("knee") = usual_simulation.knee, py::arg("faults") = std::vector<std::string>(),
+      py::arg("views") = std::vector<std::string>(), py::arg("ct") = py::none(),
+      py::arg("threads") = usual_simulation.threads,
       R"(Writes a simulated case (images, case.json, calibrator.json, plate.json, truth.json) into a folder.
 
 The same seed gives the same bytes. kind: accuracy, tunnels, flat or grid; preset: paper-sim, ii-9in or flat-panel;

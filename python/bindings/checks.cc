@@ -34,9 +34,9 @@ std::optional<double> checked(std::optional<double> value, const Limits& limits,
   return value;
 }
 
-Eigen::MatrixXd checked_covariance(const Eigen::MatrixXd& given, const std::string& argument,
+Eigen::MatrixXd checked_covariance(const Eigen::MatrixXd& stated, const std::string& argument,
                                    const std::string& view) {
-  auto covariance = phantom::checked_covariance(given);
+  auto covariance = phantom::checked_covariance(stated);
   if (covariance) return *std::move(covariance);
   Failure failure = std::move(covariance).error();
   failure.message = fmt::format("{}: {}", argument, failure.message);

@@ -31,7 +31,7 @@ std::optional<double> checked(std::optional<double> value, const Limits& limits,
 
 /// The matrix made exactly symmetric. Raises InputError (bad_value) for one that is asymmetric or has a
 /// negative eigenvalue.
-Eigen::MatrixXd checked_covariance(const Eigen::MatrixXd& given, const std::string& argument,
+Eigen::MatrixXd checked_covariance(const Eigen::MatrixXd& stated, const std::string& argument,
                                    const std::string& view = {});
 
 /// Index of `word` in `words`. Raises InputError (usage) for another word.

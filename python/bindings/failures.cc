@@ -52,11 +52,11 @@ Json json_from(const py::object& value) {
     throw py::type_error("dict: holds a " + std::string(py::str(py::type::of(other).attr("__name__"))) +
                          ", which JSON cannot express");
   });
-  py::dict how;
-  how["default"] = listed;
+  py::dict dump_options;
+  dump_options["default"] = listed;
   std::string text;
   try {
-    text = py::module_::import("json").attr("dumps")(value, **how).cast<std::string>();
+    text = py::module_::import("json").attr("dumps")(value, **dump_options).cast<std::string>();
   } catch (py::error_already_set& error) {
     raise({Reason::bad_json, std::string(py::str(error.value())), {}, {}});
   }

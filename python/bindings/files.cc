@@ -31,7 +31,7 @@ py::dict new_case(const std::vector<std::string>& images, const std::filesystem:
                   const std::string& calibrator, const std::optional<std::string>& plate,
                   const NamedPaths& plate_images, const NamedPaths& maps, std::optional<double> pixel_mm,
                   std::optional<double> source_detector_mm) {
-  const auto made = value_or_raise(without_gil([&] {
+  const auto written = value_or_raise(without_gil([&] {
     return guarded([&] {
       std::vector<pipeline::InspectedImage> inspected;
       for (const std::string& word : images)
@@ -49,14 +49,14 @@ py::dict new_case(const std::vector<std::string>& images, const std::filesystem:
   }));
   py::dict answer;
   answer["case"] = (out / "case.json").string();
-  answer["findings"] = made.findings;
-  answer["warnings"] = warning_list(made.warnings);
+  answer["findings"] = written.findings;
+  answer["warnings"] = warning_list(written.warnings);
   return answer;
 }
 
 py::dict bundle(const std::filesystem::path& folder, const std::filesystem::path& out,
                 const std::optional<std::filesystem::path>& result, bool measure, unsigned threads) {
-  const auto made = value_or_raise(without_gil([&] {
+  const auto written = value_or_raise(without_gil([&] {
     return guarded([&] {
       pipeline::BundleOptions options;
       options.measure = measure;
@@ -71,10 +71,10 @@ py::dict bundle(const std::filesystem::path& folder, const std::filesystem::path
     });
   }));
   py::dict answer, files;
-  for (const pipeline::ArchivedFile& file : made.files) files[file.name.c_str()] = file.bytes.size();
+  for (const pipeline::ArchivedFile& file : written.files) files[file.name.c_str()] = file.bytes.size();
   answer["written"] = out.string();
   answer["files"] = files;
-  answer["left_out"] = made.left_out;
+  answer["left_out"] = written.left_out;
   return answer;
 }
 
@@ -82,7 +82,7 @@ py::object schema(const std::string& file) {
   const auto& all = operation::schemas();
   if (const auto found = all.find(file); found != all.end()) return python_from(found->second());
   std::vector<std::string> names;
-  for (const auto& [name, made] : all) names.push_back(name);
+  for (const auto& [name, written] : all) names.push_back(name);
   raise({Reason::usage, fmt::format("file: \"{}\" is none of: {}", file, fmt::join(names, ", ")), {}, {}});
 }
 

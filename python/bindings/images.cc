@@ -18,11 +18,11 @@ using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 
 /// What the array's type can hold; of floating-point pixels the caller must say it.
 std::pair<float, float> range_of(const py::array& pixels,
-                                 const std::optional<std::pair<float, float>>& given) {
-  if (given) {
-    checked(given->first, any_number, "range: least");
-    checked(given->second, {given->first, std::numeric_limits<float>::max(), true}, "range: greatest");
-    return *given;
+                                 const std::optional<std::pair<float, float>>& stated) {
+  if (stated) {
+    checked(stated->first, any_number, "range: least");
+    checked(stated->second, {stated->first, std::numeric_limits<float>::max(), true}, "range: greatest");
+    return *stated;
   }
   const char kind = pixels.dtype().kind();
   if (kind == 'u' && pixels.itemsize() <= 2) return {0.f, pixels.itemsize() == 1 ? 255.f : 65535.f};
@@ -34,10 +34,10 @@ std::pair<float, float> range_of(const py::array& pixels,
 
 std::optional<Eigen::Vector2d> spacing_of(const py::object& pixel_mm) {
   if (pixel_mm.is_none()) return {};
-  const Doubles given = Doubles::ensure(pixel_mm);
-  if (!given || (given.size() != 1 && given.size() != 2))
+  const Doubles spacings = Doubles::ensure(pixel_mm);
+  if (!spacings || (spacings.size() != 1 && spacings.size() != 2))
     raise({Reason::bad_value, "pixel_mm: is neither a number nor (column spacing, row spacing)", {}, {}});
-  Eigen::Vector2d spacing(given.data()[0], given.data()[given.size() - 1]);
+  Eigen::Vector2d spacing(spacings.data()[0], spacings.data()[spacings.size() - 1]);
   for (const double mm : spacing) checked(mm, {xray::min_pixel_mm, xray::max_pixel_mm}, "pixel_mm");
   return spacing;
 }
@@ -84,27 +84,28 @@ py::tuple state_of(const xray::XrayImage& image) {
 }
 
 std::shared_ptr<xray::XrayImage> image_of_state(const py::tuple& state) {
-  auto made = std::make_shared<xray::XrayImage>();
+  auto loaded = std::make_shared<xray::XrayImage>();
   std::size_t next = 0;
   const auto take = [&](auto& value) { value = state[next++].cast<std::decay_t<decltype(value)>>(); };
   Floats pixels;
   py::list warnings;
   py::object pixel_mm, acquired;
-  xray::Acquisition& a = made->acquisition;
-  take(pixels), take(made->name), take(made->lowest), take(made->highest), take(warnings), take(pixel_mm);
+  xray::Acquisition& a = loaded->acquisition;
+  take(pixels), take(loaded->name), take(loaded->lowest), take(loaded->highest), take(warnings),
+      take(pixel_mm);
   take(a.source_detector_mm), take(a.source_patient_mm), take(a.primary_angle_deg);
   take(a.secondary_angle_deg), take(acquired), take(a.flip_hint), take(a.rotation_hint_deg);
   take(a.logarithmic), take(a.modality), take(a.technique), take(a.patient_key), take(a.study_key);
   take(a.frame_of_reference_key), take(a.instance_key), take(a.uid_key);
-  made->pixels = image::Image<float>(int(pixels.shape(1)), int(pixels.shape(0)));
-  std::copy_n(pixels.data(), pixels.size(), made->pixels.pixels().begin());
-  made->warnings = warnings_from(warnings);
+  loaded->pixels = image::Image<float>(int(pixels.shape(1)), int(pixels.shape(0)));
+  std::copy_n(pixels.data(), pixels.size(), loaded->pixels.pixels().begin());
+  loaded->warnings = warnings_from(warnings);
   a.pixel_mm = spacing_of(pixel_mm);
   if (!acquired.is_none()) {
     const auto [seconds, resolution_s, source] = acquired.cast<std::tuple<double, double, std::string>>();
     a.acquired = {seconds, resolution_s, source};
   }
-  return made;
+  return loaded;
 }
 
 py::dict marks(const xray::XrayImage& image, const std::string& kind) {

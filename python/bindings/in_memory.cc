@@ -28,44 +28,44 @@ using GivenView = std::tuple<std::string, ImagePointer, Camera, std::optional<re
 
 geometry::RigidTransform pose_from(const Doubles& matrix, const std::string& name) {
   constexpr double rounded = 1e-6;
-  const Eigen::Matrix4d given = matrix_of(matrix, 4, 4, name);
-  const geometry::RigidTransform pose{given.topLeftCorner<3, 3>(), given.topRightCorner<3, 1>()};
-  if (given.row(3) != Eigen::RowVector4d(0, 0, 0, 1) ||
+  const Eigen::Matrix4d stated = matrix_of(matrix, 4, 4, name);
+  const geometry::RigidTransform pose{stated.topLeftCorner<3, 3>(), stated.topRightCorner<3, 1>()};
+  if (stated.row(3) != Eigen::RowVector4d(0, 0, 0, 1) ||
       !(pose.rotation * pose.rotation.transpose()).isIdentity(rounded) || pose.rotation.determinant() < 0)
     raise({Reason::bad_value, fmt::format("{}: is not a rigid motion (4 x 4, mm)", name), {}, {}});
   return pose;
 }
 
-case_registration::GivenModel model_of(const std::string& name, const py::dict& given,
+case_registration::GivenModel model_of(const std::string& name, const py::dict& entries,
                                        const std::vector<Doubles>& starts) {
-  case_registration::GivenModel made;
-  if (given.contains("surface")) {
-    const auto surface = given["surface"].cast<SurfacePointer>();
-    made.model = value_or_raise(without_gil([&] { return registration::model_from(name, *surface); }));
-    made.model.warnings = surface->warnings;
+  case_registration::GivenModel loaded;
+  if (entries.contains("surface")) {
+    const auto surface = entries["surface"].cast<SurfacePointer>();
+    loaded.model = value_or_raise(without_gil([&] { return registration::model_from(name, *surface); }));
+    loaded.model.warnings = surface->warnings;
   } else {
-    const auto held = given["volume"].cast<VolumePointer>();
+    const auto held = entries["volume"].cast<VolumePointer>();
     std::optional<volume::Volume> mask;
-    if (given.contains("mask")) mask = *given["mask"].cast<VolumePointer>();
+    if (entries.contains("mask")) mask = *entries["mask"].cast<VolumePointer>();
     std::optional<registration::HuWindow> window;
-    if (given.contains("window_hu")) {
-      const auto [low, high] = given["window_hu"].cast<std::pair<double, double>>();
+    if (entries.contains("window_hu")) {
+      const auto [low, high] = entries["window_hu"].cast<std::pair<double, double>>();
       checked(low, any_number, name + ": window_hu");
       checked(high, {low, std::numeric_limits<double>::infinity(), true}, name + ": window_hu");
       window = registration::HuWindow{low, high};
     }
-    made.model =
+    loaded.model =
         value_or_raise(without_gil([&] { return registration::model_from(name, *held, mask, window); }));
-    made.model.warnings = held->warnings;
+    loaded.model.warnings = held->warnings;
     for (Warning& warning : value_or_raise(volume::check_hounsfield(*held, name + ": volume")))
-      made.model.warnings.push_back(std::move(warning));
+      loaded.model.warnings.push_back(std::move(warning));
     if (mask)
-      made.model.warnings.insert(made.model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
+      loaded.model.warnings.insert(loaded.model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
   }
-  if (given.contains("scale_sigma"))
-    made.scale_sigma = checked(given["scale_sigma"].cast<double>(), {0, 0.1}, name + ": scale_sigma");
-  for (const Doubles& start : starts) made.starts.push_back(pose_from(start, "starts: " + name));
-  return made;
+  if (entries.contains("scale_sigma"))
+    loaded.scale_sigma = checked(entries["scale_sigma"].cast<double>(), {0, 0.1}, name + ": scale_sigma");
+  for (const Doubles& start : starts) loaded.starts.push_back(pose_from(start, "starts: " + name));
+  return loaded;
 }
 
 case_registration::LoadedViews views_of(const std::vector<GivenView>& views,
@@ -87,15 +87,15 @@ case_registration::LoadedViews views_of(const std::vector<GivenView>& views,
   for (std::size_t i = 0; i < usable.size(); ++i) {
     if (!usable[i]) continue;
     auto& view = loaded.views[i];
-    const py::array_t<bool> given = py::array_t<bool, py::array::c_style>::ensure(*usable[i]);
-    if (given.ndim() != 2 || given.shape(0) != view.grey.height() || given.shape(1) != view.grey.width())
+    const py::array_t<bool> mask = py::array_t<bool, py::array::c_style>::ensure(*usable[i]);
+    if (mask.ndim() != 2 || mask.shape(0) != view.grey.height() || mask.shape(1) != view.grey.width())
       raise({Reason::bad_size,
-             fmt::format("usable: shape {}, the image has ({}, {})", shape_of(given), view.grey.height(),
+             fmt::format("usable: shape {}, the image has ({}, {})", shape_of(mask), view.grey.height(),
                          view.grey.width()),
              view.name,
              {}});
     view.usable = image::Image<std::uint8_t>(view.grey.width(), view.grey.height());
-    std::ranges::copy_n(given.data(), given.size(), view.usable.pixels().begin());
+    std::ranges::copy_n(mask.data(), mask.size(), view.usable.pixels().begin());
   }
   return loaded;
 }
@@ -110,18 +110,20 @@ py::object register_given(const std::vector<std::pair<std::string, py::dict>>& m
                           const py::object& progress) {
   const auto options = measuring_options("register", "best", max_error_mm, motion_sigma_mm, search_mm,
                                          search_deg, threads, {}, py::bool_(false));
-  std::vector<case_registration::GivenModel> given;
+  std::vector<case_registration::GivenModel> loaded_models;
   for (const auto& [name, model] : models) {
     const auto at = starts.find(name);
-    given.push_back(model_of(name, model, at == starts.end() ? std::vector<Doubles>{} : at->second));
+    loaded_models.push_back(model_of(name, model, at == starts.end() ? std::vector<Doubles>{} : at->second));
   }
   auto loaded = views_of(views, camera_covariance, usable);
   const RunHooks hooks = run_hooks(progress);
   const auto result = value_or_raise(without_gil([&] {
-    return case_registration::register_given(std::move(given), std::move(loaded), options, progress_of(hooks))
-        .and_then([&](case_registration::CaseRegistration made) {
-          const auto written = out ? case_registration::write_registration(made, *out) : Expected<void>{};
-          return written.map([&] { return std::move(made); });
+    return case_registration::register_given(std::move(loaded_models), std::move(loaded), options,
+                                             progress_of(hooks))
+        .and_then([&](case_registration::CaseRegistration registered) {
+          const auto written =
+              out ? case_registration::write_registration(registered, *out) : Expected<void>{};
+          return written.map([&] { return std::move(registered); });
         });
   }));
   py::object answer = python_from(case_registration::to_json(result));
@@ -140,26 +142,26 @@ sweep::Sweep sweep_images(const std::vector<ImagePointer>& images, const phantom
            fmt::format("images: {} images, 1 to {} are possible", images.size(), most_images),
            {},
            {}});
-  sweep::SweepCase given;
-  given.base.calibrator = calibrator;
-  given.base.calibrator_name = calibrator.name;
-  given.base.plate = plate;
-  if (plate) given.base.plate_name = plate->name;
+  sweep::SweepCase the_case;
+  the_case.base.calibrator = calibrator;
+  the_case.base.calibrator_name = calibrator.name;
+  the_case.base.plate = plate;
+  if (plate) the_case.base.plate_name = plate->name;
   pipeline::CaseView run;
   run.name = "RUN";
   run.image = "images";
   run.mirrored = mirrored;
-  given.base.views = {run};
+  the_case.base.views = {run};
   std::vector<xray::XrayImage> frames;
   for (std::size_t i = 0; i < images.size(); ++i) {
     frames.push_back(*images[i]);
     sweep::Frame frame{run, run.name, int(i) + 1};
     frame.view.name = fmt::format("{}/{}", run.name, frame.number);
     frame.view.frame = frame.number;
-    given.frames.push_back(std::move(frame));
+    the_case.frames.push_back(std::move(frame));
   }
-  given.files[run.image] = value_or_raise(xray::ImageFile::of(std::move(frames)));
-  return run_sweep([&] { return Expected<sweep::SweepCase>(std::move(given)); }, path, threads, progress);
+  the_case.files[run.image] = value_or_raise(xray::ImageFile::of(std::move(frames)));
+  return run_sweep([&] { return Expected<sweep::SweepCase>(std::move(the_case)); }, path, threads, progress);
 }
 
 }  // namespace

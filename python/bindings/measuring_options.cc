@@ -18,10 +18,10 @@ case_registration::RegisterOptions measuring_options(const char* function, const
   case_registration::RegisterOptions options;
   options.run.method = method_of(method);
   for (const auto& field : pipeline::run_fields) {
-    const auto given = field.name == "max_error_mm"      ? max_error_mm
-                       : field.name == "motion_sigma_mm" ? std::optional(motion_sigma_mm)
-                                                         : std::nullopt;
-    if (given) field.set(options.run, checked(*given, within(field.range), std::string(field.name)));
+    const auto number = field.name == "max_error_mm"      ? max_error_mm
+                        : field.name == "motion_sigma_mm" ? std::optional(motion_sigma_mm)
+                                                          : std::nullopt;
+    if (number) field.set(options.run, checked(*number, within(field.range), std::string(field.name)));
   }
   options.run.threads = threads;
   value_or_raise(check_fields<pipeline::RunOptions>(pipeline::run_fields, options.run, function));

@@ -18,8 +18,7 @@ case_registration::RegisterOptions measuring_options(const char* function, const
                                                      double motion_sigma_mm, double search_mm,
                                                      double search_deg, unsigned threads,
                                                      const std::optional<std::filesystem::path>& history,
-                                                     const py::object& cache,
-                                                     bool extends_history = false);
+                                                     const py::object& cache, bool extends_history = false);
 
 /// Hears of every stage and step, and may end the work between them. Refers to `hooks`.
 case_registration::Progress progress_of(const RunHooks& hooks);

@@ -24,9 +24,9 @@ py::object migration_between(const std::filesystem::path& first, const std::file
   request.options.reference = reference;
   if (by_name) request.options.matching = migration::Matching::name;
   const auto answer = value_or_raise(without_gil([&] {
-    return migration::answer(request).and_then([&](migration::MigrationAnswer made) {
-      const auto written = out ? migration::write_migration(made, *out) : Expected<void>{};
-      return written.map([&] { return std::move(made); });
+    return migration::answer(request).and_then([&](migration::MigrationAnswer migration_answer) {
+      const auto written = out ? migration::write_migration(migration_answer, *out) : Expected<void>{};
+      return written.map([&] { return std::move(migration_answer); });
     });
   }));
   return python_from(migration::to_json(answer));

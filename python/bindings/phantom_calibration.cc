@@ -41,8 +41,9 @@ PhantomResult measured(const std::filesystem::path& folder, const std::vector<Di
   options.on_stage = hooks.on_stage;
   options.on_view = hooks.on_view;
   PhantomResult result = value_or_raise(without_gil([&] {
-    return sweep::read_phantom_case(folder).and_then(
-        [&](const pipeline::Case& given) { return phantom_calibration::measure_phantom(given, options); });
+    return sweep::read_phantom_case(folder).and_then([&](const pipeline::Case& the_case) {
+      return phantom_calibration::measure_phantom(the_case, options);
+    });
   }));
   if (result.failure) raise(*result.failure, py::cast(result));
   return result;
@@ -51,8 +52,9 @@ PhantomResult measured(const std::filesystem::path& folder, const std::vector<Di
 py::object verified(const std::filesystem::path& folder, const std::optional<std::filesystem::path>& history,
                     unsigned threads) {
   phantom_calibration::PhantomVerification result = value_or_raise(without_gil([&] {
-    return pipeline::read_case(folder).and_then(
-        [&](const pipeline::Case& given) { return phantom_calibration::verify_phantom(given, threads); });
+    return pipeline::read_case(folder).and_then([&](const pipeline::Case& the_case) {
+      return phantom_calibration::verify_phantom(the_case, threads);
+    });
   }));
   result.date = phantom_calibration::today();
   if (history && !result.balls.empty()) value_or_raise(phantom_calibration::add_to_history(*history, result));

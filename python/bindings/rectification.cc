@@ -225,11 +225,10 @@ void add_rectification(py::module_& module) {
         for (const Warning& warning : r.warnings) text += fmt::format(", warning {}", code(warning.reason));
         return text + ">";
       });
-  module.def(
-      "rectify", &rectified, py::arg("image"), py::arg("plate"), py::kw_only(),
-      py::arg("method") = std::string(word(pipeline::RunOptions{}.method)),
-      py::arg("model") = py::none(),
-      R"(Finds the plate in an image and fits the distortion map (2.1, Eq. 1-3).
+  module.def("rectify", &rectified, py::arg("image"), py::arg("plate"), py::kw_only(),
+             py::arg("method") = std::string(word(pipeline::RunOptions{}.method)),
+             py::arg("model") = py::none(),
+             R"(Finds the plate in an image and fits the distortion map (2.1, Eq. 1-3).
 
 plate: a Plate, a built-in's name ("plate48") or the path of a plate.json. method: "best" or "paper". model, of
 method best: "polynomial", "radial" or "kriging"; None: by the number of dots and their held-out errors. Releases the GIL.

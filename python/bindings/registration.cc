@@ -50,14 +50,14 @@ using Frames = std::variant<std::string, py::sequence>;
 case_registration::FrameRange frames_from(const Frames& frames) {
   if (const auto* text = std::get_if<std::string>(&frames))
     return value_or_raise(case_registration::frame_range_from(*text));
-  const auto& given = std::get<py::sequence>(frames);
+  const auto& sequence = std::get<py::sequence>(frames);
   constexpr std::size_t most = 1'000'000;
-  if (given.empty() || given.size() > most)
+  if (sequence.empty() || sequence.size() > most)
     raise({Reason::bad_value,
-           fmt::format("frames: has {} numbers, 1 to {} are possible", given.size(), most),
+           fmt::format("frames: has {} numbers, 1 to {} are possible", sequence.size(), most),
            {},
            {}});
-  const auto numbers = given.cast<std::vector<std::int64_t>>();
+  const auto numbers = sequence.cast<std::vector<std::int64_t>>();
   for (const std::int64_t number : numbers)
     if (number < 0 || number >= std::int64_t(most))
       raise({Reason::bad_value, fmt::format("frames: {} is outside 0 to {}", number, most - 1), {}, {}});
@@ -154,8 +154,8 @@ py::object register_sequence(const std::filesystem::path& folder, const Frames& 
   if (out && !resume) report::forget_registration(*out);
   const auto sequence = value_or_raise(without_gil([&] {
     return pipeline::read_case(folder, pipeline::Purpose::registration)
-        .and_then([&](const pipeline::Case& given) {
-          return track::follow_models(given, range, options, {.out = out, .resume = resume}, on_frame,
+        .and_then([&](const pipeline::Case& the_case) {
+          return track::follow_models(the_case, range, options, {.out = out, .resume = resume}, on_frame,
                                       {{}, hooks.on_view});
         })
         .and_then([&](track::ModelSequence made) {
@@ -184,8 +184,8 @@ void add_registration(py::module_& module) {
   const case_registration::RegisterOptions defaults;
   module.def(
       "register", &register_models, py::arg("folder"), py::kw_only(), py::arg("out") = py::none(),
-      py::arg("method") = std::string(word(defaults.run.method)),
-      py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
+      py::arg("method") = std::string(word(defaults.run.method)), py::arg("max_error_mm") = py::none(),
+      py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
       py::arg("search_mm") = defaults.search.shift_mm, py::arg("search_deg") = defaults.search.turn_deg,
       py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(), py::arg("cache") = true,
       py::arg("progress") = py::none(),
@@ -206,8 +206,8 @@ void add_registration(py::module_& module) {
   module.def(
       "register_sequence", &register_sequence, py::arg("folder"), py::arg("frames"), py::kw_only(),
       py::arg("out") = py::none(), py::arg("resume") = false,
-      py::arg("method") = std::string(word(defaults.run.method)),
-      py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
+      py::arg("method") = std::string(word(defaults.run.method)), py::arg("max_error_mm") = py::none(),
+      py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
       py::arg("search_mm") = defaults.search.shift_mm, py::arg("search_deg") = defaults.search.turn_deg,
       py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(), py::arg("cache") = true,
       py::arg("progress") = py::none(),

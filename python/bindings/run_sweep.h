@@ -21,8 +21,8 @@ sweep::Sweep run_sweep(const Read& read, const std::optional<std::string>& path,
   const py::object nothing = py::none();
   const RunHooks hooks = run_hooks(nothing);
   sweep::Sweep result = value_or_raise(without_gil([&] {
-    return read().and_then([&](const sweep::SweepCase& given) {
-      return sweep::run_sweep(given, options, [&](double share) {
+    return read().and_then([&](const sweep::SweepCase& the_case) {
+      return sweep::run_sweep(the_case, options, [&](double share) {
         hooks.on_view();
         if (progress.is_none()) return;
         const py::gil_scoped_acquire acquire;

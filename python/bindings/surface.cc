@@ -16,8 +16,8 @@ using Indices = py::array_t<std::int64_t, py::array::c_style | py::array::forcec
 
 std::shared_ptr<SurfaceMesh> surface_from(const Doubles& vertices, const py::array& faces,
                                           const std::string& frame, const std::string& unit) {
-  registration::SurfaceFile given;
-  given.mesh.corners = rows_of<3>(vertices, "vertices");
+  registration::SurfaceFile file;
+  file.mesh.corners = rows_of<3>(vertices, "vertices");
   if (std::string_view("iu").find(faces.dtype().kind()) == std::string_view::npos || faces.ndim() != 2 ||
       faces.shape(1) != 3)
     raise({Reason::bad_value,
@@ -27,9 +27,9 @@ std::shared_ptr<SurfaceMesh> surface_from(const Doubles& vertices, const py::arr
            {}});
   value_or_raise(guarded([&] { registration::check_triangles(double(faces.shape(0)), "faces"); }));
   const Indices indices = Indices::ensure(faces);
-  const auto count = std::int64_t(given.mesh.corners.size());
+  const auto count = std::int64_t(file.mesh.corners.size());
   for (py::ssize_t face = 0; face < indices.shape(0); ++face) {
-    auto& triangle = given.mesh.triangles.emplace_back();
+    auto& triangle = file.mesh.triangles.emplace_back();
     for (py::ssize_t side = 0; side < 3; ++side) {
       const std::int64_t corner = indices.at(face, side);
       if (corner < 0 || corner >= count)
@@ -44,10 +44,10 @@ std::shared_ptr<SurfaceMesh> surface_from(const Doubles& vertices, const py::arr
   value_or_raise(guarded([&] {
     const Eigen::Vector3d factors =
         volume::declared_space(frame, "frame") * volume::declared_unit(unit, "unit");
-    for (Eigen::Vector3d& corner : given.mesh.corners) corner = corner.cwiseProduct(factors);
+    for (Eigen::Vector3d& corner : file.mesh.corners) corner = corner.cwiseProduct(factors);
   }));
-  return std::make_shared<SurfaceMesh>(value_or_raise(
-      without_gil([&] { return registration::surface_of_file(std::move(given), "Surface"); })));
+  return std::make_shared<SurfaceMesh>(
+      value_or_raise(without_gil([&] { return registration::surface_of_file(std::move(file), "Surface"); })));
 }
 
 py::array faces_of(const SurfaceMesh& surface) {
@@ -82,9 +82,9 @@ unit). as_surface takes objects of other packages, read_surface files.)")
             return py::make_tuple(rows_array<3>(s.corners), faces_of(s), warning_list(s.warnings));
           },
           [](const py::tuple& state) {
-            auto made = surface_from(state[0].cast<Doubles>(), state[1].cast<py::array>(), "LPS", "mm");
-            made->warnings = warnings_from(state[2].cast<py::list>());
-            return made;
+            auto loaded = surface_from(state[0].cast<Doubles>(), state[1].cast<py::array>(), "LPS", "mm");
+            loaded->warnings = warnings_from(state[2].cast<py::list>());
+            return loaded;
           }))
       .def("__repr__", [](const SurfaceMesh& s) {
         return fmt::format("<Surface: {} vertices, {} triangles>", s.corners.size(), s.triangles.size());

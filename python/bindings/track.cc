@@ -18,7 +18,7 @@ constexpr double unplaced = std::numeric_limits<double>::quiet_NaN();
 
 /// A sequence with the case that it is of.
 struct Tracked {
-  track::TrackCase given;
+  track::TrackCase the_case;
   track::Sequence sequence;
 };
 
@@ -32,15 +32,15 @@ std::unique_ptr<Tracked> tracked(const std::filesystem::path& folder, const std:
       if (out && !resume) track::forget_track(*out);
       const auto range = value_or_throw(case_registration::frame_range_from(frames));
       auto made = std::make_unique<Tracked>();
-      made->given = value_or_throw(track::read_track_case(folder, range));
-      made->sequence =
-          value_or_throw(track::run_track(made->given, range, {.out = out, .resume = resume}, [&](int done) {
+      made->the_case = value_or_throw(track::read_track_case(folder, range));
+      made->sequence = value_or_throw(
+          track::run_track(made->the_case, range, {.out = out, .resume = resume}, [&](int done) {
             hooks.on_view();
             if (progress.is_none()) return;
             const py::gil_scoped_acquire acquire;
             progress(double(done) / range.count());
           }));
-      if (out) value_or_throw(track::write_track(made->sequence, made->given, *out));
+      if (out) value_or_throw(track::write_track(made->sequence, made->the_case, *out));
       if (made->sequence.failure) throw BadInput(*made->sequence.failure);
       return made;
     });
@@ -57,9 +57,9 @@ std::unique_ptr<Tracked> tracked_images(
     double diameter_mm, std::optional<double> frame_rate_hz, const std::optional<std::filesystem::path>& out,
     const py::object& progress) {
   auto made = std::make_unique<Tracked>();
-  track::TrackCase& given = made->given;
+  track::TrackCase& the_case = made->the_case;
   for (const auto& [name, images, camera, map] : views) {
-    track::TrackView& view = given.views.emplace_back();
+    track::TrackView& view = the_case.views.emplace_back();
     view.images.name = name;
     view.images.image = name;
     view.image_size = camera.image_size;
@@ -71,27 +71,27 @@ std::unique_ptr<Tracked> tracked_images(
   }
   const auto size = py::ssize_t(calibration::view_parameters * views.size());
   if (camera_covariance)
-    given.camera_covariance = checked_covariance(
+    the_case.camera_covariance = checked_covariance(
         matrix_of(*camera_covariance, size, size, "camera_covariance"), "camera_covariance");
-  given.diameter_mm = checked(diameter_mm, {0.1, 30}, "diameter_mm");
-  given.frame_rate_hz = checked(frame_rate_hz, {0.01, 1e5}, "frame_rate_hz");
-  given.markers = markers;
-  for (const auto& [marker, view, u, v] : picks) given.picks.push_back({marker, view, {u, v}});
+  the_case.diameter_mm = checked(diameter_mm, {0.1, 30}, "diameter_mm");
+  the_case.frame_rate_hz = checked(frame_rate_hz, {0.01, 1e5}, "frame_rate_hz");
+  the_case.markers = markers;
+  for (const auto& [marker, view, u, v] : picks) the_case.picks.push_back({marker, view, {u, v}});
   for (const auto& [name, of, geometry] : bodies)
-    given.bodies.push_back(
+    the_case.bodies.push_back(
         {name, of, geometry ? rows_of<3>(*geometry, "bodies: " + name) : std::vector<Eigen::Vector3d>{}});
   const case_registration::FrameRange range{1, int(std::get<1>(views.front()).size()), 1};
   const RunHooks hooks = run_hooks(py::none());
   value_or_raise(without_gil([&] {
     return guarded([&] {
       if (out) track::forget_track(*out);
-      made->sequence = value_or_throw(track::run_track(given, range, {.out = out}, [&](int done) {
+      made->sequence = value_or_throw(track::run_track(the_case, range, {.out = out}, [&](int done) {
         hooks.on_view();
         if (progress.is_none()) return;
         const py::gil_scoped_acquire acquire;
         progress(double(done) / range.count());
       }));
-      if (out) value_or_throw(track::write_track(made->sequence, given, *out));
+      if (out) value_or_throw(track::write_track(made->sequence, the_case, *out));
       if (made->sequence.failure) throw BadInput(*made->sequence.failure);
     });
   }));
@@ -101,7 +101,8 @@ std::unique_ptr<Tracked> tracked_images(
 /// (n, markers, ...) of the places, NaN where a marker is lost.
 template <class Write>
 py::array places_array(const Tracked& t, std::vector<py::ssize_t> rest, Write write) {
-  std::vector<py::ssize_t> shape{py::ssize_t(t.sequence.frames.size()), py::ssize_t(t.given.markers.size())};
+  std::vector<py::ssize_t> shape{py::ssize_t(t.sequence.frames.size()),
+                                 py::ssize_t(t.the_case.markers.size())};
   py::ssize_t each = 1;
   for (const py::ssize_t size : rest) shape.push_back(size), each *= size;
   py::array_t<double> array(shape);
@@ -120,7 +121,7 @@ template <class Value>
 py::dict bodies_dict(const Tracked& t, std::vector<track::TrackedBody> track::BodySequence::*frames, int size,
                      Value value) {
   py::dict dict;
-  for (std::size_t b = 0; b < t.given.bodies.size(); ++b) {
+  for (std::size_t b = 0; b < t.the_case.bodies.size(); ++b) {
     const auto& of = t.sequence.bodies[b].*frames;
     py::array_t<double> array({py::ssize_t(of.size()), py::ssize_t(size), py::ssize_t(size)});
     double* at = array.mutable_data();
@@ -133,7 +134,7 @@ py::dict bodies_dict(const Tracked& t, std::vector<track::TrackedBody> track::Bo
         block.setConstant(unplaced);
       at += size * size;
     }
-    dict[py::str(t.given.bodies[b].name)] = read_only(array);
+    dict[py::str(t.the_case.bodies[b].name)] = read_only(array);
   }
   return dict;
 }
@@ -150,7 +151,7 @@ void add_track(py::module_& module) {
       .def_property_readonly(
           "frames", [](const Tracked& t) { return t.sequence.frames; }, "Number of each frame.")
       .def_property_readonly(
-          "markers", [](const Tracked& t) { return t.given.markers; }, "Names, in the arrays' order.")
+          "markers", [](const Tracked& t) { return t.the_case.markers; }, "Names, in the arrays' order.")
       .def_property_readonly(
           "places",
           [](const Tracked& t) {
@@ -197,17 +198,17 @@ void add_track(py::module_& module) {
           "{name: (n, 6, 6)}.")
       .def_property_readonly("warnings", [](const Tracked& t) { return warning_list(t.sequence.warnings); })
       .def(
-          "to_dict", [](const Tracked& t) { return python_from(track::to_json(t.sequence, t.given)); },
+          "to_dict", [](const Tracked& t) { return python_from(track::to_json(t.sequence, t.the_case)); },
           "The content of track.json.")
       .def(
           "write",
           [](const Tracked& t, const std::filesystem::path& folder) {
-            value_or_raise(without_gil([&] { return track::write_track(t.sequence, t.given, folder); }));
+            value_or_raise(without_gil([&] { return track::write_track(t.sequence, t.the_case, folder); }));
           },
           py::arg("folder"), "All files of `helicarm track`. Raises InputError: cannot_write.")
       .def("__repr__", [](const Tracked& t) {
         return fmt::format("<Track: {} frames, {} markers, {} bodies>", t.sequence.frames.size(),
-                           t.given.markers.size(), t.given.bodies.size());
+                           t.the_case.markers.size(), t.the_case.bodies.size());
       });
   module.def("_track_images", &tracked_images, py::arg("views"), py::arg("camera_covariance"),
              py::arg("markers"), py::arg("picks"), py::arg("bodies"), py::kw_only(), py::arg("diameter_mm"),

@@ -154,28 +154,29 @@ ViewPoints view_points(const std::string& name, const Doubles& xyz_mm, const Dou
 
 using GivenMap = std::variant<std::monostate, rectification::Rectification, rectification::DistortionMap>;
 
-Expected<rectification::Rectification> rectification_of(pipeline::DetectedView& view, const GivenMap& given) {
-  if (const auto* whole = std::get_if<rectification::Rectification>(&given)) {
+Expected<rectification::Rectification> rectification_of(pipeline::DetectedView& view,
+                                                        const GivenMap& source) {
+  if (const auto* whole = std::get_if<rectification::Rectification>(&source)) {
     detection::dots_of(view.dots, *view.xray_image, whole->metal);
     return *whole;
   }
-  const auto* map = std::get_if<rectification::DistortionMap>(&given);
+  const auto* map = std::get_if<rectification::DistortionMap>(&source);
   return rectification::with_map(*view.xray_image, view.dots,
                                  map ? *map : rectification::flat_panel_map(*view.xray_image), std::nullopt);
 }
 
 /// The stages of a run for one image.
 pipeline::OrRefusal<std::vector<pipeline::LabelledView>> labelled_views(
-    const std::shared_ptr<xray::XrayImage>& image, const GivenMap& map, const pipeline::Case& given,
+    const std::shared_ptr<xray::XrayImage>& image, const GivenMap& map, const pipeline::Case& the_case,
     const pipeline::RunOptions& options) {
-  return pipeline::detect_in_views({{{image->name}, image}}, given, options)
+  return pipeline::detect_in_views({{{image->name}, image}}, the_case, options)
       .and_then([&](auto detected) -> pipeline::OrRefusal<std::vector<pipeline::LabelledView>> {
         auto rectification = rectification_of(detected.front(), map);
         if (!rectification) {
           rectification.error().view = image->name;
           return tl::unexpected(pipeline::Refusal{rectification.error(), pipeline::Stage::rectify, {}});
         }
-        return pipeline::label_views({{std::move(detected.front()), *std::move(rectification)}}, given,
+        return pipeline::label_views({{std::move(detected.front()), *std::move(rectification)}}, the_case,
                                      options);
       });
 }
@@ -184,10 +185,10 @@ ViewPoints labelled(const std::shared_ptr<xray::XrayImage>& image, const phantom
                     const GivenMap& map, std::optional<bool> mirrored, const std::string& method) {
   pipeline::RunOptions options;
   options.method = method_of(method);
-  pipeline::Case given;
-  given.calibrator = calibrator;
-  given.views.emplace_back().mirrored = mirrored;
-  const auto views = without_gil([&] { return labelled_views(image, map, given, options); });
+  pipeline::Case the_case;
+  the_case.calibrator = calibrator;
+  the_case.views.emplace_back().mirrored = mirrored;
+  const auto views = without_gil([&] { return labelled_views(image, map, the_case, options); });
   if (!views) raise(views.error().failure);
   const pipeline::LabelledView& view = views->front();
   const bool explained = view.fiducials.mirrored && image->acquisition.flip_hint;

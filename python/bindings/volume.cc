@@ -24,9 +24,9 @@ using VoxelArray = py::array_t<float, py::array::f_style | py::array::forcecast>
 constexpr std::array<std::string_view, 2> value_words{"hu", "raw"};
 
 /// 3 x 4 or 4 x 4, to L, P, S.
-Eigen::Affine3d affine_from(const Doubles& given, const std::string& frame) {
-  const py::ssize_t rows = given.ndim() == 2 && given.shape(0) == 3 ? 3 : 4;
-  const Eigen::MatrixXd matrix = matrix_of(given, rows, 4, "affine");
+Eigen::Affine3d affine_from(const Doubles& stated, const std::string& frame) {
+  const py::ssize_t rows = stated.ndim() == 2 && stated.shape(0) == 3 ? 3 : 4;
+  const Eigen::MatrixXd matrix = matrix_of(stated, rows, 4, "affine");
   if (rows == 4 && matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
     raise({Reason::bad_value, "affine: the last row is not 0 0 0 1", {}, {}});
   const Eigen::Vector3d signs =
@@ -41,15 +41,15 @@ std::shared_ptr<Volume> volume_from(const py::array& array, const Doubles& affin
     raise({Reason::bad_size, fmt::format("array: shape {} is not (i, j, k)", shape_of(array)), {}, {}});
   if (std::string_view("biuf").find(array.dtype().kind()) == std::string_view::npos)
     raise({Reason::bad_value, "array: its elements are not real numbers", {}, {}});
-  auto made = std::make_shared<Volume>();
-  for (int axis = 0; axis < 3; ++axis) made->size[axis] = int(array.shape(axis));
-  const std::size_t count = value_or_raise(volume::voxel_count(made->size.cast<double>(), "array"));
-  made->patient_from_voxel = affine_from(affine, frame);
+  auto loaded = std::make_shared<Volume>();
+  for (int axis = 0; axis < 3; ++axis) loaded->size[axis] = int(array.shape(axis));
+  const std::size_t count = value_or_raise(volume::voxel_count(loaded->size.cast<double>(), "array"));
+  loaded->patient_from_voxel = affine_from(affine, frame);
   const VoxelArray voxels = VoxelArray::ensure(array);
   if (!voxels) raise({Reason::bad_value, "array: its elements are not real numbers", {}, {}});
-  made->voxels.assign(voxels.data(), voxels.data() + count);
-  value_or_raise(volume::check_read(*made, "Volume"));
-  return made;
+  loaded->voxels.assign(voxels.data(), voxels.data() + count);
+  value_or_raise(volume::check_read(*loaded, "Volume"));
+  return loaded;
 }
 
 py::array array_of(const py::object& self) {
@@ -116,9 +116,9 @@ unsupported (another frame). as_volume takes objects of other packages, read_vol
                                   warning_list(held.warnings));
           },
           [](const py::tuple& state) {
-            auto made = volume_from(state[0].cast<py::array>(), state[1].cast<Doubles>(), "LPS");
-            made->warnings = warnings_from(state[2].cast<py::list>());
-            return made;
+            auto loaded = volume_from(state[0].cast<py::array>(), state[1].cast<Doubles>(), "LPS");
+            loaded->warnings = warnings_from(state[2].cast<py::list>());
+            return loaded;
           }))
       .def("__repr__", [](const Volume& v) {
         return fmt::format("<Volume: {} x {} x {} voxels>", v.size.x(), v.size.y(), v.size.z());

@@ -140,6 +140,6 @@ def test_register_refuses_an_absent_history_and_run_case_begins_it(both, tmp_pat
     case, _ = both
     with pytest.raises(helicarm.InputError) as refused:
         helicarm.register(case, history=tmp_path / "absent.json")
-    assert refused.value.reason == "missing_file"
+    assert refused.value.code == "missing_file"
     helicarm.run_case(case, history=tmp_path / "new.json")
     assert (tmp_path / "new.json").exists()

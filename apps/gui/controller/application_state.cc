@@ -54,12 +54,12 @@ std::optional<WantedPick> missing_pick(const ApplicationState& state, const std:
 
 }  // namespace
 
-WantedPick wanted_end(const operation::PlannedTunnel& tunnel, const std::string& end) {
+WantedPick wanted_end(const operation::OperationTunnel& tunnel, const std::string& end) {
   return {end, "", tunnel.bone.empty() ? std::nullopt : std::optional(tunnel.bone), {}};
 }
 
 std::optional<WantedPick> next_pick(const ApplicationState& state) {
-  for (const operation::PlannedTunnel& tunnel : state.tunnels)
+  for (const operation::OperationTunnel& tunnel : state.tunnels)
     for (const std::string& point : {tunnel.start, tunnel.end})
       if (const auto missing = missing_pick(state, point, wanted_end(tunnel, point).bone)) return missing;
   return std::nullopt;
@@ -71,7 +71,7 @@ std::optional<WantedPick> next_landmark(const ApplicationState& state) {
   return std::nullopt;
 }
 
-bool is_unpicked(const ApplicationState& state, const operation::PlannedTunnel& tunnel) {
+bool is_unpicked(const ApplicationState& state, const operation::OperationTunnel& tunnel) {
   return std::ranges::none_of(state.picks, [&](const pipeline::Pick& pick) {
     return pick.name == tunnel.start || pick.name == tunnel.end;
   });
@@ -86,7 +86,7 @@ std::optional<pipeline::BoneLabel> bone_of(const ApplicationState& state, const 
 
 void complete_landmarks(ApplicationState& state) {
   const auto is_end = [&](const std::string& point) {
-    return std::ranges::any_of(state.tunnels, [&](const operation::PlannedTunnel& tunnel) {
+    return std::ranges::any_of(state.tunnels, [&](const operation::OperationTunnel& tunnel) {
       return tunnel.start == point || tunnel.end == point;
     });
   };

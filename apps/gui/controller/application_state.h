@@ -77,7 +77,7 @@ struct ApplicationState {
   std::vector<std::string> check_points;     ///< on the bones, for the pointer
   std::map<std::string, double> touched_mm;  ///< deviation at the last touch
 
-  std::vector<operation::PlannedTunnel> tunnels;
+  std::vector<operation::OperationTunnel> tunnels;
   std::vector<std::string> landmarks;                   ///< other points to pick; of files only
   std::map<std::string, pipeline::BoneLabel> bones_of;  ///< of landmarks that are not picked yet
   std::vector<pipeline::Pick> picks;
@@ -139,12 +139,12 @@ struct WantedPick {
   std::optional<Failure> failed = {};  ///< why an earlier click in this view is no pick
 };
 /// An end of a tunnel, in any view.
-WantedPick wanted_end(const operation::PlannedTunnel& tunnel, const std::string& end);
+WantedPick wanted_end(const operation::OperationTunnel& tunnel, const std::string& end);
 std::optional<WantedPick> next_pick(const ApplicationState& state);
 /// The next landmark and view to pick.
 std::optional<WantedPick> next_landmark(const ApplicationState& state);
 /// Whether no end of the tunnel is picked.
-bool is_unpicked(const ApplicationState& state, const operation::PlannedTunnel& tunnel);
+bool is_unpicked(const ApplicationState& state, const operation::OperationTunnel& tunnel);
 /// What a point lies on; nothing if it is not stated.
 std::optional<pipeline::BoneLabel> bone_of(const ApplicationState& state, const std::string& point);
 /// Adds the points that are picked and are no tunnel's end to the landmarks.

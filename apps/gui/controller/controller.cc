@@ -184,7 +184,7 @@ void Controller::measure_again() {
 }
 
 void Controller::measure() {
-  if (!equipment_ || (!equipment_->given && !equipment_->operation)) return;
+  if (!equipment_ || (!equipment_->the_case && !equipment_->operation)) return;
   measures_again_ = state_.busy.has_value();
   begin(Phase::calibrate, "measuring",
         [this, equipment = equipment_, picks = state_.picks, options = options_] {

@@ -144,7 +144,7 @@ class Controller : public QObject {
   bool has_all_images() const;
   Change measured(Equipment& equipment, const std::vector<pipeline::Pick>& picks);
   static Change with_plan(const operation::OperationPlan& plan, const std::vector<pipeline::Pick>& offered);
-  Change with_case(pipeline::Case given, Equipment& equipment, std::optional<Picks> unsaved = {});
+  Change with_case(pipeline::Case the_case, Equipment& equipment, std::optional<Picks> unsaved = {});
   void keep_unsaved_picks();
   void watch_files_of(const std::filesystem::path& case_folder);
   void watch_no_files();

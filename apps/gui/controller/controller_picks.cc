@@ -35,8 +35,8 @@ void Controller::keep_unsaved_picks() {
 
 void Controller::save_picks() {
   if (!state_.case_folder || !takes_picks()) return;
-  std::vector<pipeline::TunnelPlan> tunnels;
-  for (const operation::PlannedTunnel& tunnel : state_.tunnels)
+  std::vector<pipeline::CaseTunnel> tunnels;
+  for (const operation::OperationTunnel& tunnel : state_.tunnels)
     tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
   watch_no_files();  // this change is its own
   const auto saved = gui::save_picks(*state_.case_folder, state_.picks, tunnels);
@@ -54,7 +54,7 @@ void Controller::add_landmark(const std::string& name, std::optional<pipeline::B
   const bool is_taken =
       std::ranges::find(state_.landmarks, name) != state_.landmarks.end() ||
       std::ranges::any_of(state_.tunnels,
-                          [&](const operation::PlannedTunnel& tunnel) {
+                          [&](const operation::OperationTunnel& tunnel) {
                             return tunnel.start == name || tunnel.end == name;
                           }) ||
       std::ranges::find(state_.calibrator.targets, name, &phantom::CalibratorTarget::name) !=

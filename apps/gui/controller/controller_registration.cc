@@ -11,9 +11,9 @@ Expected<CaseRegistration> register_models(Equipment& equipment, const std::vect
                                            const std::optional<NudgedModel>& from,
                                            const std::function<void(const std::string& step)>& tell) {
   return guarded([&] {
-    pipeline::Case given = *equipment.given;
-    given.picks = picks;
-    if (from) given.models.at(from->model).world_from_model = from->world_from_model;
+    pipeline::Case the_case = *equipment.the_case;
+    the_case.picks = picks;
+    if (from) the_case.models.at(from->model).world_from_model = from->world_from_model;
     const case_registration::RegisterOptions& options = equipment.options;
     equipment.registered_by = options;
     const case_registration::Progress progress{
@@ -22,8 +22,8 @@ Expected<CaseRegistration> register_models(Equipment& equipment, const std::vect
           if (equipment.stopped) throw BadInput(Reason::interrupted, "cancelled");
         }};
     return value_or_throw(case_registration::register_loaded(
-        given, case_registration::views_of_calibration(given, *equipment.measurement->calibration), options,
-        progress));
+        the_case, case_registration::views_of_calibration(the_case, *equipment.measurement->calibration),
+        options, progress));
   });
 }
 

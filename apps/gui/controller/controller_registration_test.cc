@@ -191,7 +191,7 @@ TEST_F(ControllerRegistration, CancelEndsIt) {
 
 TEST_F(ControllerRegistration, CancelDuringTheSearchEndsIt) {
   Equipment equipment;
-  equipment.given = pipeline::read_case(folder_->path()).value();
+  equipment.the_case = pipeline::read_case(folder_->path()).value();
   ASSERT_TRUE(measure(equipment, {}));
   std::vector<std::string> told;
   const auto done = gui::register_models(equipment, {}, {}, [&](const std::string& step) {

@@ -185,7 +185,7 @@ LiveState Controller::live() const {
     if (!holds && holds.error().reason == Reason::plan_stale) now.stale = holds.error();
   }
   if (!live_tool_ || state_.tunnels.empty()) return now;
-  const auto tunnel = std::ranges::find(state_.tunnels, followed_, &operation::PlannedTunnel::name);
+  const auto tunnel = std::ranges::find(state_.tunnels, followed_, &operation::OperationTunnel::name);
   now.bone = (tunnel == state_.tunnels.end() ? state_.tunnels.front() : *tunnel).bone;
   now.tool = live_tool_->overlay(board, now.bone);
   if (tunnel == state_.tunnels.end()) return now;

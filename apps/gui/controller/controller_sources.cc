@@ -18,23 +18,24 @@ constexpr double bone_step_mm = 5;
 
 /// Names and bones of a case's tunnels; the two of an ACL reconstruction if it has the knee's calibrator and
 /// neither tunnels nor models, nor picks of other points only.
-std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given,
-                                                 const std::vector<pipeline::Pick>& unsaved) {
-  std::vector<operation::PlannedTunnel> tunnels;
-  for (const pipeline::TunnelPlan& tunnel : given.tunnels) {
-    const auto pick = std::ranges::find(given.picks, tunnel.start, &pipeline::Pick::name);
-    const auto bone = pick == given.picks.end() ? std::nullopt : pick->moves_with;
+std::vector<operation::OperationTunnel> tunnels_of(const pipeline::Case& the_case,
+                                                   const std::vector<pipeline::Pick>& unsaved) {
+  std::vector<operation::OperationTunnel> tunnels;
+  for (const pipeline::CaseTunnel& tunnel : the_case.tunnels) {
+    const auto pick = std::ranges::find(the_case.picks, tunnel.start, &pipeline::Pick::name);
+    const auto bone = pick == the_case.picks.end() ? std::nullopt : pick->moves_with;
     tunnels.push_back({tunnel.name, bone.value_or(guidance::Bone()), tunnel.start, tunnel.end});
   }
   const bool is_of_the_knee =
-      given.bones == guidance::knee_bones() && given.calibrator.name == phantom::udcsc().name;
-  if (!given.picks.empty() || !tunnels.empty() || !given.models.empty() || !is_of_the_knee) return tunnels;
+      the_case.bones == guidance::knee_bones() && the_case.calibrator.name == phantom::udcsc().name;
+  if (!the_case.picks.empty() || !tunnels.empty() || !the_case.models.empty() || !is_of_the_knee)
+    return tunnels;
   tunnels = {{"femur", "femur", "FS", "FE", operation::TunnelEnd::end}, {"tibia", "tibia", "TS", "TE"}};
   ApplicationState picked;
   picked.picks = unsaved;
   const bool has_none =
       std::ranges::all_of(tunnels, [&](const auto& tunnel) { return is_unpicked(picked, tunnel); });
-  return unsaved.empty() || !has_none ? tunnels : std::vector<operation::PlannedTunnel>{};
+  return unsaved.empty() || !has_none ? tunnels : std::vector<operation::OperationTunnel>{};
 }
 
 /// Every file of the folder that a JSON value names.
@@ -187,10 +188,10 @@ Controller::Change Controller::with_plan(const operation::OperationPlan& plan,
 void Controller::open_case(const fs::path& folder, bool keeps_picks) {
   open(Source::files, folder, "reading " + folder.filename().string(),
        [=, this](Equipment& equipment) -> Change {
-         pipeline::Case given = value_or_throw(pipeline::read_case(folder));
-         if (!keeps_picks) return with_case(std::move(given), equipment);
-         const auto unsaved = unsaved_picks(folder, given);
-         return [this, change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)),
+         pipeline::Case the_case = value_or_throw(pipeline::read_case(folder));
+         if (!keeps_picks) return with_case(std::move(the_case), equipment);
+         const auto unsaved = unsaved_picks(folder, the_case);
+         return [this, change = with_case(std::move(the_case), equipment, unsaved.value_or(std::nullopt)),
                  folder, unsaved](ApplicationState& state) {
            change(state);
            if (unsaved)
@@ -244,22 +245,22 @@ QString Controller::loss() const {
   return {};
 }
 
-Controller::Change Controller::with_case(pipeline::Case given, Equipment& equipment,
+Controller::Change Controller::with_case(pipeline::Case the_case, Equipment& equipment,
                                          std::optional<Picks> unsaved) {
-  equipment.given = given;
-  const std::vector<ViewFile> files = files_of(given);
-  const Change found = measured(equipment, unsaved.value_or(given.picks));
+  equipment.the_case = the_case;
+  const std::vector<ViewFile> files = files_of(the_case);
+  const Change found = measured(equipment, unsaved.value_or(the_case.picks));
   std::vector<std::string> models;
-  for (const pipeline::CaseModel& model : given.models) models.push_back(model.name);
-  return [this, given = std::move(given), unsaved = std::move(unsaved), files, found,
+  for (const pipeline::CaseModel& model : the_case.models) models.push_back(model.name);
+  return [this, the_case = std::move(the_case), unsaved = std::move(unsaved), files, found,
           models = std::move(models)](ApplicationState& state) {
-    for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
+    for (const pipeline::CaseView& view : the_case.views) state.views.push_back(view.name);
     state.files = files;
-    state.calibrator = given.calibrator;
-    state.tunnels = tunnels_of(given, unsaved.value_or(given.picks));
-    state.picks = unsaved.value_or(given.picks);
+    state.calibrator = the_case.calibrator;
+    state.tunnels = tunnels_of(the_case, unsaved.value_or(the_case.picks));
+    state.picks = unsaved.value_or(the_case.picks);
     state.has_unsaved_picks = unsaved.has_value();
-    if (unsaved) earlier_picks_.push_back(given.picks);
+    if (unsaved) earlier_picks_.push_back(the_case.picks);
     complete_landmarks(state);
     found(state);
     state.has_models = !models.empty();

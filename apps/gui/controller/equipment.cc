@@ -70,25 +70,26 @@ Expected<Images> shoot_and_take(Equipment& equipment, const std::string& view) {
 namespace {
 
 /// The case with other picks; without the tunnels that have lost an end, and their tool lines.
-pipeline::Case with_picks(pipeline::Case given, const std::vector<pipeline::Pick>& picks) {
-  given.picks = picks;
+pipeline::Case with_picks(pipeline::Case the_case, const std::vector<pipeline::Pick>& picks) {
+  the_case.picks = picks;
   const auto is_picked = [&](const std::string& point) {
     return std::ranges::find(picks, point, &pipeline::Pick::name) != picks.end();
   };
-  std::erase_if(given.tunnels, [&](const pipeline::TunnelPlan& tunnel) {
+  std::erase_if(the_case.tunnels, [&](const pipeline::CaseTunnel& tunnel) {
     return !is_picked(tunnel.start) || !is_picked(tunnel.end);
   });
-  std::erase_if(given.tool_lines, [&](const auto& line) {
-    return std::ranges::find(given.tunnels, line.tunnel, &pipeline::TunnelPlan::name) == given.tunnels.end();
+  std::erase_if(the_case.tool_lines, [&](const auto& line) {
+    return std::ranges::find(the_case.tunnels, line.tunnel, &pipeline::CaseTunnel::name) ==
+           the_case.tunnels.end();
   });
-  return given;
+  return the_case;
 }
 
 }  // namespace
 
 Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipeline::Pick>& picks) {
-  if (equipment.given) {
-    const pipeline::Case picked = with_picks(*equipment.given, picks);
+  if (equipment.the_case) {
+    const pipeline::Case picked = with_picks(*equipment.the_case, picks);
     auto measured = pipeline::measure_again(equipment.measurement, picked, equipment.options.run);
     if (!measured) return tl::unexpected<Failure>(measured.error());
     equipment.measurement = *std::move(measured);
@@ -140,9 +141,9 @@ Expected<LooseImages> read_loose_images(const std::vector<std::filesystem::path>
   return loose;
 }
 
-std::vector<ViewFile> files_of(const pipeline::Case& given) {
+std::vector<ViewFile> files_of(const pipeline::Case& the_case) {
   std::vector<ViewFile> files;
-  for (const pipeline::CaseView& view : given.views)
+  for (const pipeline::CaseView& view : the_case.views)
     files.push_back({view.image, xray::count_frames(view.image).value_or(1), view.frame.value_or(1)});
   return files;
 }

@@ -24,7 +24,7 @@ struct Equipment {
   std::unique_ptr<operation::Connections> devices;
   std::unique_ptr<operation::Operation> operation;
   operation::TrackerPlan tracker;  ///< of the operation; any thread may read it
-  std::optional<pipeline::Case> given;
+  std::optional<pipeline::Case> the_case;
   std::optional<pipeline::Result> measurement;  ///< of `given`
   case_registration::RegisterOptions options;
   std::optional<case_registration::RegisterOptions> registered_by;  ///< of the registered models
@@ -69,6 +69,6 @@ struct LooseImages {
 Expected<LooseImages> read_loose_images(const std::vector<std::filesystem::path>& files);
 
 /// The files of a case's views; an unreadable one counts as one frame.
-std::vector<ViewFile> files_of(const pipeline::Case& given);
+std::vector<ViewFile> files_of(const pipeline::Case& the_case);
 
 }  // namespace helicarm::gui

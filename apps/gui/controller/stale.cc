@@ -174,7 +174,7 @@ QStringList lacks_of_export(const ApplicationState& state) {
   if (const QString all = stale(state, Phase::calibrate); !all.isEmpty())
     return {stale_tr("%1; nothing is exported until it is measured again (F5)").arg(all)};
   std::vector<std::string> points;
-  for (const operation::PlannedTunnel& tunnel : state.tunnels)
+  for (const operation::OperationTunnel& tunnel : state.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end}) points.push_back(end);
   points.insert(points.end(), state.landmarks.begin(), state.landmarks.end());
   for (const std::string& point : points)

@@ -15,12 +15,12 @@ fs::path unsaved_file(const fs::path& case_folder) { return case_folder / "unsav
 }  // namespace
 
 Expected<std::optional<std::vector<pipeline::Pick>>> unsaved_picks(const fs::path& case_folder,
-                                                                   const pipeline::Case& given) {
+                                                                   const pipeline::Case& the_case) {
   const fs::path file = unsaved_file(case_folder);
   if (!fs::exists(file)) return std::nullopt;
   return read_json(file)
       .and_then([&](const Json& json) {
-        return pipeline::picks_from(json, file.filename().string(), given.views, given.bones);
+        return pipeline::picks_from(json, file.filename().string(), the_case.views, the_case.bones);
       })
       .map([](std::vector<pipeline::Pick> picks) { return std::optional(std::move(picks)); });
 }
@@ -32,7 +32,7 @@ Expected<void> keep_unsaved(const fs::path& case_folder, const std::vector<pipel
 }
 
 Expected<void> save_picks(const fs::path& case_folder, const std::vector<pipeline::Pick>& picks,
-                          const std::vector<pipeline::TunnelPlan>& tunnels) {
+                          const std::vector<pipeline::CaseTunnel>& tunnels) {
   const fs::path file = case_folder / "case.json";
   return read_json(file)
       .and_then(

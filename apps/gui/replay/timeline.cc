@@ -253,7 +253,7 @@ Expected<operation::ToolOverlay> overlay_of(const operation::LiveTool& tool, con
       return seen == state.tracker_from.end() ? std::nullopt : std::optional(seen->second);
     };
     if (plan.tunnels.empty()) throw BadInput(Reason::bad_value, "the plan has no tunnel");
-    const auto tunnel = std::ranges::find(plan.tunnels, state.tunnel, &operation::PlannedTunnel::name);
+    const auto tunnel = std::ranges::find(plan.tunnels, state.tunnel, &operation::OperationTunnel::name);
     guidance::Poses now;
     for (const auto& [bone, marker] : plan.tracker.markers)
       if (const auto seen = pose(marker)) now.tracker_from_bone.emplace(bone, *seen);

@@ -11,7 +11,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-ResultScene scene() { return scene_of(*simulated().result, simulated().given.calibrator); }
+ResultScene scene() { return scene_of(*simulated().result, simulated().the_case.calibrator); }
 
 void expect_inside(const SceneCamera& camera, double aspect, const Vector3d& place) {
   const auto seen = seen_at(camera, aspect, place);

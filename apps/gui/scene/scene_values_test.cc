@@ -39,7 +39,7 @@ double distance_from(const Segment& ray, const Vector3d& point) {
 }
 
 TEST(SceneValues, RaysPassThroughTheirPointsAndEndOnTheDetectors) {
-  const ResultScene scene = scene_of(*simulated().result, simulated().given.calibrator);
+  const ResultScene scene = scene_of(*simulated().result, simulated().the_case.calibrator);
   ASSERT_EQ(scene.views.size(), 2u);
   ASSERT_EQ(scene.points.size(), 4u);
   for (const PointShape& point : scene.points) {
@@ -55,7 +55,7 @@ TEST(SceneValues, RaysPassThroughTheirPointsAndEndOnTheDetectors) {
 }
 
 TEST(SceneValues, DetectorAgreesWithTheSimulatedOne) {
-  const ResultScene scene = scene_of(*simulated().result, simulated().given.calibrator);
+  const ResultScene scene = scene_of(*simulated().result, simulated().the_case.calibrator);
   for (std::size_t i = 0; i < 2; ++i) {
     const simulation::TrueView& true_view = simulated().truth.views[i].true_view;
     const ViewShape& view = scene.views[i];
@@ -67,7 +67,7 @@ TEST(SceneValues, DetectorAgreesWithTheSimulatedOne) {
 }
 
 TEST(SceneValues, TunnelsRunBetweenTheirPoints) {
-  const ResultScene scene = scene_of(*simulated().result, simulated().given.calibrator);
+  const ResultScene scene = scene_of(*simulated().result, simulated().the_case.calibrator);
   ASSERT_EQ(scene.tunnels.size(), 2u);
   EXPECT_EQ(scene.tunnels[0].axis.from, scene.points[0].error.centre);
   EXPECT_EQ(scene.tunnels[0].axis.to, scene.points[1].error.centre);

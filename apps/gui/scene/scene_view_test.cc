@@ -23,7 +23,7 @@ class ShownScene : public testing::Test {
     view_.resize(420, 420);
     view_.show();
     ASSERT_TRUE(QTest::qWaitForWindowExposed(&view_));
-    view_.show_result(simulated().result, simulated().given.calibrator);
+    view_.show_result(simulated().result, simulated().the_case.calibrator);
   }
 
   QImage acquired_view(const char* name) {
@@ -48,7 +48,7 @@ class ShownScene : public testing::Test {
         robot::inverse(robot::ur5(), live.calibrator_from_base->inverse() * calibrator_from_flange);
     live.joints =
         ways.empty() ? robot::Joints((robot::Joints() << 0, -1.2, 1.5, -1, 0.5, 0).finished()) : ways.front();
-    const guidance::Poses& poses = simulated().given.views[0].poses;
+    const guidance::Poses& poses = simulated().the_case.views[0].poses;
     for (const auto& [bone, pose] : poses.tracker_from_bone)
       live.calibrator_from_bone_marker.emplace(bone, *guidance::calibrator_from(bone, poses));
     for (int i = 10; i >= 0; --i) live.path.push_back(start - 12 * i * turn.col(2));
@@ -120,7 +120,7 @@ TEST_F(ShownScene, ToolRobotAndBonesMove) {
   EXPECT_GT(pixels_apart(acquired_view("tibia_moved"), turned), 100);
   view_.show_live({});
   view_.show_bones({});
-  view_.show_result(nullptr, simulated().given.calibrator);
+  view_.show_result(nullptr, simulated().the_case.calibrator);
   EXPECT_LT(colours_in(acquired_view("empty")), 150u);  // the triad's letters
 }
 
@@ -257,7 +257,7 @@ TEST(WithoutOpenGL, MessageIsShown) {
   ASSERT_TRUE(view.obstacle());
   EXPECT_FALSE(view.obstacle()->isEmpty());
   view.show();
-  view.show_result(simulated().result, simulated().given.calibrator);
+  view.show_result(simulated().result, simulated().the_case.calibrator);
   view.show_live({});
   view.set_preset(SceneView::Preset::ap);
   EXPECT_FALSE(view.grab().isNull());

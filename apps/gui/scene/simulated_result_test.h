@@ -15,7 +15,7 @@ namespace helicarm::gui {
 /// A simulated navigation case and its measurement, made once for all tests of a program.
 struct Simulated {
   simulation::SimulatedCase truth;
-  pipeline::Case given;
+  pipeline::Case the_case;
   std::shared_ptr<const pipeline::Result> result;
 };
 
@@ -29,8 +29,8 @@ inline const Simulated& simulated() {
     options.seed = 5;
     Simulated fresh{*simulation::simulate_case(options), {}, nullptr};
     if (!simulation::write_case(folder, fresh.truth)) std::abort();
-    fresh.given = *pipeline::read_case(folder);
-    fresh.result = std::make_shared<const pipeline::Result>(*pipeline::measure(fresh.given, {}));
+    fresh.the_case = *pipeline::read_case(folder);
+    fresh.result = std::make_shared<const pipeline::Result>(*pipeline::measure(fresh.the_case, {}));
     std::filesystem::remove_all(folder);
     return fresh;
   }();

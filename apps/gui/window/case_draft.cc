@@ -113,7 +113,7 @@ Expected<pipeline::NewCase> DraftChecker::make(const CaseDraft& draft,
     if (plate.plate_image) options.plate_images.emplace_back(images[i].view, *plate.plate_image);
   }
   return pipeline::new_case(std::move(images), options, draft.folder).map([&](pipeline::NewCase made) {
-    std::string& notes = made.given.notes;
+    std::string& notes = made.the_case.notes;
     for (const auto& [what, words] : {std::pair("C-arm", &draft.c_arm), {"detector", &draft.intensifier}})
       if (!words->empty()) notes += fmt::format("; {}: {}", what, *words);
     return made;

@@ -92,7 +92,7 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
 namespace {
 
 /// What an end is. Where the drill enters is known of an operation's plan only.
-QString kind_of(const ApplicationState& state, const operation::PlannedTunnel& tunnel,
+QString kind_of(const ApplicationState& state, const operation::OperationTunnel& tunnel,
                 const std::string& end) {
   const QString kind = end == tunnel.start ? PlanPage::tr("start") : PlanPage::tr("end");
   if (state.source == Source::files) return kind;
@@ -197,7 +197,7 @@ std::optional<WantedPick> PlanPage::target() const {
     const auto end = next_pick(state);
     return end ? end : next_landmark(state);
   }
-  for (const operation::PlannedTunnel& tunnel : state.tunnels)
+  for (const operation::OperationTunnel& tunnel : state.tunnels)
     if (tunnel.start == *chosen_ || tunnel.end == *chosen_) return wanted_end(tunnel, *chosen_);
   if (std::ranges::find(state.landmarks, *chosen_) != state.landmarks.end())
     return WantedPick{*chosen_, "", {}, {}};
@@ -206,7 +206,7 @@ std::optional<WantedPick> PlanPage::target() const {
 
 void PlanPage::show_state(const ApplicationState& state) {
   std::vector<PlannedPoint> points;
-  for (const operation::PlannedTunnel& tunnel : state.tunnels)
+  for (const operation::OperationTunnel& tunnel : state.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end}) {
       points.push_back({end, kind_of(state, tunnel, end)});
     }
@@ -312,7 +312,7 @@ QString PlanPage::next_words() const {
   if (wanted && wanted->failed)
     return tr("%1 is not picked in %2: %3. %4")
         .arg(text(wanted->point), text(wanted->view), text(wanted->failed->message), again);
-  for (const operation::PlannedTunnel& tunnel : state.tunnels)
+  for (const operation::OperationTunnel& tunnel : state.tunnels)
     if (wanted && (tunnel.start == wanted->point || tunnel.end == wanted->point))
       return tr("Click %1 in %2: the %3 of the %4's tunnel.")
           .arg(text(wanted->point), text(wanted->view), kind_of(state, tunnel, wanted->point),

@@ -293,7 +293,7 @@ TEST_F(WindowWithOwnImages, APresetGivesAViewItsImageOfThePlate) {
   EXPECT_EQ(distortion_of(0), "plate: IM2");
   EXPECT_EQ(distortion_of(1), "in the image");
   ASSERT_TRUE(dialog().checked().is_complete());
-  EXPECT_TRUE((*dialog().checked().made)->given.views[0].plate_image);
+  EXPECT_TRUE((*dialog().checked().made)->the_case.views[0].plate_image);
 }
 
 }  // namespace

@@ -226,18 +226,18 @@ class WindowStates : public Window, public testing::WithParamInterface<InputChan
   /// As `helicarm run` measures the folder, with the present picks and the tunnels of which both ends are
   /// picked.
   void expect_as_measured_afresh() {
-    pipeline::Case given = pipeline::read_case(folder_ / "case").value();
-    given.picks = state().picks;
+    pipeline::Case the_case = pipeline::read_case(folder_ / "case").value();
+    the_case.picks = state().picks;
     const auto lacks = [&](const std::string& end) {
-      return std::ranges::find(given.picks, end, &pipeline::Pick::name) == given.picks.end();
+      return std::ranges::find(the_case.picks, end, &pipeline::Pick::name) == the_case.picks.end();
     };
-    for (std::size_t i = given.tunnels.size(); i-- > 0;) {
-      const pipeline::TunnelPlan tunnel = given.tunnels[i];
+    for (std::size_t i = the_case.tunnels.size(); i-- > 0;) {
+      const pipeline::CaseTunnel tunnel = the_case.tunnels[i];
       if (!lacks(tunnel.start) && !lacks(tunnel.end)) continue;
-      given.tunnels.erase(given.tunnels.begin() + std::ptrdiff_t(i));
-      std::erase_if(given.tool_lines, [&](const auto& line) { return line.tunnel == tunnel.name; });
+      the_case.tunnels.erase(the_case.tunnels.begin() + std::ptrdiff_t(i));
+      std::erase_if(the_case.tool_lines, [&](const auto& line) { return line.tunnel == tunnel.name; });
     }
-    const auto measured = case_registration::measure_case(given, options_);
+    const auto measured = case_registration::measure_case(the_case, options_);
     ASSERT_TRUE(measured) << measured.error().message;
     const pipeline::Result& fresh = measured->result;
     QStringList wrong =

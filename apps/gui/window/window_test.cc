@@ -27,7 +27,7 @@ class WholeOperation : public Window {
     EXPECT_LE(state().measurements, 5);
   }
   void move_to_each_tunnel() {
-    for (const operation::PlannedTunnel& tunnel : state().tunnels) {
+    for (const operation::OperationTunnel& tunnel : state().tunnels) {
       find<QComboBox>("tunnel")->setCurrentText(QString::fromStdString(tunnel.name));
       const auto go = [&] {
         click("planWay");

@@ -46,7 +46,7 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
 
 void NavigatePage::show_state(const ApplicationState& state) {
   QStringList names;
-  for (const operation::PlannedTunnel& tunnel : state.tunnels) names << text(tunnel.name);
+  for (const operation::OperationTunnel& tunnel : state.tunnels) names << text(tunnel.name);
   QStringList shown;
   for (int i = 0; i < tunnel_->count(); ++i) shown << tunnel_->itemText(i);
   if (names != shown) {

@@ -90,17 +90,17 @@ VariationEstimates estimates_of(CArmModel model, CArmVariation CArmModel::*kind,
 
 CArmVariations c_arm_variations(const CArmModel& model) {
   if (model.entries.empty()) return {};
-  CArmVariations made{estimates_of(model, &CArmModel::focal, model.unknown.focal->of_view),
-                      estimates_of(model, &CArmModel::principal, model.unknown.principal->of_view),
-                      {}};
+  CArmVariations variations{estimates_of(model, &CArmModel::focal, model.unknown.focal->of_view),
+                            estimates_of(model, &CArmModel::principal, model.unknown.principal->of_view),
+                            {}};
   std::vector<HistoryEntry> placed;
   for (const HistoryEntry& entry : model.entries)
     if (entry.primary_deg) placed.push_back(entry);
-  if (placed.empty()) return made;
+  if (placed.empty()) return variations;
   const Eigen::VectorXd mean = predict_intrinsics(model, placed).mean_mm;
   const Eigen::Matrix3Xd by_axis = mean.reshaped(3, Eigen::Index(placed.size()));
-  made.at_positions = {by_axis.rowwise().minCoeff(), by_axis.rowwise().maxCoeff()};
-  return made;
+  variations.at_positions = {by_axis.rowwise().minCoeff(), by_axis.rowwise().maxCoeff()};
+  return variations;
 }
 
 std::string text_of(const VariationEstimate& estimate) {

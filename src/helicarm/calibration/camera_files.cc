@@ -63,15 +63,15 @@ SavedCalibration from_file(const std::filesystem::path& path) {
   return one_view(std::move(view));
 }
 
-Camera camera_in(const CameraFile& given, const SavedCalibration& file) {
-  const auto found = std::ranges::find(file.views, given.view, &CalibratedView::name);
+Camera camera_in(const CameraFile& camera_file, const SavedCalibration& file) {
+  const auto found = std::ranges::find(file.views, camera_file.view, &CalibratedView::name);
   if (found != file.views.end()) return {file, std::size_t(found - file.views.begin())};
   if (file.views.size() == 1) return {file, 0};
   std::vector<std::string> names;
   for (const CalibratedView& view : file.views) names.push_back(view.name);
   throw BadInput(Reason::bad_value,
-                 fmt::format("{}: has no view \"{}\"; its views are {}", given.path.filename().string(),
-                             given.view, fmt::join(names, ", ")));
+                 fmt::format("{}: has no view \"{}\"; its views are {}", camera_file.path.filename().string(),
+                             camera_file.view, fmt::join(names, ", ")));
 }
 
 /// Independent between files; joint among the views of one file. Empty if all have none.
@@ -102,15 +102,15 @@ Expected<SavedCalibration> calibration_of_cameras(std::span<const CameraFile> fi
     std::map<std::filesystem::path, SavedCalibration> read;
     std::vector<Camera> cameras;
     SavedCalibration joined;
-    for (const CameraFile& given : files) {
-      if (std::ranges::count(files, given.view, &CameraFile::view) > 1)
+    for (const CameraFile& camera_file : files) {
+      if (std::ranges::count(files, camera_file.view, &CameraFile::view) > 1)
         throw BadInput(Reason::name_clash,
-                       fmt::format("--calibration: two files for the view \"{}\"", given.view));
-      if (!read.count(given.path)) read.emplace(given.path, from_file(given.path));
-      cameras.push_back(camera_in(given, read.at(given.path)));
+                       fmt::format("--calibration: two files for the view \"{}\"", camera_file.view));
+      if (!read.count(camera_file.path)) read.emplace(camera_file.path, from_file(camera_file.path));
+      cameras.push_back(camera_in(camera_file, read.at(camera_file.path)));
       const auto& [file, index] = cameras.back();
       joined.views.push_back(file.views[index]);
-      joined.views.back().name = given.view;
+      joined.views.back().name = camera_file.view;
       joined.maps.push_back(file.maps[index]);
       joined.fiducials.push_back(index < file.fiducials.size() ? file.fiducials[index]
                                                                : std::vector<fiducials::Fiducial>{});

@@ -52,14 +52,14 @@ void reorder(ViewFiducials& view, std::vector<Fiducial> order) {
   std::map<std::size_t, Eigen::Index> row_of;  // place in the order to row of the map's covariance
   for (const Fiducial& fiducial : view.fiducials) {
     const auto found = std::ranges::find(order, fiducial.label, &Fiducial::label);
-    const auto place = std::size_t(found - order.begin());
+    const auto index = std::size_t(found - order.begin());
     *found = fiducial;
-    if (fiducial.status == FiducialStatus::used) row_of.emplace(place, Eigen::Index(row_of.size()));
+    if (fiducial.status == FiducialStatus::used) row_of.emplace(index, Eigen::Index(row_of.size()));
   }
   view.fiducials = std::move(order);
   if (view.map_covariance_px2.size() == 0) return;
   std::vector<Eigen::Index> rows;
-  for (const auto& [place, row] : row_of) rows.push_back(row);
+  for (const auto& [index, row] : row_of) rows.push_back(row);
   view.map_covariance_px2 = Eigen::MatrixXd(view.map_covariance_px2(rows, rows));
 }
 

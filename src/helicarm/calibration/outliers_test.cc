@@ -77,23 +77,23 @@ Case with_displaced(std::uint64_t seed, int displaced) {
 
 TEST(Outliers, AreThoseThatWholeFitsFind) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    const Case given = with_displaced(seed, int(seed) - 1);
-    const auto clean = refine_without_outliers(given.problems, given.common, probability, least_kept);
+    const Case the_case = with_displaced(seed, int(seed) - 1);
+    const auto clean = refine_without_outliers(the_case.problems, the_case.common, probability, least_kept);
     ASSERT_TRUE(clean) << clean.error().message;
     Removed removed;
     for (const auto& [view, observation] : clean->removed) removed.emplace(view, observation);
-    EXPECT_THAT(removed, testing::ContainerEq(removed_by_fits(given.problems, given.common))) << seed;
+    EXPECT_THAT(removed, testing::ContainerEq(removed_by_fits(the_case.problems, the_case.common))) << seed;
   }
 }
 
 TEST(Outliers, LeaveTheFitWithoutThem) {
-  const Case given = with_displaced(3, 3);
-  const auto clean = refine_without_outliers(given.problems, given.common, probability, least_kept);
+  const Case the_case = with_displaced(3, 3);
+  const auto clean = refine_without_outliers(the_case.problems, the_case.common, probability, least_kept);
   ASSERT_TRUE(clean && !clean->removed.empty());
   std::size_t left = 0;
   for (const ViewProblem& problem : clean->problems) left += problem.observations.size();
   EXPECT_EQ(left + clean->removed.size(), 48u);
-  EXPECT_NEAR(clean->fit.chi2, refine(clean->problems, given.common)->chi2, 1e-6);
+  EXPECT_NEAR(clean->fit.chi2, refine(clean->problems, the_case.common)->chi2, 1e-6);
 }
 
 }  // namespace

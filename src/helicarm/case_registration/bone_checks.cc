@@ -39,7 +39,7 @@ std::string places_of(const BoneCheck& check) {
   return text;
 }
 
-Failure finding(Reason reason, const std::string& model, const PlanTunnel& tunnel, const BoneCheck& check,
+Failure finding(Reason reason, const std::string& model, const MarkupLine& tunnel, const BoneCheck& check,
                 const std::string& end) {
   return {reason,
           fmt::format("{}: tunnel \"{}\" of {:g} mm: {}{}", model, tunnel.name, check.diameter_mm.value_or(0),
@@ -50,11 +50,12 @@ Failure finding(Reason reason, const std::string& model, const PlanTunnel& tunne
 
 }  // namespace
 
-std::vector<std::optional<BoneCheck>> bone_checks(const Plan& plan, const registration::BoneSurface* bone) {
+std::vector<std::optional<BoneCheck>> bone_checks(const MarkupPlan& plan,
+                                                  const registration::BoneSurface* bone) {
   std::vector<std::optional<BoneCheck>> checks(plan.tunnels.size());
   if (!bone) return checks;
   for (std::size_t i = 0; i < checks.size(); ++i) {
-    const PlanTunnel& tunnel = plan.tunnels[i];
+    const MarkupLine& tunnel = plan.tunnels[i];
     registration::BoneTunnel line{plan.points[tunnel.start].in_model, plan.points[tunnel.end].in_model,
                                   tunnel.diameter_mm};
     if (tunnel.enters_at_end) std::swap(line.start, line.end);
@@ -71,12 +72,12 @@ std::vector<std::optional<BoneCheck>> bone_checks(const Plan& plan, const regist
   return checks;
 }
 
-void judge_tunnels(const Plan& plan, std::vector<std::optional<BoneCheck>>& checks,
+void judge_tunnels(const MarkupPlan& plan, std::vector<std::optional<BoneCheck>>& checks,
                    registration::Registration& result) {
   for (std::size_t i = 0; i < checks.size(); ++i) {
     if (!checks[i] || !checks[i]->diameter_mm) continue;
     BoneCheck& check = *checks[i];
-    const PlanTunnel& tunnel = plan.tunnels[i];
+    const MarkupLine& tunnel = plan.tunnels[i];
     if (check.bridge_mm && result.is_determined()) {
       const Eigen::Vector3d outward = result.world_from_model.rotation * check.outward;
       const Eigen::Matrix3d covariance =

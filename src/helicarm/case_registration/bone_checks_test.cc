@@ -21,8 +21,8 @@ std::shared_ptr<const registration::BoneSurface> block() {
 }
 
 /// Tunnels of 6 mm along z at these x.
-Plan plan_at(const std::vector<double>& places) {
-  Plan plan;
+MarkupPlan plan_at(const std::vector<double>& places) {
+  MarkupPlan plan;
   for (const double x : places) {
     const std::string name = "T" + std::to_string(plan.tunnels.size());
     plan.tunnels.push_back({name, plan.points.size(), plan.points.size() + 1, 6.0, 2.0});
@@ -44,7 +44,7 @@ Registration registered(double sigma_mm) {
   return result;
 }
 
-Registration judged(const Plan& plan, double sigma_mm) {
+Registration judged(const MarkupPlan& plan, double sigma_mm) {
   Registration result = registered(sigma_mm);
   auto checks = bone_checks(plan, block().get());
   judge_tunnels(plan, checks, result);
@@ -95,7 +95,7 @@ TEST(JudgeTunnels, TwoTunnelsTooNearToEachOtherAreWarnedOf) {
 }
 
 TEST(BoneChecks, WithoutADiameterNothingIsJudged) {
-  Plan plan = plan_at({10});
+  MarkupPlan plan = plan_at({10});
   plan.tunnels[0].diameter_mm.reset();
   const auto checks = bone_checks(plan, block().get());
   ASSERT_TRUE(checks[0]);
@@ -106,7 +106,7 @@ TEST(BoneChecks, WithoutADiameterNothingIsJudged) {
 TEST(BoneChecks, WithoutAnOutlineThereAreNone) { EXPECT_FALSE(bone_checks(plan_at({4}), nullptr)[0]); }
 
 TEST(BoneChecks, ATunnelMayEnterAtItsEnd) {
-  Plan plan = plan_at({4});
+  MarkupPlan plan = plan_at({4});
   plan.points[1].in_model.z() = 10;
   plan.points[0].in_model.z() = -25;
   std::swap(plan.points[0].in_model, plan.points[1].in_model);

@@ -26,8 +26,8 @@ Eigen::Matrix3Xd by_shared_errors(const registration::Registration& pose, const 
 
 }  // namespace
 
-bool tracked(const pipeline::Case& given, const guidance::Bone& bone) {
-  return std::ranges::all_of(given.views, [&](const pipeline::CaseView& view) {
+bool tracked(const pipeline::Case& the_case, const guidance::Bone& bone) {
+  return std::ranges::all_of(the_case.views, [&](const pipeline::CaseView& view) {
     return guidance::calibrator_from(bone, view.poses).has_value();
   });
 }
@@ -39,18 +39,18 @@ Eigen::MatrixXd shared_covariance(const registration::Registration& registration
   return covariance;
 }
 
-void carry_plan(const Plan& plan, const pipeline::Case& given, RegisteredModel& model) {
+void carry_plan(const MarkupPlan& plan, const pipeline::Case& the_case, RegisteredModel& model) {
   model.points.clear();
   model.tunnels.clear();
   model.tunnel_ends.clear();
   const auto& pose = model.registration;
   const std::optional<guidance::Bone> anchor =
-      model.moves_with && tracked(given, *model.moves_with) ? model.moves_with : std::nullopt;
+      model.moves_with && tracked(the_case, *model.moves_with) ? model.moves_with : std::nullopt;
   std::vector<guidance::DatedView> dated;
-  for (std::size_t i = 0; i < given.views.size(); ++i)
-    dated.push_back({model.views[i], given.views[i].poses, 1});
+  for (std::size_t i = 0; i < the_case.views.size(); ++i)
+    dated.push_back({model.views[i], the_case.views[i].poses, 1});
   const RigidTransform anchor_from_world =
-      anchor ? guidance::calibrator_from(*anchor, given.views.front().poses)->inverse() : RigidTransform{};
+      anchor ? guidance::calibrator_from(*anchor, the_case.views.front().poses)->inverse() : RigidTransform{};
   for (const PlanPoint& point : plan.points) {
     const Vector3d in_world = pose.world_from_model * point.in_model;
     localization::LocatedPoint located;
@@ -61,13 +61,13 @@ void carry_plan(const Plan& plan, const pipeline::Case& given, RegisteredModel& 
                                    anchor_from_world.rotation.transpose();
     located.by_calibration = anchor_from_world.rotation * by_shared_errors(pose, in_world);
     model.points.push_back(
-        {point.name, guidance::guide(located, anchor, dated, given.poses_now, given.tracker)});
+        {point.name, guidance::guide(located, anchor, dated, the_case.poses_now, the_case.tracker)});
   }
   const Eigen::MatrixXd shared = shared_covariance(pose);
-  for (const PlanTunnel& tunnel : plan.tunnels) {
+  for (const MarkupLine& tunnel : plan.tunnels) {
     model.tunnels.push_back(
         value_or_throw(guidance::plan_tunnel(tunnel.name, model.points[tunnel.start].place,
-                                             model.points[tunnel.end].place, shared, given.tracker)));
+                                             model.points[tunnel.end].place, shared, the_case.tracker)));
     model.tunnel_ends.push_back({tunnel.start, tunnel.end});
   }
 }

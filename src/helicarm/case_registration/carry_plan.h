@@ -7,13 +7,13 @@
 namespace helicarm::case_registration {
 
 /// Poses at each acquisition by which a bone can be followed.
-bool tracked(const pipeline::Case& given, const guidance::Bone& bone);
+bool tracked(const pipeline::Case& the_case, const guidance::Bone& bone);
 
 /// Covariance that the planned points of a model share: of its pose and, last, of its size.
 Eigen::MatrixXd shared_covariance(const registration::Registration& registration);
 
 /// Sets the model's points and tunnels from its plan at the registered pose and the case's present poses.
 /// Throws BadInput (bad_tunnel).
-void carry_plan(const Plan& plan, const pipeline::Case& given, RegisteredModel& model);
+void carry_plan(const MarkupPlan& plan, const pipeline::Case& the_case, RegisteredModel& model);
 
 }  // namespace helicarm::case_registration

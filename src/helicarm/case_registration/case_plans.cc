@@ -24,34 +24,34 @@ bool is_landmark(const pipeline::CaseModel& model, const PlanPoint& point) {
   return same != landmarks.end() && (same->in_model - point.in_model).norm() < same_place_mm;
 }
 
-void check_points(const Plan& plan, const pipeline::Case& given, const pipeline::CaseModel& model) {
+void check_points(const MarkupPlan& plan, const pipeline::Case& the_case, const pipeline::CaseModel& model) {
   for (const PlanPoint& point : plan.points)
-    if (std::ranges::find(given.picks, point.name, &pipeline::Pick::name) != given.picks.end() &&
+    if (std::ranges::find(the_case.picks, point.name, &pipeline::Pick::name) != the_case.picks.end() &&
         !is_landmark(model, point))
       refuse_name(point.name, fmt::format("a point of \"{}\"'s plan", model.name),
                   "another point, of the picks");
 }
 
 /// Gives the lines that the case's tunnels name their names and sizes.
-void name_lines(const pipeline::Case& given, const pipeline::CaseModel& model, Plan& plan) {
-  const std::vector<PlanTunnel> lines = plan.tunnels;
+void name_lines(const pipeline::Case& the_case, const pipeline::CaseModel& model, MarkupPlan& plan) {
+  const std::vector<MarkupLine> lines = plan.tunnels;
   std::vector<std::string> taken;
-  for (const pipeline::ModelTunnelPlan& tunnel : given.model_tunnels) {
+  for (const pipeline::ModelLine& tunnel : the_case.model_tunnels) {
     if (tunnel.model != model.name) continue;
     const auto refuse = [&](const std::string& problem) {
       throw BadInput(Reason::bad_value,
                      fmt::format("tunnels: \"{}\": \"line\": \"{}\" {}", tunnel.name, tunnel.line, problem));
     };
-    const auto line = std::ranges::find(lines, tunnel.line, &PlanTunnel::name);
+    const auto line = std::ranges::find(lines, tunnel.line, &MarkupLine::name);
     if (line == lines.end()) {
       std::string names;
-      for (const PlanTunnel& other : lines) names += (names.empty() ? "" : ", ") + other.name;
+      for (const MarkupLine& other : lines) names += (names.empty() ? "" : ", ") + other.name;
       refuse(fmt::format("is not a line of {}, which has: {}", model.plan->filename().string(),
                          names.empty() ? "none" : names));
     }
     if (std::ranges::find(taken, tunnel.line) != taken.end()) refuse("is a line of two tunnels");
     taken.push_back(tunnel.line);
-    PlanTunnel& named = plan.tunnels[std::size_t(line - lines.begin())];
+    MarkupLine& named = plan.tunnels[std::size_t(line - lines.begin())];
     named.name = tunnel.name;
     named.diameter_mm = tunnel.diameter_mm;
     named.bridge_mm = tunnel.bridge_mm;
@@ -61,23 +61,23 @@ void name_lines(const pipeline::Case& given, const pipeline::CaseModel& model, P
 
 }  // namespace
 
-std::vector<std::optional<Plan>> read_plans(const pipeline::Case& given) {
+std::vector<std::optional<MarkupPlan>> read_plans(const pipeline::Case& the_case) {
   std::map<std::string, std::string> owners;
-  for (const pipeline::TunnelPlan& tunnel : given.tunnels)
+  for (const pipeline::CaseTunnel& tunnel : the_case.tunnels)
     owners.emplace(tunnel.name, "a tunnel of the case's picks");
-  std::vector<std::optional<Plan>> plans;
-  for (const pipeline::CaseModel& model : given.models) {
+  std::vector<std::optional<MarkupPlan>> plans;
+  for (const pipeline::CaseModel& model : the_case.models) {
     plans.emplace_back();
     if (!model.plan) continue;
     plans.back() = value_or_throw(read_plan(*model.plan));
-    name_lines(given, model, *plans.back());
-    for (const PlanTunnel& tunnel : plans.back()->tunnels) {
+    name_lines(the_case, model, *plans.back());
+    for (const MarkupLine& tunnel : plans.back()->tunnels) {
       const std::string owner =
           fmt::format("a tunnel of \"{}\"'s plan {}", model.name, model.plan->filename().string());
       if (const auto [other, is_new] = owners.emplace(tunnel.name, owner); !is_new)
         refuse_name(tunnel.name, other->second, owner);
     }
-    check_points(*plans.back(), given, model);
+    check_points(*plans.back(), the_case, model);
   }
   return plans;
 }

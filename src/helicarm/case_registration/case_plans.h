@@ -13,6 +13,6 @@ namespace helicarm::case_registration {
 /// diameters and bridges. Throws BadInput: as `read_plan`, bad_value for a tunnel of a line that the plan
 /// lacks or that another tunnel has, and name_clash for two tunnels of one name, of plans or of the case, and
 /// for a planned point named like a pick that is not the model's landmark there.
-std::vector<std::optional<Plan>> read_plans(const pipeline::Case& given);
+std::vector<std::optional<MarkupPlan>> read_plans(const pipeline::Case& the_case);
 
 }  // namespace helicarm::case_registration

@@ -34,7 +34,7 @@ class CasePlans : public testing::Test {
     pick.name = name;
     given_.picks.push_back(pick);
   }
-  Expected<std::vector<std::optional<Plan>>> plans() {
+  Expected<std::vector<std::optional<MarkupPlan>>> plans() {
     return guarded([&] { return read_plans(given_); });
   }
 
@@ -55,7 +55,7 @@ TEST_F(CasePlans, PointsOfTwoPlansMayShareANameTunnelsMayNot) {
 
 TEST_F(CasePlans, ATunnelOfThePicksIsAnother) {
   add_model("femur", "one", "F-1");
-  pipeline::TunnelPlan tunnel;
+  pipeline::CaseTunnel tunnel;
   tunnel.name = "one";
   given_.tunnels.push_back(tunnel);
   EXPECT_EQ(plans().error().reason, Reason::name_clash);
@@ -90,7 +90,7 @@ TEST_F(CasePlans, ATunnelOfTheCaseNamesALineAndGivesItsDiameter) {
   given_.model_tunnels.push_back({"ACL", "femur", "one", 8.0, 3});
   const auto read = plans();
   ASSERT_TRUE(read) << read.error().message;
-  const PlanTunnel& tunnel = (*read)[0]->tunnels.at(0);
+  const MarkupLine& tunnel = (*read)[0]->tunnels.at(0);
   EXPECT_EQ(tunnel.name, "ACL");
   EXPECT_EQ(tunnel.diameter_mm, 8);
   EXPECT_EQ(tunnel.bridge_mm, 3);

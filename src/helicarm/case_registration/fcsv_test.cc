@@ -18,7 +18,7 @@ std::string header(const std::string& system) {
   return "# Markups fiducial file version = 4.11\n# CoordinateSystem = " + system + "\n" + columns;
 }
 
-Expected<Plan> plan_of(const std::string& text, const std::string& name = "F.fcsv") {
+Expected<MarkupPlan> plan_of(const std::string& text, const std::string& name = "F.fcsv") {
   const TemporaryFolder folder;
   EXPECT_TRUE(write_file(folder.path() / name, text));
   return read_plan(folder.path() / name);

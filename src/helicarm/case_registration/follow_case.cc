@@ -22,43 +22,43 @@ struct FollowedModel {
   std::optional<registration::Follower> follower;
   StartPoses start;
   std::optional<registration::LandmarkFault> fault;
-  std::optional<Plan> plan;
+  std::optional<MarkupPlan> plan;
 };
 
 namespace {
 
 using registration::Registration;
 
-std::vector<std::unique_ptr<FollowedModel>> followed_models(const pipeline::Case& given,
+std::vector<std::unique_ptr<FollowedModel>> followed_models(const pipeline::Case& the_case,
                                                             const RegisterOptions& options,
                                                             const Progress& progress,
                                                             const LoadedViews& loaded,
                                                             std::vector<Warning>& warnings) {
   std::vector<std::unique_ptr<FollowedModel>> bodies;
-  std::vector<std::optional<Plan>> plans = read_plans(given);
-  for (std::size_t i = 0; i < given.models.size(); ++i) {
-    const pipeline::CaseModel& asked = given.models[i];
-    auto model = value_or_throw(load_model(asked)).model;
+  std::vector<std::optional<MarkupPlan>> plans = read_plans(the_case);
+  for (std::size_t i = 0; i < the_case.models.size(); ++i) {
+    const pipeline::CaseModel& case_model = the_case.models[i];
+    auto model = value_or_throw(load_model(case_model)).model;
     if (!model)
       throw BadInput(Reason::bad_value,
-                     fmt::format("models: \"{}\": a sequence needs a volume or a surface", asked.name));
-    StartPoses start = start_poses(given, loaded, asked, loaded.views, options.run.motion_sigma_mm);
+                     fmt::format("models: \"{}\": a sequence needs a volume or a surface", case_model.name));
+    StartPoses start = start_poses(the_case, loaded, case_model, loaded.views, options.run.motion_sigma_mm);
     std::optional<registration::LandmarkFault> fault;
     if (start.landmarks) fault = registration::landmark_fault(start.used, *start.landmarks);
     if (fault && fault->is_certain) throw BadInput(fault->failure);
-    for (Warning& warning : places_outside(asked, model, start.used, plans[i]))
+    for (Warning& warning : places_outside(case_model, model, start.used, plans[i]))
       warnings.push_back(std::move(warning));
     auto body = std::make_unique<FollowedModel>(
         FollowedModel{std::move(*model), {}, std::move(start), fault, std::move(plans[i])});
     const std::vector<geometry::RigidTransform>& poses = body->start.poses;
-    body->follower.emplace(body->model, poses, search_options(options, progress, loaded, asked));
+    body->follower.emplace(body->model, poses, search_options(options, progress, loaded, case_model));
     bodies.push_back(std::move(body));
   }
   return bodies;
 }
 
 /// Of the planned points in the world.
-std::optional<PlannedError> largest_error(const std::optional<Plan>& plan, const Registration& result) {
+std::optional<PlannedError> largest_error(const std::optional<MarkupPlan>& plan, const Registration& result) {
   if (!plan || !result.is_determined()) return std::nullopt;
   std::vector<RegisteredPoint> points;
   for (const PlanPoint& point : plan->points) {

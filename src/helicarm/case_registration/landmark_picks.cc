@@ -37,10 +37,10 @@ struct PickedRays {
   double dof() const { return 2 * double(rays.size()) - 3; }
 };
 
-PickedRays rays_of(std::string name, const Vector3d& in_model, const pipeline::Case& given,
+PickedRays rays_of(std::string name, const Vector3d& in_model, const pipeline::Case& the_case,
                    const LoadedViews& loaded, const std::vector<RegistrationView>& views) {
   PickedRays picked{std::move(name), in_model, {}, {}, {}};
-  for (const pipeline::Pick& pick : given.picks) {
+  for (const pipeline::Pick& pick : the_case.picks) {
     if (pick.name != picked.name) continue;
     for (std::size_t i = 0; i < views.size(); ++i) {
       if (views[i].name != pick.view) continue;
@@ -121,14 +121,15 @@ Eigen::MatrixXd by_cameras(const geometry::Intersection& crossing, const PickedR
 
 }  // namespace
 
-std::vector<registration::Landmark> picked_landmarks(const pipeline::CaseModel& asked,
-                                                     const pipeline::Case& given, const LoadedViews& loaded,
+std::vector<registration::Landmark> picked_landmarks(const pipeline::CaseModel& case_model,
+                                                     const pipeline::Case& the_case,
+                                                     const LoadedViews& loaded,
                                                      const std::vector<RegistrationView>& views) {
-  const std::filesystem::path& path = *asked.landmarks;
+  const std::filesystem::path& path = *case_model.landmarks;
   std::string missing;
   std::vector<PickedRays> picked;
   for (const auto& [name, in_model] : read_landmarks(path)) {
-    PickedRays rays = rays_of(name, in_model, given, loaded, views);
+    PickedRays rays = rays_of(name, in_model, the_case, loaded, views);
     if (rays.rays.size() >= 2)
       picked.push_back(std::move(rays));
     else
@@ -138,9 +139,9 @@ std::vector<registration::Landmark> picked_landmarks(const pipeline::CaseModel& 
     throw BadInput(Reason::bad_value,
                    fmt::format("models: \"{}\": {}: {} of its landmarks are picked in two views, at least {} "
                                "are required; not picked so: {}",
-                               asked.name, path.filename().string(), picked.size(),
+                               case_model.name, path.filename().string(), picked.size(),
                                registration::least_landmarks, missing.empty() ? "none" : missing));
-  check_exchange(picked, views, asked.name);
+  check_exchange(picked, views, case_model.name);
   std::vector<registration::Landmark> landmarks;
   for (const PickedRays& rays : picked) {
     const auto crossing = value_or_throw(rays.crossing());

@@ -13,7 +13,7 @@ namespace helicarm::case_registration {
 /// each other and would meet with two names of one view exchanged, and as `read_csv`, `geometry::intersect`.
 /// `views`: as used for this model.
 std::vector<registration::Landmark> picked_landmarks(
-    const pipeline::CaseModel& asked, const pipeline::Case& given, const LoadedViews& loaded,
+    const pipeline::CaseModel& case_model, const pipeline::Case& the_case, const LoadedViews& loaded,
     const std::vector<registration::RegistrationView>& views);
 
 }  // namespace helicarm::case_registration

@@ -18,7 +18,7 @@ registration::Registration registered_by_landmarks(const std::string& name,
                                                    const std::vector<registration::Landmark>& used,
                                                    const registration::LandmarkRegistration& found,
                                                    const std::optional<registration::LandmarkFault>& fault,
-                                                   const std::optional<Plan>& plan,
+                                                   const std::optional<MarkupPlan>& plan,
                                                    const std::optional<double>& max_error_mm);
 
 }  // namespace helicarm::case_registration

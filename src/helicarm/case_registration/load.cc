@@ -71,12 +71,13 @@ image::Image<std::uint8_t> usable_of(const pipeline::LabelledView& view,
   return usable;
 }
 
-volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& given, double offset_hu) {
+volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& case_model, double offset_hu) {
   if (!volume::is_tiff_stack(path)) return value_or_throw(volume::read_volume(path));
-  if (!given.voxel_mm)
-    throw BadInput(Reason::bad_value,
-                   fmt::format("models: \"{}\": \"voxel_mm\" is missing: a TIFF stack needs it", given.name));
-  return value_or_throw(volume::tiff_stack(path, *given.voxel_mm, offset_hu));
+  if (!case_model.voxel_mm)
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("models: \"{}\": \"voxel_mm\" is missing: a TIFF stack needs it", case_model.name));
+  return value_or_throw(volume::tiff_stack(path, *case_model.voxel_mm, offset_hu));
 }
 
 std::string list_of_segments(const std::map<int, std::string>& segments) {
@@ -123,9 +124,9 @@ void add_view(LoadedViews& loaded, xray::XrayImage image, const exchange::Import
                        [](const Warning& warning) { return warning.reason != Reason::spacing_missing; });
 }
 
-LoadedViews views_of_cameras(const pipeline::Case& given) {
+LoadedViews views_of_cameras(const pipeline::Case& the_case) {
   LoadedViews loaded;
-  for (const pipeline::CaseView& view : given.views)
+  for (const pipeline::CaseView& view : the_case.views)
     add_view(loaded, value_or_throw(pipeline::image_of(view)),
              value_or_throw(exchange::import_matrix(*view.camera)));
   return loaded;
@@ -158,7 +159,8 @@ Eigen::MatrixXd covariance_by_residuals(const pipeline::CaseCalibration& calibra
 
 }  // namespace
 
-LoadedViews views_of_calibration(const pipeline::Case& given, const pipeline::CaseCalibration& calibration) {
+LoadedViews views_of_calibration(const pipeline::Case& the_case,
+                                 const pipeline::CaseCalibration& calibration) {
   LoadedViews loaded;
   for (std::size_t i = 0; i < calibration.views.size(); ++i) {
     const pipeline::LabelledView& image = calibration.images[i];
@@ -166,7 +168,7 @@ LoadedViews views_of_calibration(const pipeline::Case& given, const pipeline::Ca
     if (loaded.patient_key.empty()) loaded.patient_key = image.xray_image->acquisition.patient_key;
     loaded.views.push_back(view_of(*image.xray_image, view.name, view.view));
     loaded.views.back().grey = rectification::resample(*image.xray_image, image.rectification.map);
-    loaded.views.back().usable = usable_of(image, given.calibrator, view.view);
+    loaded.views.back().usable = usable_of(image, the_case.calibrator, view.view);
     loaded.maps.emplace_back(image.rectification.map);
   }
   loaded.camera_covariance = calibration.joint_covariance.size() > 0 ? calibration.joint_covariance
@@ -175,16 +177,16 @@ LoadedViews views_of_calibration(const pipeline::Case& given, const pipeline::Ca
   return loaded;
 }
 
-Expected<LoadedViews> load_views(const pipeline::Case& given, const pipeline::RunOptions& run,
+Expected<LoadedViews> load_views(const pipeline::Case& the_case, const pipeline::RunOptions& run,
                                  const pipeline::Progress& progress) {
   return guarded([&] {
-    if (pipeline::brings_cameras(given)) {
+    if (pipeline::brings_cameras(the_case)) {
       progress.begin("read");
-      return views_of_cameras(given);
+      return views_of_cameras(the_case);
     }
-    const auto calibration = pipeline::calibrate_case(given, run, progress);
+    const auto calibration = pipeline::calibrate_case(the_case, run, progress);
     if (!calibration) throw BadInput(calibration.error().failure);
-    return views_of_calibration(given, *calibration);
+    return views_of_calibration(the_case, *calibration);
   });
 }
 
@@ -216,7 +218,8 @@ Expected<std::vector<RegistrationView>> with_images(const LoadedViews& loaded,
   });
 }
 
-Expected<LoadedModel> load_model(const pipeline::CaseModel& given, const std::optional<Plan>& plan) {
+Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,
+                                 const std::optional<MarkupPlan>& plan) {
   return guarded([&]() -> LoadedModel {
     const bool has_tunnels = plan && !plan->tunnels.empty();
     LoadedModel loaded;
@@ -224,42 +227,45 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& given, const std::op
       loaded.bone_checks = bone_checks(*plan, &bone);
       loaded.tunnel_slices = tunnel_slices(*plan, loaded.bone_checks, bone, ct);
     };
-    if (given.surface) {
-      registration::SurfaceMesh surface = value_or_throw(registration::read_surface(*given.surface));
-      registration::Model model = value_or_throw(registration::model_from(given.name, surface));
+    if (case_model.surface) {
+      registration::SurfaceMesh surface = value_or_throw(registration::read_surface(*case_model.surface));
+      registration::Model model = value_or_throw(registration::model_from(case_model.name, surface));
       model.warnings = std::move(surface.warnings);
       if (has_tunnels) compare(*registration::bone_surface(*model.surface, model.voxel_mm), nullptr);
       loaded.model = std::move(model);
       return loaded;
     }
-    if (!given.volume) return loaded;
-    if (given.voxel_mm && !volume::is_tiff_stack(*given.volume))
+    if (!case_model.volume) return loaded;
+    if (case_model.voxel_mm && !volume::is_tiff_stack(*case_model.volume))
       throw BadInput(Reason::bad_value,
                      fmt::format("models: \"{}\": \"voxel_mm\" is for TIFF stacks only; {} states its own",
-                                 given.name, given.volume->filename().string()));
-    const volume::Volume volume = volume_at(*given.volume, given, given.tiff_offset_hu);
+                                 case_model.name, case_model.volume->filename().string()));
+    const volume::Volume volume = volume_at(*case_model.volume, case_model, case_model.tiff_offset_hu);
     std::optional<volume::Volume> mask;
     std::optional<std::map<int, std::string>> segments;
-    if (given.mask) {
-      segments = value_or_throw(volume::segments_in(*given.mask));
-      mask = volume_at(*given.mask, given, 0);
+    if (case_model.mask) {
+      segments = value_or_throw(volume::segments_in(*case_model.mask));
+      mask = volume_at(*case_model.mask, case_model, 0);
       auto chosen = volume::choose_label(
-          *mask, given.mask_label,
-          fmt::format("models: \"{}\": {}", given.name, given.mask->filename().string()), "\"mask_label\"");
+          *mask, case_model.mask_label,
+          fmt::format("models: \"{}\": {}", case_model.name, case_model.mask->filename().string()),
+          "\"mask_label\"");
       if (!chosen && segments) chosen.error().message += list_of_segments(*segments);
       value_or_throw(chosen);
     }
     // A stack has no frame of its own: a mask drawn on it in another program brings that program's.
-    if (mask && given.voxel_mm && has_voxels_of(*mask, *given.voxel_mm))
+    if (mask && case_model.voxel_mm && has_voxels_of(*mask, *case_model.voxel_mm))
       mask->patient_from_voxel = volume.patient_from_voxel;
     // Another grid is refused with the model; a segmentation's empty slices may be missing.
     if (mask) volume::onto_grid(*mask, volume, segments.has_value());
     std::optional<registration::HuWindow> window;
-    if (given.window_hu) window = {given.window_hu->x(), given.window_hu->y()};
-    registration::Model model = value_or_throw(registration::model_from(given.name, volume, mask, window));
+    if (case_model.window_hu) window = {case_model.window_hu->x(), case_model.window_hu->y()};
+    registration::Model model =
+        value_or_throw(registration::model_from(case_model.name, volume, mask, window));
     model.warnings = volume.warnings;
     for (Warning& warning : value_or_throw(volume::check_hounsfield(
-             volume, fmt::format("models: \"{}\": {}", given.name, given.volume->filename().string()))))
+             volume,
+             fmt::format("models: \"{}\": {}", case_model.name, case_model.volume->filename().string()))))
       model.warnings.push_back(std::move(warning));
     if (mask) model.warnings.insert(model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
     if (has_tunnels && (mask || window)) compare(*registration::bone_surface(volume, mask, window), &volume);

@@ -30,12 +30,13 @@ struct LoadedViews {
 /// or with cameras of other programs, then the images are taken as free of distortion. Fails as
 /// `read_xray_image`, `import_matrix` and `calibrate_case`, with patient_mismatch for images of two patients,
 /// and with bad_size for a camera of another image size.
-Expected<LoadedViews> load_views(const pipeline::Case& given, const pipeline::RunOptions& run,
+Expected<LoadedViews> load_views(const pipeline::Case& the_case, const pipeline::RunOptions& run,
                                  const pipeline::Progress& progress = {});
 
 /// The views of a case that is calibrated already. Of the paper's method, which has no covariance, each
 /// view's follows from its residuals.
-LoadedViews views_of_calibration(const pipeline::Case& given, const pipeline::CaseCalibration& calibration);
+LoadedViews views_of_calibration(const pipeline::Case& the_case,
+                                 const pipeline::CaseCalibration& calibration);
 
 /// The views with the images of another moment, one for each view: their geometry, distortion and masks stay.
 /// Fails with bad_size for another image size, and with patient_mismatch for another patient.
@@ -51,6 +52,7 @@ struct LoadedModel {
 };
 
 /// The model's files; of a plan the tunnels against the bone.
-Expected<LoadedModel> load_model(const pipeline::CaseModel& given, const std::optional<Plan>& plan = {});
+Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,
+                                 const std::optional<MarkupPlan>& plan = {});
 
 }  // namespace helicarm::case_registration

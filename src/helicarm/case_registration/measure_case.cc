@@ -45,13 +45,13 @@ pipeline::Result with_models(pipeline::Result result, const CaseRegistration& re
   return result;
 }
 
-Expected<Measurement> measure_case(const pipeline::Case& given, const RegisterOptions& options,
+Expected<Measurement> measure_case(const pipeline::Case& the_case, const RegisterOptions& options,
                                    const Progress& progress) {
   return guarded([&] {
-    auto done = value_or_throw(pipeline::measure(given, options.run, progress.of_views()));
-    if (done.failure || given.models.empty()) return Measurement{std::move(done), {}};
+    auto done = value_or_throw(pipeline::measure(the_case, options.run, progress.of_views()));
+    if (done.failure || the_case.models.empty()) return Measurement{std::move(done), {}};
     auto registration = value_or_throw(
-        register_loaded(given, views_of_calibration(given, *done.calibration), options, progress));
+        register_loaded(the_case, views_of_calibration(the_case, *done.calibration), options, progress));
     pipeline::Result result = with_models(std::move(done), registration);
     return Measurement{std::move(result), std::move(registration)};
   });

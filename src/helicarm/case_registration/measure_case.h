@@ -19,7 +19,7 @@ struct Measurement {
 
 /// Calibrates once, locates the picks and registers the models, if the case names any. A refusal is in
 /// `result.failure`, with all that was computed before it; unreadable input (exit code 2) fails.
-Expected<Measurement> measure_case(const pipeline::Case& given, const RegisterOptions& options,
+Expected<Measurement> measure_case(const pipeline::Case& the_case, const RegisterOptions& options,
                                    const Progress& progress = {});
 
 /// The result with the plans' points and tunnels of the models that were not refused (or for a tunnel_breach

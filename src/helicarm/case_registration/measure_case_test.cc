@@ -146,10 +146,11 @@ TEST(MeasuredCase, CamerasOfOtherProgramsAreNamed) {
   ASSERT_TRUE(write_file(folder.path() / "case.json",
                          R"({"format": "helicarm-case/1", "views": [{"name": "A", "image": "a.png",
                              "camera": "a.json"}], "models": [{"name": "x", "surface": "x.stl"}]})"));
-  const auto given = pipeline::read_case(folder.path());
-  ASSERT_FALSE(given);
-  EXPECT_EQ(given.error().reason, Reason::bad_value);
-  EXPECT_NE(given.error().message.find("helicarm register"), std::string::npos) << given.error().message;
+  const auto the_case = pipeline::read_case(folder.path());
+  ASSERT_FALSE(the_case);
+  EXPECT_EQ(the_case.error().reason, Reason::bad_value);
+  EXPECT_NE(the_case.error().message.find("helicarm register"), std::string::npos)
+      << the_case.error().message;
 }
 
 }  // namespace

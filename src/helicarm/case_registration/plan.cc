@@ -85,7 +85,7 @@ class Markup {
   std::string where_;
 };
 
-void add_point(Plan& plan, PlanPoint point, const std::string& where) {
+void add_point(MarkupPlan& plan, PlanPoint point, const std::string& where) {
   if (std::ranges::find(plan.points, point.name, &PlanPoint::name) != plan.points.end())
     throw BadInput(Reason::name_clash, fmt::format("{}: \"{}\" is given twice", where, point.name));
   if (plan.points.size() == most_points)
@@ -93,8 +93,8 @@ void add_point(Plan& plan, PlanPoint point, const std::string& where) {
   plan.points.push_back(std::move(point));
 }
 
-Plan plan_of_fcsv(std::string_view bytes, const std::string& origin) {
-  Plan plan;
+MarkupPlan plan_of_fcsv(std::string_view bytes, const std::string& origin) {
+  MarkupPlan plan;
   const std::string stem = origin.substr(0, origin.find('.'));
   for (PlanPoint& point : fcsv_points(bytes, origin)) {
     if (point.name.empty()) point.name = fmt::format("{}-{}", stem, plan.points.size() + 1);
@@ -111,7 +111,7 @@ bool is_json(std::string_view bytes) {
 
 }  // namespace
 
-Expected<Plan> read_plan(const std::filesystem::path& path) {
+Expected<MarkupPlan> read_plan(const std::filesystem::path& path) {
   return guarded([&] {
     const std::string origin = path.filename().string();
     const std::string bytes = value_or_throw(read_file(path, most_plan_bytes));
@@ -121,7 +121,7 @@ Expected<Plan> read_plan(const std::filesystem::path& path) {
       throw BadInput(Reason::bad_value,
                      fmt::format("{}: no list \"markups\": not a file of Slicer's markups", origin));
     std::string stem = origin.substr(0, origin.find('.'));
-    Plan plan;
+    MarkupPlan plan;
     for (std::size_t i = 0; i < json["markups"].size(); ++i) {
       const std::string where = fmt::format("{}: markups[{}]", origin, i);
       const Markup markup(json["markups"][i], where);

@@ -18,7 +18,7 @@ struct PlanPoint {
 };
 
 /// A line of the plan: its first point is the tunnel's start.
-struct PlanTunnel {
+struct MarkupLine {
   std::string name;
   std::size_t start = 0, end = 0;  ///< among the points
   // Of the case's tunnel of this line.
@@ -26,16 +26,16 @@ struct PlanTunnel {
   bool enters_at_end = false;
 };
 
-struct Plan {
+struct MarkupPlan {
   std::vector<PlanPoint> points;
-  std::vector<PlanTunnel> tunnels;
+  std::vector<MarkupLine> tunnels;
 };
 
 /// Reads 3D Slicer's markups: of a .mrk.json point lists give points, lines give tunnels with points
 /// NAME_start and NAME_end; a line without a name is called as the file. An .fcsv holds points. RAS and LAS
 /// are converted to LPS, other units of length to mm. Fails with missing_file, bad_json, not_finite,
 /// bad_value, bad_size, truncated, unsupported, name_clash.
-Expected<Plan> read_plan(const std::filesystem::path& path);
+Expected<MarkupPlan> read_plan(const std::filesystem::path& path);
 
 /// Landmarks in a model, mm, each name once: a CSV of name,x_mm,y_mm,z_mm, or the points of Slicer's markups
 /// (.mrk.json, .fcsv). Throws BadInput: as `read_plan`, and unknown_key.

@@ -9,7 +9,7 @@
 namespace helicarm::case_registration {
 namespace {
 
-Expected<Plan> plan_of(const std::string& text) {
+Expected<MarkupPlan> plan_of(const std::string& text) {
   const TemporaryFolder folder;
   EXPECT_TRUE(write_file(folder.path() / "femur.mrk.json", text));
   return read_plan(folder.path() / "femur.mrk.json");
@@ -34,7 +34,7 @@ TEST(ReadPlan, ALineIsATunnel) {
   EXPECT_EQ(plan->points[plan->tunnels[0].end].name, "femur_end");
 }
 
-Expected<Plan> plan_with(const std::string& declares) {
+Expected<MarkupPlan> plan_with(const std::string& declares) {
   return plan_of(R"({"markups": [{"type": "Fiducial", )" + declares +
                  R"(, "controlPoints": [{"label": "entry", "position": [1, 2, 3]}]}]})");
 }

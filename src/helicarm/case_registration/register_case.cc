@@ -26,25 +26,25 @@ using registration::RegistrationView;
 constexpr double outline_step_px = 2;
 
 /// The views as if the bone were where it was at the first one's acquisition.
-std::vector<RegistrationView> following(std::vector<RegistrationView> views, const pipeline::Case& given,
+std::vector<RegistrationView> following(std::vector<RegistrationView> views, const pipeline::Case& the_case,
                                         const guidance::Bone& bone) {
-  const RigidTransform first = *guidance::calibrator_from(bone, given.views.front().poses);
+  const RigidTransform first = *guidance::calibrator_from(bone, the_case.views.front().poses);
   for (std::size_t i = 0; i < views.size(); ++i)
     views[i].view.camera_from_world = views[i].view.camera_from_world *
-                                      *guidance::calibrator_from(bone, given.views[i].poses) *
+                                      *guidance::calibrator_from(bone, the_case.views[i].poses) *
                                       first.inverse();
   return views;
 }
 
 /// What no image shows of a body whose poses at the acquisitions are not known.
-Warning motion_note(const pipeline::CaseModel& asked, double motion_sigma_mm) {
+Warning motion_note(const pipeline::CaseModel& case_model, double motion_sigma_mm) {
   return {
-      asked.moves_with ? Reason::bone_taken_as_fixed : Reason::unobservable_motion,
+      case_model.moves_with ? Reason::bone_taken_as_fixed : Reason::unobservable_motion,
       fmt::format("{}: motion between the acquisitions within the plane of the central rays is taken for a "
                   "position; {}",
-                  asked.name,
+                  case_model.name,
                   motion_sigma_mm > 0 ? fmt::format("{:g} mm per axis is in the covariance", motion_sigma_mm)
-                  : asked.moves_with
+                  : case_model.moves_with
                       ? "poses of the bone at every acquisition are missing"
                       : "put a marker on the bone, give its poses and \"moves_with\", or --motion-sigma"),
       {},
@@ -63,21 +63,23 @@ void add_warnings_of_files(const registration::Model& model, registration::Regis
 
 class Registrar {
  public:
-  Registrar(const pipeline::Case& given, const RegisterOptions& options, const Progress& progress,
+  Registrar(const pipeline::Case& the_case, const RegisterOptions& options, const Progress& progress,
             const LoadedViews& loaded)
-      : given_(given), options_(options), progress_(progress), loaded_(loaded) {}
+      : given_(the_case), options_(options), progress_(progress), loaded_(loaded) {}
 
-  RegisteredModel registered(const pipeline::CaseModel& asked, const std::optional<Plan>& plan) const {
+  RegisteredModel registered(const pipeline::CaseModel& case_model,
+                             const std::optional<MarkupPlan>& plan) const {
     RegisteredModel made;
-    made.moves_with = asked.moves_with;
-    made.registration.name = asked.name;
-    const bool follows = asked.moves_with && tracked(given_, *asked.moves_with);
-    const auto views = follows ? following(loaded_.views, given_, *asked.moves_with) : loaded_.views;
+    made.moves_with = case_model.moves_with;
+    made.registration.name = case_model.name;
+    const bool follows = case_model.moves_with && tracked(given_, *case_model.moves_with);
+    const auto views = follows ? following(loaded_.views, given_, *case_model.moves_with) : loaded_.views;
     for (const RegistrationView& view : views) made.views.push_back(view.view);
-    LoadedModel files = value_or_throw(load_model(asked, plan));
+    LoadedModel files = value_or_throw(load_model(case_model, plan));
     std::optional<registration::Model>& model = files.model;
     const double motion_sigma_mm = follows ? 0 : options_.run.motion_sigma_mm;
-    const auto start = guarded([&] { return start_poses(given_, loaded_, asked, views, motion_sigma_mm); });
+    const auto start =
+        guarded([&] { return start_poses(given_, loaded_, case_model, views, motion_sigma_mm); });
     if (!start) {
       if (exit_code(start.error().reason) == 2) throw BadInput(start.error());
       made.by_landmarks_only = true;
@@ -86,23 +88,24 @@ class Registrar {
     }
     made.landmarks = start->landmarks;
     made.used_landmarks = start->used;
-    const auto outside = places_outside(asked, model, start->used, plan);
+    const auto outside = places_outside(case_model, model, start->used, plan);
     std::optional<registration::LandmarkFault> fault;
     if (made.landmarks) fault = registration::landmark_fault(start->used, *made.landmarks);
     if (model && !(fault && fault->is_certain)) {
-      made.registration = registered_by_images(asked, *model, *start, fault, views, motion_sigma_mm);
+      made.registration = registered_by_images(case_model, *model, *start, fault, views, motion_sigma_mm);
       add_figures(*model, views, made);
       made.model = std::make_shared<const registration::Model>(*std::move(model));
     } else {
       made.by_landmarks_only = true;
-      made.registration = registered_by_landmarks(asked.name, start->used, *made.landmarks, fault, plan,
+      made.registration = registered_by_landmarks(case_model.name, start->used, *made.landmarks, fault, plan,
                                                   options_.run.max_error_mm);
-      made.registration.scale_sigma = asked.scale_sigma.value_or(registration::usual_scale_sigma);
+      made.registration.scale_sigma = case_model.scale_sigma.value_or(registration::usual_scale_sigma);
       if (loaded_.camera_covariance.size() == 0)
-        add_finding(made.registration, registration::cameras_without_covariance(asked.name), false);
+        add_finding(made.registration, registration::cameras_without_covariance(case_model.name), false);
     }
     for (const Warning& warning : outside) add_finding(made.registration, warning, false);
-    if (!follows && views.size() > 1) made.registration.notes.push_back(motion_note(asked, motion_sigma_mm));
+    if (!follows && views.size() > 1)
+      made.registration.notes.push_back(motion_note(case_model, motion_sigma_mm));
     if (plan && made.registration.is_determined()) {
       carry_plan(*plan, given_, made);
       limit_error(largest_error(made.points), options_.run.max_error_mm, made.registration);
@@ -115,34 +118,35 @@ class Registrar {
     return made;
   }
 
-  RegisteredModel registered(GivenModel given) const {
-    pipeline::CaseModel asked;
-    asked.name = given.model.name;
-    asked.scale_sigma = given.scale_sigma;
-    if (given.starts.empty() && loaded_.views.size() < 2)
-      throw BadInput(Reason::bad_value,
-                     fmt::format("starts: \"{}\" is missing: with one view a pose is needed", asked.name));
+  RegisteredModel registered(GivenModel loaded_model) const {
+    pipeline::CaseModel case_model;
+    case_model.name = loaded_model.model.name;
+    case_model.scale_sigma = loaded_model.scale_sigma;
+    if (loaded_model.starts.empty() && loaded_.views.size() < 2)
+      throw BadInput(
+          Reason::bad_value,
+          fmt::format("starts: \"{}\" is missing: with one view a pose is needed", case_model.name));
     RegisteredModel made;
     for (const RegistrationView& view : loaded_.views) made.views.push_back(view.view);
     const double motion_sigma_mm = options_.run.motion_sigma_mm;
-    made.registration =
-        registered_by_images(asked, given.model, {given.starts, {}, {}}, {}, loaded_.views, motion_sigma_mm);
-    add_figures(given.model, loaded_.views, made);
-    if (loaded_.views.size() > 1) made.registration.notes.push_back(motion_note(asked, motion_sigma_mm));
-    made.model = std::make_shared<const registration::Model>(std::move(given.model));
+    made.registration = registered_by_images(case_model, loaded_model.model, {loaded_model.starts, {}, {}},
+                                             {}, loaded_.views, motion_sigma_mm);
+    add_figures(loaded_model.model, loaded_.views, made);
+    if (loaded_.views.size() > 1) made.registration.notes.push_back(motion_note(case_model, motion_sigma_mm));
+    made.model = std::make_shared<const registration::Model>(std::move(loaded_model.model));
     add_warnings_of_files(*made.model, made.registration);
     return made;
   }
 
  private:
-  registration::Registration registered_by_images(const pipeline::CaseModel& asked,
+  registration::Registration registered_by_images(const pipeline::CaseModel& case_model,
                                                   const registration::Model& model, const StartPoses& start,
                                                   const std::optional<registration::LandmarkFault>& fault,
                                                   const std::vector<RegistrationView>& views,
                                                   double motion_sigma_mm) const {
-    registration::RegistrationOptions how = search_options(options_, progress_, loaded_, asked);
+    registration::RegistrationOptions how = search_options(options_, progress_, loaded_, case_model);
     how.motion_sigma_mm = motion_sigma_mm;
-    if (progress_.step) how.on_step = [&](std::string_view step) { progress_.step(asked.name, step); };
+    if (progress_.step) how.on_step = [&](std::string_view step) { progress_.step(case_model.name, step); };
     auto result = registration::register_model(model, views, start.poses, how);
     compare_with_landmarks(start, fault, result);
     return result;
@@ -189,38 +193,38 @@ bool CaseRegistration::refused() const {
          });
 }
 
-Expected<CaseRegistration> register_case(const pipeline::Case& given, const RegisterOptions& options,
+Expected<CaseRegistration> register_case(const pipeline::Case& the_case, const RegisterOptions& options,
                                          const Progress& progress) {
   return guarded([&] {
     CaseRegistration result;
-    result.bones = given.bones;
-    result.warnings = given.warnings;
-    if (pipeline::is_sequence(given))
+    result.bones = the_case.bones;
+    result.warnings = the_case.warnings;
+    if (pipeline::is_sequence(the_case))
       throw BadInput(Reason::bad_value,
                      "views: \"image\" holds {frame}: name the frames with --frames, such as --frames 1-100");
-    auto loaded = load_views(given, options.run, progress.of_views());
+    auto loaded = load_views(the_case, options.run, progress.of_views());
     if (!loaded) {
       if (exit_code(loaded.error().reason) == 2) throw BadInput(loaded.error());
       result.failure = loaded.error();
       return result;
     }
-    return value_or_throw(register_loaded(given, *std::move(loaded), options, progress));
+    return value_or_throw(register_loaded(the_case, *std::move(loaded), options, progress));
   });
 }
 
-Expected<CaseRegistration> register_loaded(const pipeline::Case& given, LoadedViews loaded,
+Expected<CaseRegistration> register_loaded(const pipeline::Case& the_case, LoadedViews loaded,
                                            const RegisterOptions& options, const Progress& progress) {
   return guarded([&] {
     CaseRegistration result;
-    result.bones = given.bones;
-    result.warnings = given.warnings;
+    result.bones = the_case.bones;
+    result.warnings = the_case.warnings;
     result.loaded = std::move(loaded);
     result.warnings.insert(result.warnings.end(), result.loaded.warnings.begin(),
                            result.loaded.warnings.end());
-    const auto plans = read_plans(given);
-    const Registrar registrar(given, options, progress, result.loaded);
-    for (std::size_t i = 0; i < given.models.size(); ++i)
-      result.models.push_back(registrar.registered(given.models[i], plans[i]));
+    const auto plans = read_plans(the_case);
+    const Registrar registrar(the_case, options, progress, result.loaded);
+    for (std::size_t i = 0; i < the_case.models.size(); ++i)
+      result.models.push_back(registrar.registered(the_case.models[i], plans[i]));
     return result;
   });
 }

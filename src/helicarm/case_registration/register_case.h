@@ -89,11 +89,11 @@ std::vector<std::vector<Eigen::Vector2d>> outlines(const registration::Model& mo
                                                    const geometry::RigidTransform& world_from_model);
 
 /// Registers every model of a case. Unreadable input is a failure; refusals are in the result.
-Expected<CaseRegistration> register_case(const pipeline::Case& given, const RegisterOptions& options,
+Expected<CaseRegistration> register_case(const pipeline::Case& the_case, const RegisterOptions& options,
                                          const Progress& progress = {});
 
 /// Registers every model to views that are loaded already. Fails as `register_case`.
-Expected<CaseRegistration> register_loaded(const pipeline::Case& given, LoadedViews loaded,
+Expected<CaseRegistration> register_loaded(const pipeline::Case& the_case, LoadedViews loaded,
                                            const RegisterOptions& options, const Progress& progress = {});
 
 /// registration.json (docs/formats.md).

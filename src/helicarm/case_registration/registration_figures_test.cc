@@ -96,10 +96,10 @@ TEST(DrrImage, ModelBehindTheSourceHasNone) {
 /// landmarks.
 class Report : public testing::Test {
  protected:
-  CaseRegistration registered(pipeline::CaseModel asked) {
-    pipeline::Case given;
-    asked.name = "implant";
-    given.models = {asked};
+  CaseRegistration registered(pipeline::CaseModel case_model) {
+    pipeline::Case the_case;
+    case_model.name = "implant";
+    the_case.models = {case_model};
     RegisterOptions options;
     options.run.threads = 1;
     options.search = {3, 3};
@@ -111,14 +111,14 @@ class Report : public testing::Test {
     loaded.maps.resize(2);
     for (const Vector3d& point : landmarks)
       for (const auto& view : loaded.views)
-        given.picks.push_back({"p" + std::to_string(int(point.x())),
-                               view.name,
-                               view.view.project(point),
-                               pipeline::Snap::none,
-                               3,
-                               {},
-                               {}});
-    auto made = register_loaded(given, std::move(loaded), options);
+        the_case.picks.push_back({"p" + std::to_string(int(point.x())),
+                                  view.name,
+                                  view.view.project(point),
+                                  pipeline::Snap::none,
+                                  3,
+                                  {},
+                                  {}});
+    auto made = register_loaded(the_case, std::move(loaded), options);
     EXPECT_TRUE(made) << made.error().message;
     return *made;
   }

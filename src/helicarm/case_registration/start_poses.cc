@@ -25,13 +25,13 @@ Eigen::MatrixXd shared_covariance(const LoadedViews& loaded, double motion_sigma
 
 }  // namespace
 
-StartPoses start_poses(const pipeline::Case& given, const LoadedViews& loaded,
-                       const pipeline::CaseModel& asked, const std::vector<RegistrationView>& views,
+StartPoses start_poses(const pipeline::Case& the_case, const LoadedViews& loaded,
+                       const pipeline::CaseModel& case_model, const std::vector<RegistrationView>& views,
                        double motion_sigma_mm) {
-  if (asked.world_from_model) return {{*asked.world_from_model}, {}, {}};
-  if (asked.landmarks) {
+  if (case_model.world_from_model) return {{*case_model.world_from_model}, {}, {}};
+  if (case_model.landmarks) {
     StartPoses start;
-    start.used = picked_landmarks(asked, given, loaded, views);
+    start.used = picked_landmarks(case_model, the_case, loaded, views);
     start.landmarks = value_or_throw(
         registration::register_landmarks(start.used, shared_covariance(loaded, motion_sigma_mm)));
     start.poses = {start.landmarks->world_from_model};
@@ -41,7 +41,7 @@ StartPoses start_poses(const pipeline::Case& given, const LoadedViews& loaded,
     throw BadInput(
         Reason::bad_value,
         fmt::format("models: \"{}\": \"start\" is missing: with one view a pose or landmarks are needed",
-                    asked.name));
+                    case_model.name));
   return {};
 }
 
@@ -58,10 +58,10 @@ void compare_with_landmarks(const StartPoses& start, const std::optional<registr
     add(apart->failure, apart->is_certain);
 }
 
-std::vector<Warning> places_outside(const pipeline::CaseModel& asked,
+std::vector<Warning> places_outside(const pipeline::CaseModel& case_model,
                                     const std::optional<registration::Model>& model,
                                     const std::vector<registration::Landmark>& landmarks,
-                                    const std::optional<Plan>& plan) {
+                                    const std::optional<MarkupPlan>& plan) {
   std::vector<PlacedPoint> of_landmarks, of_plan;
   for (const registration::Landmark& landmark : landmarks)
     of_landmarks.push_back({landmark.name, landmark.in_model});
@@ -69,10 +69,10 @@ std::vector<Warning> places_outside(const pipeline::CaseModel& asked,
     for (const PlanPoint& point : plan->points) of_plan.push_back({point.name, point.in_model});
   const ModelBox box = model ? box_of(*model) : box_of(landmarks);
   std::vector<Warning> warnings;
-  if (asked.landmarks)
-    warnings = check_places(asked.name, asked.landmarks->filename().string(), box, of_landmarks);
-  if (asked.plan) {
-    const auto further = check_places(asked.name, asked.plan->filename().string(), box, of_plan);
+  if (case_model.landmarks)
+    warnings = check_places(case_model.name, case_model.landmarks->filename().string(), box, of_landmarks);
+  if (case_model.plan) {
+    const auto further = check_places(case_model.name, case_model.plan->filename().string(), box, of_plan);
     warnings.insert(warnings.end(), further.begin(), further.end());
   }
   return warnings;
@@ -80,11 +80,11 @@ std::vector<Warning> places_outside(const pipeline::CaseModel& asked,
 
 registration::RegistrationOptions search_options(const RegisterOptions& options, const Progress& progress,
                                                  const LoadedViews& loaded,
-                                                 const pipeline::CaseModel& asked) {
+                                                 const pipeline::CaseModel& case_model) {
   registration::RegistrationOptions how;
   how.max_error_mm = options.run.max_error_mm;
   how.motion_sigma_mm = options.run.motion_sigma_mm;
-  how.scale_sigma = asked.scale_sigma.value_or(registration::usual_scale_sigma);
+  how.scale_sigma = case_model.scale_sigma.value_or(registration::usual_scale_sigma);
   how.threads = options.run.threads;
   how.camera_covariance = loaded.camera_covariance;
   how.search.shift_mm = options.search.shift_mm;

@@ -21,8 +21,8 @@ struct StartPoses {
 /// The pose or the landmarks that the case gives; none: the model is searched anywhere. `motion_sigma_mm`: of
 /// landmarks, between the acquisitions. Throws BadInput: bad_value without a start in one view, and as
 /// `picked_landmarks`, `register_landmarks`.
-StartPoses start_poses(const pipeline::Case& given, const LoadedViews& loaded,
-                       const pipeline::CaseModel& asked,
+StartPoses start_poses(const pipeline::Case& the_case, const LoadedViews& loaded,
+                       const pipeline::CaseModel& case_model,
                        const std::vector<registration::RegistrationView>& views, double motion_sigma_mm);
 
 /// Compares a pose that the images gave with the landmarks it started from, which may be at fault themselves:
@@ -31,13 +31,14 @@ void compare_with_landmarks(const StartPoses& start, const std::optional<registr
                             registration::Registration& result);
 
 /// Planned points and landmarks outside the model, as `check_places`.
-std::vector<Warning> places_outside(const pipeline::CaseModel& asked,
+std::vector<Warning> places_outside(const pipeline::CaseModel& case_model,
                                     const std::optional<registration::Model>& model,
                                     const std::vector<registration::Landmark>& landmarks,
-                                    const std::optional<Plan>& plan);
+                                    const std::optional<MarkupPlan>& plan);
 
 /// The options of an untracked model's registration.
 registration::RegistrationOptions search_options(const RegisterOptions& options, const Progress& progress,
-                                                 const LoadedViews& loaded, const pipeline::CaseModel& asked);
+                                                 const LoadedViews& loaded,
+                                                 const pipeline::CaseModel& case_model);
 
 }  // namespace helicarm::case_registration

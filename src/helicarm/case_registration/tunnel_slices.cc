@@ -158,7 +158,7 @@ void draw_tunnel(cv::Mat& drawn, const TunnelSlice& slice, double radius_px, con
 
 }  // namespace
 
-std::vector<std::optional<TunnelSlices>> tunnel_slices(const Plan& plan,
+std::vector<std::optional<TunnelSlices>> tunnel_slices(const MarkupPlan& plan,
                                                        const std::vector<std::optional<BoneCheck>>& checks,
                                                        const registration::BoneSurface& bone,
                                                        const volume::Volume* ct) {

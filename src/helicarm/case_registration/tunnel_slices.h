@@ -34,7 +34,7 @@ struct TunnelSlices {
 
 /// Of each tunnel of the plan, in its order; nothing where `checks` has nothing. `ct`: null for a surface.
 std::vector<std::optional<TunnelSlices>> tunnel_slices(
-    const Plan& plan, const std::vector<std::optional<registration::BoneCheck>>& checks,
+    const MarkupPlan& plan, const std::vector<std::optional<registration::BoneCheck>>& checks,
     const registration::BoneSurface& bone, const volume::Volume* ct);
 
 /// The three slices side by side with the tunnel's walls: red where it is a breach, yellow where it is thin,

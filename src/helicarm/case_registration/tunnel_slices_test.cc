@@ -27,8 +27,8 @@ volume::Volume block_of_bone() {
 }
 
 /// A tunnel of 6 mm along z at x = 6: its wall is 3 mm from the face at x = 12.
-Plan plan() {
-  Plan plan;
+MarkupPlan plan() {
+  MarkupPlan plan;
   plan.points = {{"T_start", {6, 0, -25}}, {"T_end", {6, 0, 25}}};
   plan.tunnels = {{"T", 0, 1, 6.0, 2.0}};
   return plan;
@@ -96,7 +96,7 @@ TEST(TunnelSlices, AreDrawnInTheColourOfTheDecision) {
 TEST(TunnelSlices, ATunnelWithoutABoneCheckHasNone) {
   const volume::Volume ct = block_of_bone();
   const auto bone = registration::bone_surface(ct, {}, registration::HuWindow{150, 3000});
-  Plan short_plan = plan();
+  MarkupPlan short_plan = plan();
   short_plan.points[1].in_model = short_plan.points[0].in_model;
   EXPECT_FALSE(tunnel_slices(short_plan, bone_checks(short_plan, bone.get()), *bone, &ct).front());
 }

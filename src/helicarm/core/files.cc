@@ -204,7 +204,7 @@ Expected<void> write_private_file(const fs::path& path, std::string_view bytes) 
 }
 
 Expected<void> write_file_with(const fs::path& path, const Write& write) {
-  if (auto made = make_folder(folder_of(path)); !made) return made;
+  if (auto created = make_folder(folder_of(path)); !created) return created;
   FileAside aside(path, readable_by_all);
   if (!aside.is_open()) return tl::unexpected<Failure>(cannot_write(path, errno));
   return write(aside.open_as()).and_then([&] { return replaced(aside, path); });

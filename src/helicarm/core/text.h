@@ -20,6 +20,14 @@ inline std::string without_control_characters(std::string text) {
   return text;
 }
 
+/// Without the blanks at both ends.
+constexpr std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view blanks = " \t\r\n\f\v";
+  const auto first = text.find_first_not_of(blanks);
+  return first == text.npos ? std::string_view{}
+                            : text.substr(first, text.find_last_not_of(blanks) - first + 1);
+}
+
 /// By its byte order mark, or the zero byte of its first letter.
 inline bool is_utf_16(std::string_view text) {
   return text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF") ||

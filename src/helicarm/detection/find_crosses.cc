@@ -42,19 +42,19 @@ struct Arms {
 };
 
 /// Directions in which the image is dark on both sides of a position, at two distances.
-std::optional<Arms> arms_at(const image::Image<float>& image, const Vector2d& place, double radius,
+std::optional<Arms> arms_at(const image::Image<float>& image, const Vector2d& position, double radius,
                             double sign, const CrossOptions& options) {
   std::array<double, ring_steps> dark{};
   const double reach = 1.6 * radius;
-  if (place.x() < reach || place.y() < reach || place.x() > image.width() - 1 - reach ||
-      place.y() > image.height() - 1 - reach)
+  if (position.x() < reach || position.y() < reach || position.x() > image.width() - 1 - reach ||
+      position.y() > image.height() - 1 - reach)
     return std::nullopt;
   for (int k = 0; k < ring_steps; ++k) {
     const double angle = std::numbers::pi * k / ring_steps;
     const Vector2d along(std::cos(angle), std::sin(angle));
     double brightest = -1e30;
     for (const double r : {radius, -radius, 1.5 * radius, -1.5 * radius}) {
-      const Vector2d p = place + r * along;
+      const Vector2d p = position + r * along;
       brightest = std::max(brightest, sign * double(bilinear(image, p.x(), p.y())));
     }
     dark[static_cast<std::size_t>(k)] = -brightest;

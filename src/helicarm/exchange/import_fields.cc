@@ -34,7 +34,7 @@ std::vector<FileField> xml_fields(std::string_view text, const std::string& orig
     at = end + 1;
     if (comment || tag.starts_with('!') || tag.starts_with('?')) continue;
     const bool closing = tag.starts_with('/'), empty = tag.ends_with('/');
-    std::string name = trimmed(tag.substr(closing, tag.find_first_of(" \t\r\n/", closing) - closing));
+    std::string name(trimmed(tag.substr(closing, tag.find_first_of(" \t\r\n/", closing) - closing)));
     if (!closing) open.push_back(name);
     if (open.size() > deepest || fields.size() > most_fields) malformed(origin, "too many XML elements");
     if (closing && (open.empty() || open.back() != name))

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "helicarm/core/text.h"
 #include "helicarm/exchange/import_matrix.h"
 
 /// The parts of `import_matrix`. All throw BadInput; `origin` and `where` begin the message.
@@ -16,7 +17,6 @@ inline constexpr double largest_number = 1e12;
 
 using Cameras = std::vector<ImportedMatrix>;
 
-std::string trimmed(std::string_view line);
 std::string without_byte_order_mark(const std::string& text);
 std::vector<double> numbers_in(std::string_view text, const std::string& where);
 /// Width, height; two whole numbers.

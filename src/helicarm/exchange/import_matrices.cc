@@ -26,7 +26,7 @@ std::string dictionary_value(std::string_view header, std::string_view key, char
   const std::size_t colon = at == header.npos ? header.npos : header.find(':', at);
   const std::size_t last = colon == header.npos ? header.npos : header.find(end, colon);
   if (last == header.npos) refuse_array(origin, Reason::truncated, fmt::format("the header has no {}", key));
-  return trimmed(header.substr(colon + 1, last - colon - 1));
+  return std::string(trimmed(header.substr(colon + 1, last - colon - 1)));
 }
 
 /// Of a float of `Stored` in the file's byte order.
@@ -47,7 +47,7 @@ Cameras parse_matrix_table(std::string_view text, const std::string& origin) {
   Cameras cameras;
   for (std::size_t at = text.find('\n'), line = 2; at != text.npos; ++line) {
     const std::size_t end = std::min(text.find('\n', at + 1), text.size());
-    const std::string row = trimmed(text.substr(at + 1, end - at - 1));
+    const std::string row(trimmed(text.substr(at + 1, end - at - 1)));
     at = end == text.size() ? text.npos : end;
     if (row.empty()) continue;
     const std::string where = fmt::format("{}: line {}", origin, line);

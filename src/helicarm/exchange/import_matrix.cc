@@ -54,9 +54,9 @@ ImportedMatrix camera_from(JsonReader& reader, const std::string& origin) {
   const auto t = reader.numbers("t", 3, {-largest_number, largest_number});
   reader.raw("warnings");
   const ImportedMatrix camera{camera_of(k, r, t, origin), std::nullopt, {}, true};
-  const geometry::View given =
+  const geometry::View stated_view =
       imported(reader.matrix("projection", 3, 4, {-largest_number, largest_number}), origin).view;
-  const geometry::Projection own = camera.view.projection(), stated = given.projection();
+  const geometry::Projection own = camera.view.projection(), stated = stated_view.projection();
   constexpr double rounding = 1e-4;
   if (std::min((own - stated).norm(), (own + stated).norm()) > rounding * own.norm())
     throw BadInput(Reason::bad_value,
@@ -204,7 +204,7 @@ Cameras parse_text_matrix(const std::string& text, const std::string& origin, co
     if (has_decimal_commas(trimmed(line)))
       throw BadInput(Reason::bad_value,
                      fmt::format("{}: \"{}\": numbers with a decimal comma: write them with a point", origin,
-                                 without_control_characters(trimmed(line).substr(0, 40))));
+                                 without_control_characters(std::string(trimmed(line).substr(0, 40)))));
     if (auto row = numbers_in(line, origin); !row.empty()) rows.push_back(std::move(row));
   }
   const auto all_have = [&](std::size_t count) {
@@ -286,11 +286,11 @@ void add_warnings(ImportedMatrix& camera, const std::string& origin) {
 
 /// The size, the rows' direction, mm and the warnings.
 void complete(ImportedMatrix& camera, const ImportOptions& options, const std::string& origin) {
-  const auto &given = options.image_size, &stated = camera.image_size;
-  if (given && stated && *given != *stated)
+  const auto &option = options.image_size, &stated = camera.image_size;
+  if (option && stated && *option != *stated)
     throw BadInput(Reason::bad_size, fmt::format("{}: is for images of {} x {}, --image-size states {} x {}",
-                                                 origin, stated->x(), stated->y(), given->x(), given->y()));
-  if (given) camera.image_size = given;
+                                                 origin, stated->x(), stated->y(), option->x(), option->y()));
+  if (option) camera.image_size = option;
   if (options.rows_upwards) {
     if (!camera.image_size)
       throw BadInput(Reason::usage,

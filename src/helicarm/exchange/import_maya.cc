@@ -12,7 +12,7 @@
 namespace helicarm::exchange {
 namespace {
 
-bool is_title(const std::string& line) {
+bool is_title(std::string_view line) {
   return !line.empty() && std::isalpha(static_cast<unsigned char>(line[0])) && !line.starts_with("nan") &&
          !line.starts_with("inf");
 }
@@ -66,15 +66,15 @@ Eigen::Matrix3d turn_about(int axis, double degrees) {
 void check_image_plane(const std::vector<double>& plane, const Eigen::Vector3d& expected, double scale,
                        const std::string& origin, ImportedMatrix& camera) {
   const double limit = std::max(2 * std::abs(scale), 1e-2 * std::abs(expected.z()));
-  const Eigen::Vector3d given(plane[0], plane[1], plane[2]);
-  const double apart = (given - expected).cwiseAbs().maxCoeff();
+  const Eigen::Vector3d centre(plane[0], plane[1], plane[2]);
+  const double apart = (centre - expected).cwiseAbs().maxCoeff();
   if (apart <= limit) return;
   camera.warnings.push_back(
       {Reason::tag_disagrees,
        fmt::format(
            "{}: line 3, the image plane {:g}, {:g}, {:g}, contradicts lines 4 and 5, which give {:g}, {:g}, "
            "{:g}; these are used",
-           origin, given.x(), given.y(), given.z(), expected.x(), expected.y(), expected.z()),
+           origin, centre.x(), centre.y(), centre.z(), expected.x(), expected.y(), expected.z()),
        {},
        {{"apart", apart}, {"limit", limit}}});
 }

@@ -175,10 +175,10 @@ std::vector<double> camera_matrix(const CameraKeys& file) {
         fmt::format("{}: is transposed, as MATLAB has it: transpose it and the rotation", file.where(key)));
   const auto skew = file.key_of({"skew", "alphac", "skewness"});
   if (skew.empty()) return k;
-  const double given = file.numbers(skew, 1)[0] * (key_word(skew) == "alphac" ? k[0] : 1);
-  if (std::abs(given - k[1]) > 1e-6 * std::abs(k[0]))
+  const double stated_skew = file.numbers(skew, 1)[0] * (key_word(skew) == "alphac" ? k[0] : 1);
+  if (std::abs(stated_skew - k[1]) > 1e-6 * std::abs(k[0]))
     throw BadInput(Reason::bad_value, fmt::format("{}: {:g} px, but the second number of {} is {:g}",
-                                                  file.where(skew), given, key, k[1]));
+                                                  file.where(skew), stated_skew, key, k[1]));
   return k;
 }
 
@@ -196,7 +196,7 @@ bool is_opencv_file(std::string_view text) {
   std::size_t at = 0;  // YAML: the first line is "key:"
   while (at < text.size()) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
-    const std::string line = trimmed(text.substr(at, end - at));
+    const std::string line(trimmed(text.substr(at, end - at)));
     at = end + 1;
     if (line.empty() || line[0] == '#' || line == "---") continue;
     const std::size_t colon = line.find(':');

@@ -40,7 +40,7 @@ constexpr std::string_view ants_marks[] = {"AffineTransform_", "MatrixOffsetTran
 bool is_toml(std::string_view text) {
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
-    const std::string line = trimmed(text.substr(at, end - at));
+    const std::string line(trimmed(text.substr(at, end - at)));
     at = end + 1;
     if (line.empty() || line[0] == '#') continue;
     const bool table = line.size() > 2 && line[0] == '[' && line.back() == ']' &&

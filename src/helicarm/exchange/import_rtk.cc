@@ -40,8 +40,8 @@ void check_matrix(const RtkProjection& projection, const FileField& field, const
   const auto numbers = numbers_in(field.text, where);
   if (numbers.size() != 12)
     throw BadInput(Reason::bad_size, fmt::format("{}: {} numbers, must be 12", where, numbers.size()));
-  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> given(numbers.data());
-  const double apart = (given - projection.matrix()).cwiseAbs().maxCoeff();
+  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(numbers.data());
+  const double apart = (matrix - projection.matrix()).cwiseAbs().maxCoeff();
   if (!(apart <= limit))
     throw BadInput(Reason::bad_value,
                    fmt::format("{}: differs by {:g} from the matrix of the parameters, limit {:g}", where,

@@ -56,7 +56,7 @@ std::vector<YamlLine> yaml_lines(std::string_view text) {
     at = end + 1;
     if (const auto comment = line.find(" #"); comment != line.npos && line.find_first_of("\"'") == line.npos)
       line = line.substr(0, comment);
-    std::string content = trimmed(line);
+    std::string content(trimmed(line));
     if (content.empty() || content[0] == '#' || content[0] == '%' || content == "---") continue;
     if (content == "...") break;
     const int change = open_brackets(content);
@@ -87,9 +87,9 @@ std::string written(std::string_view content) {
   const std::size_t colon = colon_of(content);
   if (colon == content.npos)
     return dashes + (is_plain(content) ? std::string(content) : with_quotes(content));
-  std::string name = trimmed(content.substr(0, colon));
+  std::string name(trimmed(std::string_view(content).substr(0, colon)));
   if (name.size() > 1 && (name[0] == '"' || name[0] == '\'')) name = name.substr(1, name.size() - 2);
-  const std::string value = trimmed(content.substr(colon + 1));
+  const std::string value(trimmed(std::string_view(content).substr(colon + 1)));
   return dashes + name + ": " + (is_plain(value) ? value : with_quotes(value));
 }
 
@@ -165,7 +165,7 @@ std::string cause_of(const cv::Exception& error) {
   const std::string_view words = error.what();
   const std::size_t open = words.find("in function '(");
   if (open == words.npos) return without_control_characters(error.err.substr(0, 100));
-  std::string cause = trimmed(words.substr(open + std::string_view("in function '").size()));
+  std::string cause(trimmed(std::string_view(words).substr(open + std::string_view("in function '").size())));
   std::erase(cause, '\'');
   return without_control_characters(cause.substr(0, 100));
 }

@@ -30,12 +30,6 @@ double number_from(std::string_view word, const std::string& where) {
 
 }  // namespace
 
-std::string trimmed(std::string_view line) {
-  const auto first = line.find_first_not_of(" \t\r\n");
-  return first == line.npos ? ""
-                            : std::string(line.substr(first, line.find_last_not_of(" \t\r\n") - first + 1));
-}
-
 std::string without_byte_order_mark(const std::string& text) {
   constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
   return text.starts_with(byte_order_mark) ? text.substr(byte_order_mark.size()) : text;

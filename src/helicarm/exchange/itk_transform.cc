@@ -36,7 +36,7 @@ ItkFile itk_file_from(const std::string& text, const std::string& origin) {
   for (std::string line; std::getline(lines, line);) {
     const auto colon = line.find(':');
     if (line.starts_with('#') || colon == line.npos) continue;
-    const std::string name = trimmed(std::string_view(line).substr(0, colon)), value = line.substr(colon + 1);
+    const std::string name(trimmed(std::string_view(line).substr(0, colon))), value = line.substr(colon + 1);
     if (name == "Transform" && !file.type.empty()) refuse_several(origin);
     if (name == "Transform") file.type = trimmed(value);
     if (name == "Parameters") file.parameters = numbers_in(value, origin + ": Parameters");
@@ -85,7 +85,7 @@ struct ItkType {
   std::size_t parameters;  ///< the last three are the translation
 };
 
-const ItkType& type_named(const std::string& given, const std::string& origin) {
+const ItkType& type_named(const std::string& type_name, const std::string& origin) {
   static constexpr std::array types{ItkType{"AffineTransform", ItkKind::matrix, 12},
                                     ItkType{"MatrixOffsetTransformBase", ItkKind::matrix, 12},
                                     ItkType{"Rigid3DTransform", ItkKind::matrix, 12},
@@ -93,13 +93,14 @@ const ItkType& type_named(const std::string& given, const std::string& origin) {
                                     ItkType{"VersorRigid3DTransform", ItkKind::versor, 6},
                                     ItkType{"QuaternionRigidTransform", ItkKind::quaternion, 7},
                                     ItkType{"TranslationTransform", ItkKind::translation, 3}};
-  if (given.empty()) throw BadInput(Reason::truncated, fmt::format("{}: Transform is missing", origin));
-  const std::string name = given.substr(0, given.find('_'));
+  if (type_name.empty()) throw BadInput(Reason::truncated, fmt::format("{}: Transform is missing", origin));
+  const std::string name = type_name.substr(0, type_name.find('_'));
   for (const ItkType& type : types)
-    if (type.name == name && (given.ends_with("_double_3_3") || given.ends_with("_float_3_3"))) return type;
+    if (type.name == name && (type_name.ends_with("_double_3_3") || type_name.ends_with("_float_3_3")))
+      return type;
   throw BadInput(Reason::unsupported,
                  fmt::format("{}: a transform {} is not read; save a linear one of 3D space", origin,
-                             given.substr(0, 60)));
+                             type_name.substr(0, 60)));
 }
 
 /// Groups, datasets and, before ITK 5, their misspelt names as in ITK's HDF5TransformIO.

@@ -48,7 +48,7 @@ Expected<std::optional<geometry::RigidTransform>> read_matrix_transform(const st
   const auto text = read_file(path, most_matrix_bytes);
   if (!text && text.error().reason == Reason::missing_file) return tl::unexpected<Failure>(text.error());
   if (!text) return std::nullopt;
-  const std::string origin = path.filename().string(), content = trimmed(without_byte_order_mark(*text));
+  const std::string origin = path.filename().string(), content(trimmed(without_byte_order_mark(*text)));
   const auto numbers = guarded([&] {
     return content.starts_with('{') || content.starts_with('[') ? numbers_of_json(content, origin)
                                                                 : numbers_of_rows(content);

@@ -10,7 +10,7 @@ namespace {
 /// Whether the disc labelled as `ball` may be that of two fiducials in one: an unlabelled fiducial lies
 /// within half its radius; or within its radius, and the other fiducials do not exclude the middle of the
 /// two.
-bool may_be_two(const Scene& scene, const Hypothesis& h, int ball) {
+bool may_be_two(const LabellingProblem& scene, const Hypothesis& h, int ball) {
   constexpr double excluded_sigmas = 4;
   const auto& own = scene.candidates[h.candidate_of_ball[ball]];
   std::vector<std::size_t> near;
@@ -36,7 +36,7 @@ bool may_be_two(const Scene& scene, const Hypothesis& h, int ball) {
 
 }  // namespace
 
-void drop_covered(const Scene& scene, Hypothesis& h) {
+void drop_covered(const LabellingProblem& scene, Hypothesis& h) {
   const Hypothesis full = h;
   for (std::size_t k = 0; k < scene.balls.size(); ++k) {
     const int own = full.candidate_of_ball[k];

@@ -6,6 +6,6 @@
 namespace helicarm::fiducials {
 
 /// Removes the label of a disc that may be two fiducials', or of a fiducial with two candidates in reach.
-void drop_covered(const Scene& scene, Hypothesis& h);
+void drop_covered(const LabellingProblem& scene, Hypothesis& h);
 
 }  // namespace helicarm::fiducials

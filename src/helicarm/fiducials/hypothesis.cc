@@ -34,7 +34,7 @@ struct RadiusEvidence {
 
 /// Agreement of the radii with the distances, marginalised over the common bias. Imprecise radii do not
 /// contribute.
-RadiusEvidence radius_evidence(const Scene& scene, const Hypothesis& h) {
+RadiusEvidence radius_evidence(const LabellingProblem& scene, const Hypothesis& h) {
   double weight = 0;
   double first = 0;
   double second = 0;
@@ -64,7 +64,7 @@ double log_factorial(double n) {
 
 /// Laplace approximation of the evidence. Prior, uniform each: rotation, centroid's image in the field, ln
 /// depth over its span, number of visible balls and which of them, mirrored or not.
-double log_odds(const Scene& scene, const std::vector<WeightedCorrespondence>& correspondences,
+double log_odds(const LabellingProblem& scene, const std::vector<WeightedCorrespondence>& correspondences,
                 const PoseFit& fit) {
   const double n = static_cast<double>(scene.candidates.size());
   const double b = static_cast<double>(scene.balls.size());
@@ -86,7 +86,8 @@ double log_odds(const Scene& scene, const std::vector<WeightedCorrespondence>& c
 /// Pairs balls and candidates one to one by increasing cost; pairs of infinite cost or outside the gate are
 /// excluded.
 template <class Cost>
-std::vector<int> assign(const Scene& scene, const geometry::View& view, double gate_px, const Cost& cost_of) {
+std::vector<int> assign(const LabellingProblem& scene, const geometry::View& view, double gate_px,
+                        const Cost& cost_of) {
   struct Pair {
     double cost;
     int ball;
@@ -128,7 +129,7 @@ std::vector<int> assign(const Scene& scene, const geometry::View& view, double g
 }
 
 /// Matches within the candidate's noise and, for balls that were not fitted, the fit's prediction.
-std::vector<int> match_within_noise(const Scene& scene, const Hypothesis& h) {
+std::vector<int> match_within_noise(const LabellingProblem& scene, const Hypothesis& h) {
   std::vector<Eigen::Matrix2d> prediction(scene.balls.size(), Eigen::Matrix2d::Zero());
   for (std::size_t k = 0; k < scene.balls.size(); ++k)
     if (h.candidate_of_ball[k] < 0) prediction[k] = prediction_covariance(h.fit, scene.balls[k].centre);
@@ -142,7 +143,7 @@ std::vector<int> match_within_noise(const Scene& scene, const Hypothesis& h) {
 }
 
 /// Squared studentised residual of a ball: its distance from the others' prediction, in sigmas.
-double studentised2(const Scene& scene, const Hypothesis& h, std::size_t ball) {
+double studentised2(const LabellingProblem& scene, const Hypothesis& h, std::size_t ball) {
   const auto& seen = scene.candidates[h.candidate_of_ball[ball]];
   const Eigen::Vector3d& centre = scene.balls[ball].centre;
   const Eigen::Vector2d off = seen.uv - h.fit.view.project(centre);
@@ -156,7 +157,7 @@ double studentised2(const Scene& scene, const Hypothesis& h, std::size_t ball) {
 }
 
 /// The balls farther than `sigmas` from the others' prediction, the farthest first.
-std::vector<int> beyond(const Scene& scene, const Hypothesis& h, double sigmas) {
+std::vector<int> beyond(const LabellingProblem& scene, const Hypothesis& h, double sigmas) {
   std::vector<std::pair<double, int>> off2;
   for (std::size_t k = 0; k < scene.balls.size(); ++k)
     if (h.candidate_of_ball[k] >= 0) off2.push_back({studentised2(scene, h, k), static_cast<int>(k)});
@@ -176,7 +177,7 @@ bool ExpectedView::allows(const geometry::View& other) const {
          std::abs(turned.angle()) <= within_deg * EIGEN_PI / 180;
 }
 
-double match_sigma_px(const Scene& scene, const geometry::View& view, std::size_t ball,
+double match_sigma_px(const LabellingProblem& scene, const geometry::View& view, std::size_t ball,
                       std::size_t candidate) {
   const double own = scene.candidates[candidate].sigma_px;
   const double of_ball = scene.balls[ball].sigma_mm;
@@ -184,7 +185,7 @@ double match_sigma_px(const Scene& scene, const geometry::View& view, std::size_
   return std::hypot(own, of_ball * view.intrinsics.fy / view.camera_from_world.translation.z());
 }
 
-std::vector<WeightedCorrespondence> correspondences_of(const Scene& scene,
+std::vector<WeightedCorrespondence> correspondences_of(const LabellingProblem& scene,
                                                        const std::vector<int>& candidate_of_ball,
                                                        const geometry::View& view) {
   std::vector<WeightedCorrespondence> correspondences;
@@ -197,7 +198,7 @@ std::vector<WeightedCorrespondence> correspondences_of(const Scene& scene,
   return correspondences;
 }
 
-Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const ModelBall& ball,
+Scale scale_by_radius(const LabellingProblem& scene, const BallCandidate& candidate, const ModelBall& ball,
                       double sigmas) {
   const double radius = candidate.radius_px / (1 + scene.radius_bias);
   const double spread = sigmas * std::hypot(candidate.radius_sigma_px, radius * scene.radius_bias_sigma);
@@ -205,14 +206,14 @@ Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const 
           radius > spread ? ball.radius_mm / (radius - spread) : infinity};
 }
 
-std::vector<int> match(const Scene& scene, const geometry::View& view, double gate_px) {
+std::vector<int> match(const LabellingProblem& scene, const geometry::View& view, double gate_px) {
   return assign(scene, view, gate_px, [&](std::size_t k, std::size_t i, const Eigen::Vector2d& off) {
     const double sigma = match_sigma_px(scene, view, k, i);
     return off.squaredNorm() / (sigma * sigma);
   });
 }
 
-Hypothesis match_and_fit(const Scene& scene, const geometry::View& rough, int least) {
+Hypothesis match_and_fit(const LabellingProblem& scene, const geometry::View& rough, int least) {
   Hypothesis h;
   h.fit.view = rough;
   h.log_odds = -infinity;
@@ -240,7 +241,7 @@ Hypothesis match_and_fit(const Scene& scene, const geometry::View& rough, int le
   return h;
 }
 
-void evaluate_odds(const Scene& scene, Hypothesis& h) {
+void evaluate_odds(const LabellingProblem& scene, Hypothesis& h) {
   const auto correspondences = correspondences_of(scene, h.candidate_of_ball, h.fit.view);
   h.matched = static_cast<int>(correspondences.size());
   h.residual2_px2 = 0;
@@ -250,16 +251,19 @@ void evaluate_odds(const Scene& scene, Hypothesis& h) {
   h.log_odds = log_odds(scene, correspondences, h.fit) + radii.log_odds;
 }
 
-std::vector<int> outlying(const Scene& scene, const Hypothesis& h) { return beyond(scene, h, 3.3); }
+std::vector<int> outlying(const LabellingProblem& scene, const Hypothesis& h) {
+  return beyond(scene, h, 3.3);
+}
 
-Hypothesis without(const Scene& scene, Hypothesis h, int ball) {
+Hypothesis without(const LabellingProblem& scene, Hypothesis h, int ball) {
   h.candidate_of_ball[ball] = -1;
   h.fit = fit_pose(h.fit.view, correspondences_of(scene, h.candidate_of_ball, h.fit.view), scene.camera,
                    fit_steps);
   return h;
 }
 
-std::vector<Hypothesis> with_pair(const Scene& scene, const Hypothesis& h, int ball, int candidate) {
+std::vector<Hypothesis> with_pair(const LabellingProblem& scene, const Hypothesis& h, int ball,
+                                  int candidate) {
   Hypothesis all = h;
   for (int& assigned : all.candidate_of_ball)
     if (assigned == candidate) assigned = -1;

@@ -35,7 +35,7 @@ struct ExpectedView {
 };
 
 /// One image's input to the labelling.
-struct Scene {
+struct LabellingProblem {
   std::vector<ModelBall> balls;
   std::vector<BallCandidate> candidates;  ///< sigma_px with its lower limit
   CameraPrior camera;
@@ -53,7 +53,7 @@ struct Scale {
 
   bool holds(double mm_per_px) const { return finest <= mm_per_px && mm_per_px <= coarsest; }
 };
-Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const ModelBall& ball,
+Scale scale_by_radius(const LabellingProblem& scene, const BallCandidate& candidate, const ModelBall& ball,
                       double sigmas);
 
 /// A pose and the candidate assigned to each ball (-1: none).
@@ -73,38 +73,39 @@ struct Hypothesis {
 
 /// Pairs balls and candidates one to one, nearest first, within `gate_px` and at a distance from the source
 /// that agrees with the candidate's radius.
-std::vector<int> match(const Scene& scene, const geometry::View& view, double gate_px);
+std::vector<int> match(const LabellingProblem& scene, const geometry::View& view, double gate_px);
 
 constexpr int fit_steps = 10;  ///< at most
 
 /// Per axis, px: the candidate's error and that of the ball's coordinates, projected.
-double match_sigma_px(const Scene& scene, const geometry::View& view, std::size_t ball,
+double match_sigma_px(const LabellingProblem& scene, const geometry::View& view, std::size_t ball,
                       std::size_t candidate);
 
 /// The matched balls as input of `fit_pose` near `view`.
-std::vector<WeightedCorrespondence> correspondences_of(const Scene& scene,
+std::vector<WeightedCorrespondence> correspondences_of(const LabellingProblem& scene,
                                                        const std::vector<int>& candidate_of_ball,
                                                        const geometry::View& view);
 
 /// Largest error of a pose from three points at the other balls.
-inline double rough_gate_px(const Scene& scene) { return 0.025 * scene.field_radius_px; }
+inline double rough_gate_px(const LabellingProblem& scene) { return 0.025 * scene.field_radius_px; }
 
 /// Alternates matching, with narrowing gates, and fitting from a rough pose until the matches are stable.
 /// With fewer than `least` matches, log_odds = -infinity.
-Hypothesis match_and_fit(const Scene& scene, const geometry::View& rough, int least = 4);
+Hypothesis match_and_fit(const LabellingProblem& scene, const geometry::View& rough, int least = 4);
 
 /// Sets the number of matches, residuals and log odds from the matches and the fit.
-void evaluate_odds(const Scene& scene, Hypothesis& h);
+void evaluate_odds(const LabellingProblem& scene, Hypothesis& h);
 
 /// The balls over 3.3 sigma (candidate and prediction) from their positions predicted by the others, the
 /// farthest first: one true ball of 230.
-std::vector<int> outlying(const Scene& scene, const Hypothesis& h);
+std::vector<int> outlying(const LabellingProblem& scene, const Hypothesis& h);
 
 /// `h` without a ball, fitted again; the odds are not updated.
-Hypothesis without(const Scene& scene, Hypothesis h, int ball);
+Hypothesis without(const LabellingProblem& scene, Hypothesis h, int ball);
 
 /// Variants of `h` with this pair: with all others, and without each that is then outlying, and those that
 /// still are after its removal.
-std::vector<Hypothesis> with_pair(const Scene& scene, const Hypothesis& h, int ball, int candidate);
+std::vector<Hypothesis> with_pair(const LabellingProblem& scene, const Hypothesis& h, int ball,
+                                  int candidate);
 
 }  // namespace helicarm::fiducials

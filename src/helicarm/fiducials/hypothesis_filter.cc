@@ -134,7 +134,7 @@ void count_near(const ModelTriangles<Simd>& model, const Depths<Simd>& depths, c
 
 }  // namespace
 
-CandidateGrid::CandidateGrid(const Scene& scene) : cell_px_(rough_gate_px(scene) / reach) {
+CandidateGrid::CandidateGrid(const LabellingProblem& scene) : cell_px_(rough_gate_px(scene) / reach) {
   low_px_ = scene.candidates.front().uv.array();
   Eigen::Array2d high = low_px_;
   for (const auto& candidate : scene.candidates) {
@@ -156,7 +156,7 @@ CandidateGrid::CandidateGrid(const Scene& scene) : cell_px_(rough_gate_px(scene)
   }
 }
 
-HypothesisFilter::HypothesisFilter(const Scene& scene) : scene_(scene), near_(scene) {
+HypothesisFilter::HypothesisFilter(const LabellingProblem& scene) : scene_(scene), near_(scene) {
   const auto count = scene.balls.size();
   for (const auto& ball : scene.balls) balls_.push_back(ball.centre.cast<float>());
   std::vector<float> a, b, c;

@@ -15,7 +15,7 @@ namespace helicarm::fiducials {
 /// projected ball.
 class CandidateGrid {
  public:
-  explicit CandidateGrid(const Scene& scene);
+  explicit CandidateGrid(const LabellingProblem& scene);
 
   /// Increments `count` where image coordinates, in cells, lie near a candidate.
   template <int width>
@@ -54,7 +54,7 @@ struct PoseHypothesis {
 class HypothesisFilter {
  public:
   /// The scene must outlive the filter.
-  explicit HypothesisFilter(const Scene& scene);
+  explicit HypothesisFilter(const LabellingProblem& scene);
 
   /// Poses of all ordered triples of balls whose radii agree with the distance within three sigma and that
   /// have candidates near at least `required` balls.
@@ -80,7 +80,7 @@ class HypothesisFilter {
   void gather_starts(const std::array<int, 3>& candidates, const Image& image);
   void test(const Start* starts, int used, const Image& image, int required);
 
-  const Scene& scene_;
+  const LabellingProblem& scene_;
   CandidateGrid near_;
   std::vector<Eigen::Vector3f> balls_;
   std::vector<Triangle> triangles_;  ///< not nearly collinear, ordered by first ball

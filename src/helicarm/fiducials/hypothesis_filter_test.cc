@@ -13,8 +13,8 @@ namespace {
 
 using namespace label_scene;
 
-Scene scene_of(const phantom::Calibrator& calibrator, const SyntheticImage& view_image) {
-  Scene scene;
+LabellingProblem scene_of(const phantom::Calibrator& calibrator, const SyntheticImage& view_image) {
+  LabellingProblem scene;
   for (const auto& ball : calibrator.balls)
     scene.balls.push_back({ball.centre_in_calibrator, ball.diameter_mm / 2});
   scene.candidates = view_image.candidates;
@@ -27,7 +27,7 @@ Scene scene_of(const phantom::Calibrator& calibrator, const SyntheticImage& view
 
 /// Scalar reference in double precision: number of balls with a candidate within `reach` rough gates; -1 if
 /// the pose does not exist or a radius contradicts it.
-int support(const Scene& scene, const std::array<int, 3>& candidates, const PoseHypothesis& pose,
+int support(const LabellingProblem& scene, const std::array<int, 3>& candidates, const PoseHypothesis& pose,
             double reach, double radius_sigmas) {
   std::array<Eigen::Vector2d, 3> image;
   std::array<Eigen::Vector3d, 3> points;
@@ -73,7 +73,7 @@ TEST(HypothesisFilter, PassesTheSamePosesAsTheScalarReference) {
     RandomStream random(6, 1, trial);
     const phantom::Calibrator calibrator = trial % 2 == 0 ? helix() : scattered(9, 3);
     const auto view_image = image_of(calibrator, {.outliers = 6, .noise_px = 0.3}, random);
-    const Scene scene = scene_of(calibrator, view_image);
+    const LabellingProblem scene = scene_of(calibrator, view_image);
     const std::array<int, 3> candidates{0, 3, 5};
     HypothesisFilter hypothesis_filter(scene);
     const auto filtered = hypothesis_filter.filter(candidates, scene.camera.focal_px, required);
@@ -98,7 +98,7 @@ TEST(HypothesisFilter, PassesTheSamePosesAsTheScalarReference) {
 TEST(HypothesisFilter, NoPosePassesWithoutSupport) {
   RandomStream random(6, 2);
   const auto view_image = image_of(helix(), {.noise_px = 0.3}, random);
-  const Scene scene = scene_of(helix(), view_image);
+  const LabellingProblem scene = scene_of(helix(), view_image);
   EXPECT_TRUE(HypothesisFilter(scene).filter({0, 1, 2}, scene.camera.focal_px, 13).empty());
 }
 

@@ -16,7 +16,7 @@ using namespace label_scene;
 
 /// A noise-free lateral image in which candidate k is ball k.
 struct SyntheticScene {
-  Scene scene;
+  LabellingProblem scene;
   geometry::View view;
 };
 

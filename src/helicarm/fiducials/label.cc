@@ -25,9 +25,9 @@ Eigen::Vector3d centroid(const phantom::Calibrator& calibrator) {
   return sum / static_cast<double>(calibrator.balls.size());
 }
 
-Scene scene_of(const phantom::Calibrator& calibrator, const std::vector<BallCandidate>& candidates,
-               const LabellingPrior& prior, const LabellingOptions& options) {
-  Scene scene;
+LabellingProblem scene_of(const phantom::Calibrator& calibrator, const std::vector<BallCandidate>& candidates,
+                          const LabellingPrior& prior, const LabellingOptions& options) {
+  LabellingProblem scene;
   const Eigen::Vector3d centre = centroid(calibrator);
   const auto covariances = phantom::ball_covariances(calibrator);
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
@@ -95,7 +95,7 @@ bool contradicts(const Hypothesis& rival, const Hypothesis& h) {
 /// different calibrator, of which a few fiducials fit by chance.
 Hypothesis loose_best(const LabelSearch& search, const LabellingOptions& options) {
   const Hypothesis& best = search.ranking().front();
-  Scene loose = search.scene();
+  LabellingProblem loose = search.scene();
   for (auto& candidate : loose.candidates) {
     candidate.sigma_px = std::hypot(candidate.sigma_px, 0.006 * loose.field_radius_px);
   }
@@ -118,10 +118,10 @@ tl::unexpected<Failure> too_few(int balls, int candidates) {
 }
 
 /// Factor on the variance: a stated tolerance is uncertain by about 40 %.
-double variance_allowance(const Scene& scene) { return scene.balls.front().sigma_mm > 0 ? 2 : 1; }
+double variance_allowance(const LabellingProblem& scene) { return scene.balls.front().sigma_mm > 0 ? 2 : 1; }
 
 /// Whether chi-square exceeds its limit, also without the worst fiducial, which may be an outlier.
-bool is_inconsistent(const Scene& scene, const Hypothesis& h) {
+bool is_inconsistent(const LabellingProblem& scene, const Hypothesis& h) {
   const double allowance = variance_allowance(scene);
   if (chi2_excess(h.fit.chi2 / allowance, 2 * h.matched - 6) < chi2_sigmas) return false;
   Hypothesis kept = h;
@@ -133,7 +133,7 @@ bool is_inconsistent(const Scene& scene, const Hypothesis& h) {
 
 /// The reason to refuse the best hypothesis, if any.
 std::optional<Failure> refusal_of(const LabelSearch& search, const LabellingOptions& options) {
-  const Scene& scene = search.scene();
+  const LabellingProblem& scene = search.scene();
   const Ranking& ranking = search.ranking();
   const int n = static_cast<int>(scene.candidates.size());
   if (ranking.empty() || ranking.front().log_odds <= 0) {
@@ -193,18 +193,18 @@ Hypothesis best_by_own_errors(const LabelSearch& search, const LabellingOptions&
 /// Whether `rival` labels more fiducials and is almost as good if the source distance is wrong, for which the
 /// prior odds are 1 to 1000: then labels of a helix shifted by one, which keep the handedness, may fit better
 /// than the true ones.
-bool fits_another_distance(const Scene& scene, const Hypothesis& h, const Hypothesis& rival,
+bool fits_another_distance(const LabellingProblem& scene, const Hypothesis& h, const Hypothesis& rival,
                            double required) {
   constexpr double wrong_focal_sigma = 0.1;  // relative
   constexpr double wrong_log_odds = -6.9;
   if (rival.matched <= h.matched || rival.mirrored() != h.mirrored()) return false;
-  Scene wrong = scene;
+  LabellingProblem wrong = scene;
   wrong.camera.focal_sigma = std::max(wrong_focal_sigma, scene.camera.focal_sigma);
   return refitted(wrong, rival).log_odds + wrong_log_odds > h.log_odds - required;
 }
 
 /// Whether `h` does not exceed `rival` by the required log odds.
-bool is_close(const Scene& scene, const Hypothesis& h, const Hypothesis& rival, double required) {
+bool is_close(const LabellingProblem& scene, const Hypothesis& h, const Hypothesis& rival, double required) {
   if (fits_another_distance(scene, h, rival, required)) return true;
   const double margin = h.log_odds - rival.log_odds;
   if (margin >= comparison_width * required) return false;
@@ -216,7 +216,7 @@ bool is_close(const Scene& scene, const Hypothesis& h, const Hypothesis& rival, 
 /// The best hypothesis without outlying fiducials and without labels that a rival almost as good contradicts.
 /// Refused if fewer than six labels remain.
 Expected<Hypothesis> unambiguous(LabelSearch& search, const LabellingOptions& options) {
-  const Scene& scene = search.scene();
+  const LabellingProblem& scene = search.scene();
   Hypothesis best = best_by_own_errors(search, options);
   const int dof = 2 * best.matched - 6;
   // If chi2 exceeds its expectation by over 1.5 sigma, the required odds grow in proportion.
@@ -287,7 +287,7 @@ LabellingAttempt attempt_labels(const phantom::Calibrator& calibrator,
   constexpr int least_shown = 4;
   const int n = static_cast<int>(candidates.size());
   if (n < least_shown) return {{}, too_few(n, n).value()};
-  const Scene scene = scene_of(calibrator, candidates, prior, options);
+  const LabellingProblem scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
   search.try_expected();
   // By then, a labelling with one fiducial less would have been found, too.

@@ -11,15 +11,16 @@ double variance_factor(const Hypothesis& h) { return h.fit.chi2 / std::max(1, 2 
 
 }  // namespace
 
-Hypothesis refitted(const Scene& scene, Hypothesis h) {
+Hypothesis refitted(const LabellingProblem& scene, Hypothesis h) {
   h.fit = fit_pose(h.fit.view, correspondences_of(scene, h.candidate_of_ball, h.fit.view), scene.camera,
                    fit_steps);
   evaluate_odds(scene, h);
   return h;
 }
 
-std::optional<double> fine_margin(const Scene& scene, const Hypothesis& h, const Hypothesis& rival) {
-  Scene fine = scene;
+std::optional<double> fine_margin(const LabellingProblem& scene, const Hypothesis& h,
+                                  const Hypothesis& rival) {
+  LabellingProblem fine = scene;
   for (BallCandidate& candidate : fine.candidates) {
     if (candidate.own_sigma_px == 0) return std::nullopt;
     candidate.sigma_px = candidate.own_sigma_px;

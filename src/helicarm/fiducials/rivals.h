@@ -8,10 +8,11 @@
 namespace helicarm::fiducials {
 
 /// `h` with its pose fitted again and its odds evaluated in `scene`, which has other errors or priors.
-Hypothesis refitted(const Scene& scene, Hypothesis h);
+Hypothesis refitted(const LabellingProblem& scene, Hypothesis h);
 
 /// Log odds of `h` over `rival` with each candidate's `own_sigma_px`, inflated by the smaller reduced
 /// chi-square of the two fits if that exceeds 1. Empty if a candidate has no own sigma.
-std::optional<double> fine_margin(const Scene& scene, const Hypothesis& h, const Hypothesis& rival);
+std::optional<double> fine_margin(const LabellingProblem& scene, const Hypothesis& h,
+                                  const Hypothesis& rival);
 
 }  // namespace helicarm::fiducials

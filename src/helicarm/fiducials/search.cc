@@ -46,7 +46,7 @@ class TripleSampler {
 
 }  // namespace
 
-LabelSearch::LabelSearch(const Scene& scene, std::vector<double> focals_px)
+LabelSearch::LabelSearch(const LabellingProblem& scene, std::vector<double> focals_px)
     : scene_(scene),
       focals_px_(std::move(focals_px)),
       flat_px_(0.04 * scene.field_radius_px),
@@ -171,10 +171,10 @@ void LabelSearch::keep(Hypothesis hypothesis) {
     if (same->log_odds >= hypothesis.log_odds) return;
     ranking_.erase(same);
   }
-  const auto place =
+  const auto behind_better =
       std::upper_bound(ranking_.begin(), ranking_.end(), hypothesis,
                        [](const Hypothesis& p, const Hypothesis& q) { return p.log_odds > q.log_odds; });
-  ranking_.insert(place, std::move(hypothesis));
+  ranking_.insert(behind_better, std::move(hypothesis));
   if (ranking_.size() > most_kept) ranking_.pop_back();
 }
 

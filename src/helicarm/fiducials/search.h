@@ -21,7 +21,7 @@ using Ranking = std::vector<Hypothesis>;
 class LabelSearch {
  public:
   /// `focals_px`: the focal lengths at which poses are tried. The scene must outlive the search.
-  LabelSearch(const Scene& scene, std::vector<double> focals_px);
+  LabelSearch(const LabellingProblem& scene, std::vector<double> focals_px);
 
   /// False if the three are nearly collinear or have been tried.
   bool try_triple(std::array<int, 3> candidates);
@@ -41,7 +41,7 @@ class LabelSearch {
 
   /// Up to `most` poses with candidates near at least `required` balls, by decreasing number.
   std::vector<geometry::View> supported(int required, std::size_t most) const;
-  const Scene& scene() const { return scene_; }
+  const LabellingProblem& scene() const { return scene_; }
 
  private:
   struct Rough {
@@ -54,7 +54,7 @@ class LabelSearch {
   void try_pose(const geometry::View& rough, double depth_sign);
   void keep(Hypothesis hypothesis);
 
-  const Scene& scene_;
+  const LabellingProblem& scene_;
   std::vector<double> focals_px_;
   double flat_px_;                  ///< least height of an image triangle
   Eigen::Matrix3d principal_axes_;  ///< of the balls, columns

@@ -18,14 +18,14 @@ PointInFrames point_at(double x, bool in_tool) {
   return point;
 }
 
-TEST(PlanTunnel, AxisRunsFromStartToEnd) {
+TEST(MarkupLine, AxisRunsFromStartToEnd) {
   const auto tunnel = plan_tunnel("femur", point_at(40, true), point_at(10, true), {}, {});
   ASSERT_TRUE(tunnel.has_value());
   EXPECT_EQ(*tunnel->axis_in_tool, Eigen::Vector3d(-1, 0, 0));
   EXPECT_DOUBLE_EQ(*tunnel->length_mm, 30);
 }
 
-TEST(PlanTunnel, WithoutATrackerOnlyTheLengthIsGiven) {
+TEST(MarkupLine, WithoutATrackerOnlyTheLengthIsGiven) {
   const auto tunnel = plan_tunnel("femur", point_at(40, false), point_at(10, false), {}, {});
   ASSERT_TRUE(tunnel.has_value());
   EXPECT_FALSE(tunnel->start_in_tool);
@@ -33,13 +33,13 @@ TEST(PlanTunnel, WithoutATrackerOnlyTheLengthIsGiven) {
   EXPECT_DOUBLE_EQ(*tunnel->length_mm, 30);
 }
 
-TEST(PlanTunnel, EntryAtExitIsRefused) {
+TEST(MarkupLine, EntryAtExitIsRefused) {
   const auto tunnel = plan_tunnel("femur", point_at(10, true), point_at(10, true), {}, {});
   ASSERT_FALSE(tunnel.has_value());
   EXPECT_EQ(tunnel.error().reason, Reason::bad_tunnel);
 }
 
-TEST(PlanTunnel, LongerThanAKneeIsRefused) {
+TEST(MarkupLine, LongerThanAKneeIsRefused) {
   EXPECT_FALSE(plan_tunnel("femur", point_at(0, true), point_at(200.1, true), {}, {}).has_value());
 }
 
@@ -55,7 +55,7 @@ PointInFrames propagated_point(double x, const Eigen::Matrix<double, 3, 2>& by_c
   return point;
 }
 
-TEST(PlanTunnel, AxisErrorAgreesWithMonteCarloOfSharedErrors) {
+TEST(MarkupLine, AxisErrorAgreesWithMonteCarloOfSharedErrors) {
   const Eigen::MatrixXd calibration = Eigen::Vector2d(0.04, 0.09).asDiagonal();
   Eigen::Matrix<double, 3, 2> of_start;
   Eigen::Matrix<double, 3, 2> of_end;
@@ -86,7 +86,7 @@ TEST(PlanTunnel, AxisErrorAgreesWithMonteCarloOfSharedErrors) {
   EXPECT_LT((across - expected).norm(), 0.04 * across.norm());
 }
 
-TEST(PlanTunnel, MotionCommonToBothEndsDoesNotTurnTheAxis) {
+TEST(MarkupLine, MotionCommonToBothEndsDoesNotTurnTheAxis) {
   const Eigen::MatrixXd calibration = 25 * Eigen::Matrix2d::Identity();
   const Eigen::Matrix<double, 3, 2> shared = Eigen::Matrix<double, 3, 2>::Ones();
   const auto tunnel = plan_tunnel("femur", propagated_point(0, shared, calibration),

@@ -16,10 +16,10 @@ double sigma_of(const BodyMigration& body, int i) {
 }
 
 Precision precision_of(const std::string& name, const std::vector<const BodyMigration*>& found) {
-  Precision made{.body = name, .n = int(found.size())};
-  const double n = made.n;
+  Precision precision{.body = name, .n = int(found.size())};
+  const double n = precision.n;
   for (int i = 0; i < 6; ++i) {
-    ZeroMotion& number = made.numbers[std::size_t(i)];
+    ZeroMotion& number = precision.numbers[std::size_t(i)];
     double squares = 0, stated = 0;
     for (const BodyMigration* body : found) number.mean += value_of(*body, i) / n;
     for (const BodyMigration* body : found) {
@@ -31,10 +31,10 @@ Precision precision_of(const std::string& name, const std::vector<const BodyMigr
     number.stated_sigma = std::sqrt(stated / n);
   }
   for (const BodyMigration* body : found) {
-    made.mtpm_mean_mm += body->mtpm_mm / n;
-    made.mtpm_largest_mm = std::max(made.mtpm_largest_mm, body->mtpm_mm);
+    precision.mtpm_mean_mm += body->mtpm_mm / n;
+    precision.mtpm_largest_mm = std::max(precision.mtpm_largest_mm, body->mtpm_mm);
   }
-  return made;
+  return precision;
 }
 
 }  // namespace
@@ -48,10 +48,10 @@ std::vector<Precision> precision_of(const std::vector<NamedMigration>& doubles) 
       if (found == of_name.end()) found = of_name.insert(found, {name, {}});
       found->second.push_back(&body);
     }
-  std::vector<Precision> made;
+  std::vector<Precision> precisions;
   for (const auto& [name, found] : of_name)
-    if (found.size() > 1) made.push_back(precision_of(name, found));
-  return made;
+    if (found.size() > 1) precisions.push_back(precision_of(name, found));
+  return precisions;
 }
 
 }  // namespace helicarm::migration

@@ -42,9 +42,9 @@ std::optional<Eigen::Matrix3d> covariance_in(const CsvTable& table, std::size_t 
   const std::array<std::optional<double>, 3> sigma{table.optional_number(row, "sx_mm"),
                                                    table.optional_number(row, "sy_mm"),
                                                    table.optional_number(row, "sz_mm")};
-  const auto given = std::ranges::count_if(sigma, [](const auto& each) { return each.has_value(); });
-  if (given == 0) return std::nullopt;
-  if (given < 3)
+  const auto stated = std::ranges::count_if(sigma, [](const auto& each) { return each.has_value(); });
+  if (stated == 0) return std::nullopt;
+  if (stated < 3)
     throw BadInput(Reason::bad_value, fmt::format("{}: row {}: sx_mm, sy_mm and sz_mm must be given together",
                                                   exam.name, row + 2));
   for (const auto& each : sigma)

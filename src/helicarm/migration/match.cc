@@ -70,14 +70,14 @@ Fitted fitted(Match match, const std::vector<Marker>& first, const std::vector<M
   std::vector<Eigen::Vector3d> from, to;
   for (std::size_t n = 0; n < match.first.size(); ++n)
     from.push_back(first[match.first[n]].place), to.push_back(second[match.second[n]].place);
-  Fitted made{std::move(match), geometry::absolute_pose(from, to), 0};
+  Fitted fitted{std::move(match), geometry::absolute_pose(from, to), 0};
   for (std::size_t n = 0; n < from.size(); ++n) {
     double variance = usual_mm * usual_mm;
-    for (const Marker* marker : {&first[made.match.first[n]], &second[made.match.second[n]]})
+    for (const Marker* marker : {&first[fitted.match.first[n]], &second[fitted.match.second[n]]})
       if (marker->covariance) variance += marker->covariance->trace() / 3;
-    made.chi2 += (made.pose * from[n] - to[n]).squaredNorm() / variance;
+    fitted.chi2 += (fitted.pose * from[n] - to[n]).squaredNorm() / variance;
   }
-  return made;
+  return fitted;
 }
 
 Expected<Match> enough(const std::string& what, Match match) {

@@ -147,42 +147,42 @@ Matched matched_segment(const Exam& first, const Exam& second, const Segment& se
   const Match match =
       value_or_throw(matching == Matching::name ? match_by_name(what, of_first, of_second)
                                                 : match_by_geometry(what, of_first, of_second, reach_mm));
-  Matched made;
-  made.segment.name = segment.name;
+  Matched matched;
+  matched.segment.name = segment.name;
   for (std::size_t n = 0; n < match.first.size(); ++n) {
-    made.first.push_back(of_first[match.first[n]]);
-    made.second.push_back(of_second[match.second[n]]);
+    matched.first.push_back(of_first[match.first[n]]);
+    matched.second.push_back(of_second[match.second[n]]);
   }
   for (std::size_t i = 0; i < of_first.size(); ++i)
-    if (std::ranges::count(match.first, i) == 0) made.segment.missing.push_back(of_first[i].name);
-  if (!made.segment.missing.empty())
+    if (std::ranges::count(match.first, i) == 0) matched.segment.missing.push_back(of_first[i].name);
+  if (!matched.segment.missing.empty())
     warnings.push_back(
         {Reason::marker_lost,
-         fmt::format("{}: {} of {} markers have no partner in {}: {}", what, made.segment.missing.size(),
-                     of_first.size(), second.name, fmt::join(made.segment.missing, ", ")),
+         fmt::format("{}: {} of {} markers have no partner in {}: {}", what, matched.segment.missing.size(),
+                     of_first.size(), second.name, fmt::join(matched.segment.missing, ", ")),
          {},
          {}});
-  require_spread(segment.name, made.first);
-  made.refit();
-  require_rigid(made, warnings);
-  require_spread(segment.name, made.first);
-  for (std::size_t n = 0; n < made.first.size(); ++n) {
-    made.segment.first.push_back(made.first[n].name);
-    made.segment.second.push_back(made.second[n].name);
-    made.segment.places.push_back(made.first[n].place);
-    for (const Marker* marker : {&made.first[n], &made.second[n]})
+  require_spread(segment.name, matched.first);
+  matched.refit();
+  require_rigid(matched, warnings);
+  require_spread(segment.name, matched.first);
+  for (std::size_t n = 0; n < matched.first.size(); ++n) {
+    matched.segment.first.push_back(matched.first[n].name);
+    matched.segment.second.push_back(matched.second[n].name);
+    matched.segment.places.push_back(matched.first[n].place);
+    for (const Marker* marker : {&matched.first[n], &matched.second[n]})
       if (marker->ray_gap_mm)
-        made.segment.ray_gap_mm = std::max(made.segment.ray_gap_mm.value_or(0), *marker->ray_gap_mm);
+        matched.segment.ray_gap_mm = std::max(matched.segment.ray_gap_mm.value_or(0), *marker->ray_gap_mm);
   }
-  made.segment.condition_per_m = track::condition_per_m(made.segment.places);
-  if (made.segment.condition_per_m > condition_limit_per_m)
+  matched.segment.condition_per_m = track::condition_per_m(matched.segment.places);
+  if (matched.segment.condition_per_m > condition_limit_per_m)
     warnings.push_back({Reason::body_ill_conditioned,
                         fmt::format("{}: condition number {:.0f} per metre, limit {:g}: its markers are too "
                                     "near one line or each other for its rotations",
-                                    what, made.segment.condition_per_m, condition_limit_per_m),
+                                    what, matched.segment.condition_per_m, condition_limit_per_m),
                         {},
-                        {{"condition_per_m", made.segment.condition_per_m}}});
-  return made;
+                        {{"condition_per_m", matched.segment.condition_per_m}}});
+  return matched;
 }
 
 /// No marker of the second examination serves two segments.
@@ -199,12 +199,12 @@ void require_own_markers(const std::vector<Matched>& all) {
 }
 
 /// The errors that the residuals show, where the examinations state none, or larger ones.
-void take_errors(Migration& made, std::vector<Matched>& all) {
+void take_errors(Migration& migration, std::vector<Matched>& all) {
   bool is_stated = true;
   double squares = 0, expected = 0;
   for (const Matched& each : all) {
     squares += each.segment.fit.squares_mm2;
-    made.freedom += 3.0 * double(each.first.size()) - 6;
+    migration.freedom += 3.0 * double(each.first.size()) - 6;
     for (const auto* markers : {&each.first, &each.second})
       for (const Marker& marker : *markers) is_stated = is_stated && marker.covariance.has_value();
     expected += each.segment.fit.expected_squares_mm2;
@@ -212,10 +212,11 @@ void take_errors(Migration& made, std::vector<Matched>& all) {
   if (is_stated) {
     // Residuals that the stated errors do not explain (chi-square, 0.1 %) widen them.
     const double excess = squares / expected;
-    const double factor = excess * made.freedom > chi2_quantile(made.freedom, normal_at_999) ? excess : 1;
+    const double factor =
+        excess * migration.freedom > chi2_quantile(migration.freedom, normal_at_999) ? excess : 1;
     for (Matched& each : all) each.segment.fit.covariance *= factor;
     if (factor > 1)
-      made.warnings.push_back(
+      migration.warnings.push_back(
           {Reason::residual_too_large,
            fmt::format("the markers' residuals are {:.1f} times their stated errors, which "
                        "are widened by as much",
@@ -224,12 +225,12 @@ void take_errors(Migration& made, std::vector<Matched>& all) {
            {{"ratio", std::sqrt(factor)}}});
     return;
   }
-  made.is_by_residuals = true;
-  made.width_of_95 = student_975(made.freedom);
+  migration.is_by_residuals = true;
+  migration.width_of_95 = student_975(migration.freedom);
   for (Matched& each : all) {
     for (std::vector<Marker>* markers : {&each.first, &each.second})
       for (Marker& marker : *markers)
-        marker.covariance = squares / made.freedom / 2 * Eigen::Matrix3d::Identity();
+        marker.covariance = squares / migration.freedom / 2 * Eigen::Matrix3d::Identity();
     each.refit();
   }
 }
@@ -258,27 +259,29 @@ BodyMigration migration_of(const std::vector<Matched>& all, std::size_t index, c
   const track::FramePose relative =
       track::relative_pose({reference.second_from_first, reference.covariance}, reference.centre,
                            {body.second_from_first, body.covariance}, body.centre);
-  BodyMigration made{.segment = index, .motion = relative.pose};
-  made.centre = geometry::mean_of(all[index].segment.places);
+  BodyMigration body_migration{.segment = index, .motion = relative.pose};
+  body_migration.centre = geometry::mean_of(all[index].segment.places);
   const Eigen::Matrix3d rotation = axes.transpose() * relative.pose.rotation * axes;
-  made.rotation_deg = degrees * angles_of(rotation);
-  made.translation_mm = axes.transpose() * (relative.pose * made.centre - made.centre);
-  made.turn_deg = degrees * geometry::vector_from_rotation(rotation).norm();
+  body_migration.rotation_deg = degrees * angles_of(rotation);
+  body_migration.translation_mm =
+      axes.transpose() * (relative.pose * body_migration.centre - body_migration.centre);
+  body_migration.turn_deg = degrees * geometry::vector_from_rotation(rotation).norm();
   registration::RigidCovariance slope = registration::RigidCovariance::Zero();
   slope.topLeftCorner<3, 3>() = angles_by_step(rotation) * axes.transpose();
   slope.bottomRightCorner<3, 3>() = axes.transpose();
-  made.covariance = slope * relative.covariance * slope.transpose();
+  body_migration.covariance = slope * relative.covariance * slope.transpose();
   for (std::size_t n = 0; n < all[index].first.size(); ++n) {
-    const Eigen::Vector3d &place = all[index].first[n].place, now = relative.pose * place;
-    const Eigen::Vector3d motion = now - place;
-    if (n > 0 && motion.norm() <= made.mtpm_mm) continue;
-    const auto by_step = track::point_by_step(now, relative.pose * made.centre);
+    const Eigen::Vector3d &position = all[index].first[n].place, now = relative.pose * position;
+    const Eigen::Vector3d motion = now - position;
+    if (n > 0 && motion.norm() <= body_migration.mtpm_mm) continue;
+    const auto by_step = track::point_by_step(now, relative.pose * body_migration.centre);
     const Eigen::Vector3d along = motion.norm() > 0 ? motion.normalized() : Eigen::Vector3d::UnitX();
-    made.mtpm_mm = motion.norm();
-    made.mtpm_sigma_mm = std::sqrt(along.dot(by_step * relative.covariance * by_step.transpose() * along));
-    made.mtpm_marker = all[index].first[n].name;
+    body_migration.mtpm_mm = motion.norm();
+    body_migration.mtpm_sigma_mm =
+        std::sqrt(along.dot(by_step * relative.covariance * by_step.transpose() * along));
+    body_migration.mtpm_marker = all[index].first[n].name;
   }
-  return made;
+  return body_migration;
 }
 
 }  // namespace
@@ -299,15 +302,16 @@ Expected<Migration> migrate(const Exam& first, const Exam& second, const Migrati
     if (!(options.axes.transpose() * options.axes).isIdentity(1e-6) || !(options.axes.determinant() > 0))
       throw BadInput(Reason::bad_value,
                      "axes: x, y and z are not perpendicular, of length 1 and right-handed");
-    Migration made;
+    Migration migration;
     std::vector<Matched> all;
     for (const Segment& segment : segments_of(first, options))
-      all.push_back(matched_segment(first, second, segment, options.matching, made.warnings));
+      all.push_back(matched_segment(first, second, segment, options.matching, migration.warnings));
     require_own_markers(all);
-    take_errors(made, all);
-    for (std::size_t i = 1; i < all.size(); ++i) made.bodies.push_back(migration_of(all, i, options.axes));
-    for (Matched& each : all) made.segments.push_back(std::move(each.segment));
-    return made;
+    take_errors(migration, all);
+    for (std::size_t i = 1; i < all.size(); ++i)
+      migration.bodies.push_back(migration_of(all, i, options.axes));
+    for (Matched& each : all) migration.segments.push_back(std::move(each.segment));
+    return migration;
   });
 }
 

@@ -227,7 +227,7 @@ Expected<MigrationAnswer> answer(const MigrationRequest& request) {
                  b = value_or_throw(read_exam(second, request.frame));
       return NamedMigration{a.name, b.name, value_or_throw(migrate(a, b, options))};
     };
-    MigrationAnswer made{between(request.first, request.second), {}, {}, options.axes};
+    MigrationAnswer migration_answer{between(request.first, request.second), {}, {}, options.axes};
     for (const auto& [first, second] : request.doubles) {
       auto one = guarded([&] { return between(first, second); });
       if (!one) {
@@ -235,10 +235,10 @@ Expected<MigrationAnswer> answer(const MigrationRequest& request) {
                                           second.filename().string(), one.error().message);
         throw BadInput(one.error());
       }
-      made.doubles.push_back(*std::move(one));
+      migration_answer.doubles.push_back(*std::move(one));
     }
-    made.precision = precision_of(made.doubles);
-    return made;
+    migration_answer.precision = precision_of(migration_answer.doubles);
+    return migration_answer;
   });
 }
 

@@ -126,7 +126,7 @@ Expected<void> Operation::take(const std::string& wanted, const receiver::Arriva
     record(record::Exposure{view, arrival.digest, inbox_of(arrival.path), held_s(*acquisition, arrival_s),
                             window, seen ? std::optional(*seen) : std::nullopt});
     const guidance::Poses poses = value_or_throw(seen);
-    for (const PlannedTunnel& tunnel : plan_.tunnels)
+    for (const OperationTunnel& tunnel : plan_.tunnels)
       if (!poses.tracker_from(tunnel.bone))
         throw BadInput(Reason::no_pose,
                        fmt::format("{}: the marker of the {} was not visible during the acquisition", view,

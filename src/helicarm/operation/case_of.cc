@@ -100,28 +100,28 @@ Expected<pipeline::Case> operation_case(const fs::path& folder, const OperationP
                                         const PlanFiles& files, const std::vector<CaseImage>& images,
                                         const guidance::Poses& now,
                                         const std::vector<guidance::ToolLine>& tool_lines) {
-  pipeline::Case made;
-  made.folder = folder;
-  made.calibrator_name = files.calibrator_name;
-  made.calibrator = files.calibrator;
-  made.plate_name = files.plate_name;
-  made.plate = files.plate;
-  made.bones = plan.bones;
+  pipeline::Case the_case;
+  the_case.folder = folder;
+  the_case.calibrator_name = files.calibrator_name;
+  the_case.calibrator = files.calibrator;
+  the_case.plate_name = files.plate_name;
+  the_case.plate = files.plate;
+  the_case.bones = plan.bones;
   for (const CaseImage& image : images) {
     pipeline::CaseView view;
     view.name = image.name;
     view.image = folder / (image.name + ".dcm");
     view.poses = image.poses;
-    made.views.push_back(std::move(view));
+    the_case.views.push_back(std::move(view));
   }
-  made.poses_now = now;
-  made.tracker = plan.tracker.noise();
-  made.picks = plan.picks;
-  for (const PlannedTunnel& tunnel : plan.tunnels)
+  the_case.poses_now = now;
+  the_case.tracker = plan.tracker.noise();
+  the_case.picks = plan.picks;
+  for (const OperationTunnel& tunnel : plan.tunnels)
     if (!tunnel.of_model && is_picked(plan, tunnel.start) && is_picked(plan, tunnel.end))
-      made.tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
-  made.tool_lines = tool_lines;
-  return pipeline::checked_case(std::move(made));
+      the_case.tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
+  the_case.tool_lines = tool_lines;
+  return pipeline::checked_case(std::move(the_case));
 }
 
 Expected<std::string> received_image(const fs::path& image, const std::string& digest) {
@@ -139,12 +139,12 @@ Expected<std::string> received_image(const fs::path& image, const std::string& d
 Expected<Digests> write_operation_case(const pipeline::Case& written, const PlanFiles& files,
                                        const std::vector<CaseImage>& images) {
   return guarded([&] {
-    CaseFolder made(written.folder);
-    for (const auto& [name, bytes] : files.files) made.add(name, bytes);
+    CaseFolder case_folder(written.folder);
+    for (const auto& [name, bytes] : files.files) case_folder.add(name, bytes);
     for (const CaseImage& image : images)
-      made.add(image.name + ".dcm", value_or_throw(received_image(image.image, image.digest)));
-    made.add("case.json", to_text(pipeline::to_json(written)));
-    return made.files;
+      case_folder.add(image.name + ".dcm", value_or_throw(received_image(image.image, image.digest)));
+    case_folder.add("case.json", to_text(pipeline::to_json(written)));
+    return case_folder.files;
   });
 }
 
@@ -159,9 +159,9 @@ Expected<void> check_digests(const fs::path& folder, const Digests& files) {
   });
 }
 
-Expected<pipeline::Result> measure_case(const pipeline::Case& given, const OperationPlan& plan,
-                                        const std::optional<pipeline::Result>& earlier) {
-  return pipeline::measure_again(earlier, given, measuring_options(plan).run);
+Expected<pipeline::Result> measure_by_plan(const pipeline::Case& the_case, const OperationPlan& plan,
+                                           const std::optional<pipeline::Result>& earlier) {
+  return pipeline::measure_again(earlier, the_case, measuring_options(plan).run);
 }
 
 Json without_timing(Json result) {

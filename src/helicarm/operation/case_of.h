@@ -55,8 +55,8 @@ Expected<Digests> write_operation_case(const pipeline::Case& written, const Plan
 Expected<void> check_digests(const std::filesystem::path& folder, const Digests& files);
 
 /// Measures by the calibration of `earlier`, if there is one: of the same images.
-Expected<pipeline::Result> measure_case(const pipeline::Case& given, const OperationPlan& plan,
-                                        const std::optional<pipeline::Result>& earlier);
+Expected<pipeline::Result> measure_by_plan(const pipeline::Case& the_case, const OperationPlan& plan,
+                                           const std::optional<pipeline::Result>& earlier);
 
 /// result.json without its timing, which differs from run to run.
 Json without_timing(Json result);

@@ -29,7 +29,7 @@ Json case_in_present_form(const Json& recorded, const Json& present, const Opera
   return json;
 }
 
-pipeline::Case as_read_earlier(pipeline::Case given) {
+pipeline::Case as_read_earlier(pipeline::Case the_case) {
   const auto read = [](auto& pose) {
     pose = value_or_throw(geometry::rigid_transform_from(pose.matrix(), "pose"));
   };
@@ -38,9 +38,9 @@ pipeline::Case as_read_earlier(pipeline::Case given) {
     for (auto& [bone, pose] : poses.tracker_from_bone) read(pose);
     if (poses.tracker_from_tool) read(*poses.tracker_from_tool);
   };
-  for (pipeline::CaseView& view : given.views) read_all(view.poses);
-  read_all(given.poses_now);
-  return given;
+  for (pipeline::CaseView& view : the_case.views) read_all(view.poses);
+  read_all(the_case.poses_now);
+  return the_case;
 }
 
 Json in_keys_of(const Json& then, const Json& now) {

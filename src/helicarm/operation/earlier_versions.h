@@ -12,7 +12,7 @@ bool is_of_earlier_version(const Json& recorded_case);
 Json case_in_present_form(const Json& recorded, const Json& present, const OperationPlan& plan);
 
 /// Earlier versions made every pose that they read a rotation again, which changes last bits.
-pipeline::Case as_read_earlier(pipeline::Case given);
+pipeline::Case as_read_earlier(pipeline::Case the_case);
 
 /// What an earlier version wrote of a result too: the keys of `then`, and its numbers where only rounding,
 /// which the compiler decides, differs.

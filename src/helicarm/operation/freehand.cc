@@ -56,13 +56,13 @@ double scatter(const std::vector<geometry::RigidTransform>& tips, const Value& v
 
 /// Mean of the last poses, with the rotation about the drill of the newest.
 geometry::RigidTransform mean_tip(std::span<const geometry::RigidTransform> tips) {
-  Vector3d place = Vector3d::Zero(), direction = Vector3d::Zero();
+  Vector3d position = Vector3d::Zero(), direction = Vector3d::Zero();
   for (const geometry::RigidTransform& tip : tips) {
-    place += tip.translation / static_cast<double>(tips.size());
+    position += tip.translation / static_cast<double>(tips.size());
     direction += tip.rotation.col(2);
   }
   const Eigen::Matrix3d& newest = tips.back().rotation;
-  return {Eigen::Quaterniond::FromTwoVectors(newest.col(2), direction).toRotationMatrix() * newest, place};
+  return {Eigen::Quaterniond::FromTwoVectors(newest.col(2), direction).toRotationMatrix() * newest, position};
 }
 
 /// Of the mean of `averaged` poses.
@@ -104,7 +104,7 @@ Expected<FreehandGuide> FreehandGuide::begin(const OperationPlan& plan, LiveTool
                                              const std::string& name, const guidance::Poses& basis,
                                              double oldest_s) {
   return guarded([&] {
-    const auto tunnel = std::ranges::find(plan.tunnels, name, &PlannedTunnel::name);
+    const auto tunnel = std::ranges::find(plan.tunnels, name, &OperationTunnel::name);
     if (tunnel == plan.tunnels.end())
       throw BadInput(Reason::bad_value, fmt::format("{}: is not a tunnel of the plan", name));
     if (!plan.drill)

@@ -35,14 +35,14 @@ class FreehandGuide {
   static Expected<FreehandGuide> begin(const OperationPlan& plan, LiveTool live, const std::string& tunnel,
                                        const guidance::Poses& basis, double oldest_s);
 
-  const PlannedTunnel& tunnel() const { return tunnel_; }
+  const OperationTunnel& tunnel() const { return tunnel_; }
   /// Samples of tool and bone in the half second before `now_s`.
   PoseWindow recent(const tracker::PoseBoard& board, double now_s) const;
   /// At the end of the window.
   Guidance at(const PoseWindow& recent) const;
 
  private:
-  FreehandGuide(const OperationPlan& plan, LiveTool live, PlannedTunnel tunnel,
+  FreehandGuide(const OperationPlan& plan, LiveTool live, OperationTunnel tunnel,
                 const geometry::RigidTransform& tracker_from_bone, double oldest_s)
       : drill_(plan.drill.value()),
         limits_(plan.limits),
@@ -58,7 +58,7 @@ class FreehandGuide {
   HandDrill drill_;
   PlanLimits limits_;
   std::string bone_, tool_;
-  PlannedTunnel tunnel_;
+  OperationTunnel tunnel_;
   LiveTool live_;
   geometry::RigidTransform tracker_from_bone_;
   double oldest_s_;

@@ -23,7 +23,7 @@ robot::Watch Operation::in_place(PlanWatch watch) const {
   };
 }
 
-PlanBasis Operation::basis_of(const PlannedTunnel& tunnel, const PoseWindow& window,
+PlanBasis Operation::basis_of(const OperationTunnel& tunnel, const PoseWindow& window,
                               const robot::RobotState& present) const {
   const auto see = [&](const std::string& marker) {
     return value_or_throw(see_tool(window, plan_.tracker, marker)).tracker_from_marker;
@@ -75,7 +75,7 @@ Expected<void> Operation::withdraw(const robot::RobotOrder& order, const robot::
                                    const Confirm& confirm) {
   return guarded([&] {
     notify_(Step::navigate, order.name + ": withdraw");
-    const PlannedTunnel& tunnel = tunnel_named(order.name);
+    const OperationTunnel& tunnel = tunnel_named(order.name);
     if (!result_ || !hand_eye_) throw BadInput(Reason::usage, "no measurement or no registration yet");
     const PoseWindow window = look(record::Look::withdraw);
     const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));

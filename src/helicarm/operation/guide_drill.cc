@@ -43,7 +43,7 @@ Expected<void> Operation::guide(const std::string& name, std::optional<double> o
     const double oldest_pose_s = oldest.value_or(plan_.tracker.oldest_pose_s());
     guide_.reset();
     guided_.reset();
-    const PlannedTunnel& tunnel = tunnel_named(name);
+    const OperationTunnel& tunnel = tunnel_named(name);
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
       throw BadInput(Reason::usage, missing.front() + ": touch this check point first");
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");
@@ -83,7 +83,7 @@ Expected<Guidance> Operation::guidance() {
 
 Expected<TunnelOutcome> Operation::verify_drilled(const std::string& name) {
   return guarded([&] {
-    const PlannedTunnel& tunnel = tunnel_named(name);
+    const OperationTunnel& tunnel = tunnel_named(name);
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");
     if (!plan_.drill) throw BadInput(Reason::usage, "the plan has no hand-held drill");
     check_registered(tunnel);

@@ -14,15 +14,15 @@ namespace {
 
 constexpr double degrees_per_rad = 180 / std::numbers::pi;
 
-const guidance::PropagatedPoint* located_in(const pipeline::Result& result, const PlannedTunnel& tunnel,
+const guidance::PropagatedPoint* located_in(const pipeline::Result& result, const OperationTunnel& tunnel,
                                             const std::string& end) {
-  const guidance::PointInFrames* place = place_of(result, tunnel, end);
-  const guidance::Place* in_bone = place ? place->in(tunnel.bone) : nullptr;
+  const guidance::PointInFrames* located = place_of(result, tunnel, end);
+  const guidance::Place* in_bone = located ? located->in(tunnel.bone) : nullptr;
   return in_bone ? &in_bone->propagated : nullptr;
 }
 
 /// Of all views' parameters, or of the pose of the tunnel's model.
-Eigen::MatrixXd shared_by_ends(const pipeline::Result& result, const PlannedTunnel& tunnel) {
+Eigen::MatrixXd shared_by_ends(const pipeline::Result& result, const OperationTunnel& tunnel) {
   if (!tunnel.of_model) return pipeline::joint_covariance(result);
   for (const pipeline::ModelTunnel& planned : result.model_tunnels)
     if (planned.model == tunnel.of_model->model) return planned.shared_covariance;
@@ -39,7 +39,7 @@ LiveTool::LiveTool(const OperationPlan& plan, const pipeline::Result& result,
     views_.push_back(
         {result.views[i].name, calibrated ? std::optional(calibrated->view) : std::nullopt, exposures[i]});
   }
-  for (const PlannedTunnel& tunnel : plan.tunnels) {
+  for (const OperationTunnel& tunnel : plan.tunnels) {
     const auto* enter = located_in(result, tunnel, tunnel.start);
     const auto* leave = located_in(result, tunnel, tunnel.end);
     if (tunnel.enter_at == TunnelEnd::end) std::swap(enter, leave);

@@ -24,12 +24,12 @@ using case_registration::CaseRegistration;
 
 constexpr std::uintmax_t most_model_bytes = std::uintmax_t{1} << 31;
 
-pipeline::Case with_models_of(const OperationPlan& plan, const pipeline::Case& given) {
-  pipeline::Case made = given;
-  made.models = plan.models;
-  for (const PlannedTunnel& tunnel : plan.tunnels)
-    if (tunnel.of_model) made.model_tunnels.push_back(*tunnel.of_model);
-  return made;
+pipeline::Case with_models_of(const OperationPlan& plan, const pipeline::Case& the_case) {
+  pipeline::Case with_models = the_case;
+  with_models.models = plan.models;
+  for (const OperationTunnel& tunnel : plan.tunnels)
+    if (tunnel.of_model) with_models.model_tunnels.push_back(*tunnel.of_model);
+  return with_models;
 }
 
 /// The file of voxels that a header names beside itself (MetaImage, NRRD), or the other file of a NIfTI pair;
@@ -90,16 +90,16 @@ class ModelFolder {
   fs::path folder_;
 };
 
-guidance::LineError error_of(const guidance::PointInFrames& place, const guidance::Bone& bone,
-                             const pipeline::Result& result, const pipeline::Case& given,
+guidance::LineError error_of(const guidance::PointInFrames& located, const guidance::Bone& bone,
+                             const pipeline::Result& result, const pipeline::Case& the_case,
                              const guidance::ToolLine& line) {
-  guidance::PlannedPoint planned{place.in_calibrator, {}};
+  guidance::PlannedPoint planned{located.in_calibrator, {}};
   std::vector<geometry::View> views;
   for (std::size_t i = 0; i < result.views.size(); ++i) {
     views.push_back(result.views[i].calibrated.value().view);
     // Where the bone was at this view's acquisition, as a pick would show it.
-    const auto calibrator_from_bone = guidance::calibrator_from(bone, given.views[i].poses);
-    const guidance::Place* in_bone = place.in(bone);
+    const auto calibrator_from_bone = guidance::calibrator_from(bone, the_case.views[i].poses);
+    const guidance::Place* in_bone = located.in(bone);
     planned.uv.push_back(calibrator_from_bone && in_bone
                              ? std::optional(views.back().project(*calibrator_from_bone * in_bone->point()))
                              : std::nullopt);
@@ -121,19 +121,19 @@ Expected<Digests> keep_models(OperationPlan& plan, const fs::path& session) {
       value_or_throw(case_registration::load_model(model));
     }
     plan.folder = session;
-    pipeline::Case given;
-    given.picks = plan.picks;
-    case_registration::read_plans(with_models_of(plan, given));
+    pipeline::Case the_case;
+    the_case.picks = plan.picks;
+    case_registration::read_plans(with_models_of(plan, the_case));
     return std::move(folder.files);
   });
 }
 
-Expected<CaseRegistration> register_models(const OperationPlan& plan, const pipeline::Case& given,
+Expected<CaseRegistration> register_models(const OperationPlan& plan, const pipeline::Case& the_case,
                                            const pipeline::Result& measured,
                                            const case_registration::Progress& progress) {
   return guarded([&] {
     if (!measured.calibration) throw BadInput(Reason::usage, "no measurement yet");
-    const pipeline::Case with_models = with_models_of(plan, given);
+    const pipeline::Case with_models = with_models_of(plan, the_case);
     return value_or_throw(case_registration::register_loaded(
         with_models, case_registration::views_of_calibration(with_models, *measured.calibration),
         measuring_options(plan), progress));
@@ -148,34 +148,34 @@ Json recorded(const CaseRegistration& registration) {
 
 Expected<pipeline::Result> with_registration(const pipeline::Result& measured,
                                              const CaseRegistration& registration, const OperationPlan& plan,
-                                             const pipeline::Case& given,
+                                             const pipeline::Case& the_case,
                                              const std::vector<guidance::ToolLine>& lines) {
   return guarded([&] {
-    const auto plans = case_registration::read_plans(with_models_of(plan, given));
+    const auto plans = case_registration::read_plans(with_models_of(plan, the_case));
     CaseRegistration now;
     now.models = registration.models;
     for (std::size_t i = 0; i < now.models.size(); ++i) {
       case_registration::RegisteredModel& model = now.models[i];
       if (!plans[i] || model.registration.failure || !model.registration.is_determined()) continue;
-      carry_plan(*plans[i], given, model);
+      carry_plan(*plans[i], the_case, model);
       limit_error(case_registration::largest_error(model.points), plan.max_error_mm, model.registration);
     }
     pipeline::Result result = case_registration::with_models(measured, now);
     for (const guidance::ToolLine& line : lines) {
-      const auto tunnel = std::ranges::find(plan.tunnels, line.tunnel, &PlannedTunnel::name);
+      const auto tunnel = std::ranges::find(plan.tunnels, line.tunnel, &OperationTunnel::name);
       if (tunnel == plan.tunnels.end()) continue;
       guidance::Verification verified{line.name, {}, {}};
       if (const auto* start = place_of(result, *tunnel, tunnel->start))
-        verified.start = error_of(*start, tunnel->bone, result, given, line);
+        verified.start = error_of(*start, tunnel->bone, result, the_case, line);
       if (const auto* end = place_of(result, *tunnel, tunnel->end))
-        verified.end = error_of(*end, tunnel->bone, result, given, line);
+        verified.end = error_of(*end, tunnel->bone, result, the_case, line);
       result.verifications.push_back(verified);
     }
     return result;
   });
 }
 
-Expected<void> check_error_at_tip(const OperationPlan& plan, const PlannedTunnel& tunnel,
+Expected<void> check_error_at_tip(const OperationPlan& plan, const OperationTunnel& tunnel,
                                   const pipeline::Result& result, const guidance::Poses& now,
                                   const TrackedTool& tool) {
   return guarded([&] {
@@ -183,8 +183,8 @@ Expected<void> check_error_at_tip(const OperationPlan& plan, const PlannedTunnel
     if (!tracker_from_bone || !now.tracker_from_tool)
       throw BadInput(Reason::no_pose, "the marker of the tool or the bone is not visible");
     for (const std::string& end : {tunnel.start, tunnel.end}) {
-      const guidance::PointInFrames* place = place_of(result, tunnel, end);
-      const guidance::Place* in_bone = place ? place->in(tunnel.bone) : nullptr;
+      const guidance::PointInFrames* located = place_of(result, tunnel, end);
+      const guidance::Place* in_bone = located ? located->in(tunnel.bone) : nullptr;
       if (!in_bone)
         throw BadInput(Reason::not_seen, fmt::format("{}: is not located in its bone's frame", end));
       const guidance::PropagatedPoint at =

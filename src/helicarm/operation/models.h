@@ -15,7 +15,7 @@ Expected<Digests> keep_models(OperationPlan& plan, const std::filesystem::path& 
 
 /// Registers the models to a measured case by its calibration. Refusals are in the result.
 Expected<case_registration::CaseRegistration> register_models(const OperationPlan& plan,
-                                                              const pipeline::Case& given,
+                                                              const pipeline::Case& the_case,
                                                               const pipeline::Result& measured,
                                                               const case_registration::Progress& progress);
 
@@ -26,12 +26,12 @@ Json recorded(const case_registration::CaseRegistration& registration);
 /// plan's error limit, and with the tool's lines against the models' tunnels.
 Expected<pipeline::Result> with_registration(const pipeline::Result& measured,
                                              const case_registration::CaseRegistration& registration,
-                                             const OperationPlan& plan, const pipeline::Case& given,
+                                             const OperationPlan& plan, const pipeline::Case& the_case,
                                              const std::vector<guidance::ToolLine>& lines = {});
 
 /// Refuses (uncertain) a tunnel whose end has a 95 % error over the plan's limit at the tool's tip, with the
 /// errors of registration, calibration, tracker and of the tool's own calibration; not_seen, no_pose.
-Expected<void> check_error_at_tip(const OperationPlan& plan, const PlannedTunnel& tunnel,
+Expected<void> check_error_at_tip(const OperationPlan& plan, const OperationTunnel& tunnel,
                                   const pipeline::Result& result, const guidance::Poses& now,
                                   const TrackedTool& tool);
 

@@ -129,39 +129,39 @@ Expected<void> Operation::finish(const std::optional<Failure>& why) {
 
 pipeline::Result Operation::run(const guidance::Poses& now,
                                 const std::vector<guidance::ToolLine>& tool_lines) {
-  newest_.reset();
-  const std::string name = fmt::format("case-{}", ++measurements_);
+  newest_result_.reset();
+  const std::string name = fmt::format("case-{}", ++case_folders_);
   std::vector<CaseImage> images;
   for (const View& view : views_) images.push_back({view.name, view.image, view.digest, view.poses});
   std::vector<guidance::ToolLine> of_picks, of_models;
   for (const guidance::ToolLine& line : tool_lines)
     (tunnel_named(line.tunnel).of_model ? of_models : of_picks).push_back(line);
-  const pipeline::Case given =
+  const pipeline::Case the_case =
       value_or_throw(operation_case(folder_ / name, plan_, files_, images, now, of_picks));
-  const Digests files = value_or_throw(write_operation_case(given, files_, images));
-  record(record::CaseBegun{name, pipeline::to_json(given), files,
+  const Digests files = value_or_throw(write_operation_case(the_case, files_, images));
+  record(record::CaseBegun{name, pipeline::to_json(the_case), files,
                            tool_lines.empty() ? std::string() : tool_lines.front().tunnel});
-  const auto earlier = measurement_ ? measurement_->calibration : nullptr;
-  measurement_ = value_or_throw(measure_case(given, plan_, measurement_));
-  if (measurement_->calibration != earlier || !earlier) ++calibrations_;
-  pipeline::Result result = *measurement_;
+  const auto earlier = by_images_ ? by_images_->calibration : nullptr;
+  by_images_ = value_or_throw(measure_by_plan(the_case, plan_, by_images_));
+  if (by_images_->calibration != earlier || !earlier) ++calibrations_;
+  pipeline::Result result = *by_images_;
   if (registration_confirmed_ && !result.failure)
-    result = value_or_throw(with_registration(result, *registration_, plan_, given, of_models));
-  const Digests written = value_or_throw(write_result(result, given.folder));
-  value_or_throw(check_digests(given.folder, files));
+    result = value_or_throw(with_registration(result, *registration_, plan_, the_case, of_models));
+  const Digests written = value_or_throw(write_result(result, the_case.folder));
+  value_or_throw(check_digests(the_case.folder, files));
   record(record::Measured{name, digest_of(pipeline::to_json(result)), written});
-  if (tool_lines.empty()) measured_ = given;
-  newest_ = std::move(result);
-  if (newest_->failure) throw BadInput(*newest_->failure);
-  return *newest_;
+  if (tool_lines.empty()) measured_case_ = the_case;
+  newest_result_ = std::move(result);
+  if (newest_result_->failure) throw BadInput(*newest_result_->failure);
+  return *newest_result_;
 }
 
 /// The images are others now.
 void Operation::forget_measurement() {
   forget_registration();
-  measured_.reset();
+  measured_case_.reset();
   result_.reset();
-  measurement_.reset();
+  by_images_.reset();
 }
 
 Expected<void> Operation::measure() {
@@ -221,8 +221,8 @@ Expected<void> Operation::register_robot(const Confirm& confirm, const Again& ag
   });
 }
 
-const PlannedTunnel& Operation::tunnel_named(const std::string& name) const {
-  const auto tunnel = std::ranges::find(plan_.tunnels, name, &PlannedTunnel::name);
+const OperationTunnel& Operation::tunnel_named(const std::string& name) const {
+  const auto tunnel = std::ranges::find(plan_.tunnels, name, &OperationTunnel::name);
   if (tunnel == plan_.tunnels.end())
     throw BadInput(Reason::bad_value, fmt::format("{}: is not a tunnel of the plan", name));
   return *tunnel;
@@ -230,7 +230,7 @@ const PlannedTunnel& Operation::tunnel_named(const std::string& name) const {
 
 Expected<robot::RobotOrder> Operation::plan_order(const std::string& name) {
   return guarded([&] {
-    const PlannedTunnel& tunnel = tunnel_named(name);
+    const OperationTunnel& tunnel = tunnel_named(name);
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
       throw BadInput(Reason::usage, fmt::format("{}: touch this check point first", missing.front()));
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");
@@ -290,7 +290,7 @@ Expected<LiveTool> Operation::live_tool() const {
 Expected<PathPreview> Operation::preview(const robot::RobotOrder& order) const {
   return guarded([&] {
     PathPreview preview;
-    const PlannedTunnel& tunnel = tunnel_named(order.name);
+    const OperationTunnel& tunnel = tunnel_named(order.name);
     const geometry::RigidTransform bone_from_base =
         planned_.at(order.name).bone_from_target * order.waypoints.back().base_from_tcp.inverse();
     std::vector<Eigen::Vector3d> tips_in_bone;
@@ -318,7 +318,7 @@ Expected<PathPreview> Operation::preview(const robot::RobotOrder& order) const {
 
 Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std::string& token) {
   return guarded([&] {
-    const PlannedTunnel& tunnel = tunnel_named(order.name);
+    const OperationTunnel& tunnel = tunnel_named(order.name);
     value_or_throw(check_plan(order));
     Planned& plan = planned_.at(order.name);
     in_place_.clear();
@@ -343,7 +343,7 @@ Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std:
   });
 }
 
-TunnelOutcome Operation::check(const PlannedTunnel& tunnel) {
+TunnelOutcome Operation::check(const OperationTunnel& tunnel) {
   const guidance::Poses now = value_or_throw(poses_now(look(record::Look::verify), plan_.tracker));
   const TrackedTool tracked = tool();
   const guidance::ToolLine line =

@@ -98,7 +98,7 @@ class Operation {
   Expected<void> measure();
   const pipeline::Result& result() const { return *result_; }
   /// The last measurement, also a refused one.
-  const std::optional<pipeline::Result>& newest_result() const { return newest_; }
+  const std::optional<pipeline::Result>& newest_result() const { return newest_result_; }
   /// Number of calibrations.
   int calibrations() const { return calibrations_; }
   /// Poses at each view's acquisition, in the plan's order.
@@ -200,33 +200,40 @@ class Operation {
   static Expected<std::unique_ptr<Operation>> begin(OperationPlan plan, const std::filesystem::path& folder,
                                                     const tracker::PoseBoard& board, robot::RobotLink* robot,
                                                     Notify notify);
+  // operation.cc
   robot::RobotLink& robot() const;
   TrackedTool tool() const;
-  const PlannedTunnel& tunnel_named(const std::string& name) const;
+  const OperationTunnel& tunnel_named(const std::string& name) const;
   void record(const Record& what);
+  void record_halt(const robot::RobotOrder& order, const Failure& why);
   PoseWindow look(record::Look why);
+  pipeline::Result run(const guidance::Poses& now, const std::vector<guidance::ToolLine>& tool_lines);
+  void forget_measurement();
+  tracker::HandEyePair pair_at(const geometry::RigidTransform& base_from_tcp, const Confirm& confirm);
+  std::vector<robot::Miss> carry_out(const robot::RobotOrder& order, const std::string& token,
+                                     const robot::Measure& measure, const robot::Watch& watch);
+  TunnelOutcome check(const OperationTunnel& tunnel);
+  void draw_preview(const robot::RobotOrder& order);
+
+  // acquire.cc
   xray::Acquisition acquisition_of(std::string& view, const receiver::Arrival& arrival, double arrival_s);
   void refuse_other_views(const std::string& view, const xray::Acquisition& shown) const;
   void weigh_delay(const std::string& view, const xray::Acquisition& shown, double arrival_s);
   double held_s(const xray::Acquisition& shown, double arrival_s) const;
   std::optional<std::string> inbox_of(const std::filesystem::path& image) const;
   void notify_once(const std::string& warning);
+
+  // register_plan_models.cc
+  void check_registered(const OperationTunnel& tunnel) const;
+  void forget_registration();
+
+  // fresh_plan.cc, plan_again.cc
   robot::Watch sees_tool() const;
   robot::Watch in_place(PlanWatch watch) const;
-  PlanBasis basis_of(const PlannedTunnel& tunnel, const PoseWindow& window,
+  PlanBasis basis_of(const OperationTunnel& tunnel, const PoseWindow& window,
                      const robot::RobotState& present) const;
   const Planned& planned(const robot::RobotOrder& order) const;
-  void record_halt(const robot::RobotOrder& order, const Failure& why);
-  pipeline::Result run(const guidance::Poses& now, const std::vector<guidance::ToolLine>& tool_lines);
-  std::vector<robot::Miss> carry_out(const robot::RobotOrder& order, const std::string& token,
-                                     const robot::Measure& measure, const robot::Watch& watch);
-  tracker::HandEyePair pair_at(const geometry::RigidTransform& base_from_tcp, const Confirm& confirm);
   bool answers_again() const;
-  TunnelOutcome check(const PlannedTunnel& tunnel);
-  void forget_measurement();
-  void check_registered(const PlannedTunnel& tunnel) const;
-  void forget_registration();
-  void draw_preview(const robot::RobotOrder& order);
 
   OperationPlan plan_;
   std::filesystem::path folder_;
@@ -242,16 +249,16 @@ class Operation {
   std::set<std::string> reported_;
   std::map<std::string, Eigen::Vector3d> touched_in_bone_;  ///< first touch of each check point
   std::set<std::string> in_place_;                          ///< check points touched since the last order
-  int measurements_ = 0;
+  int case_folders_ = 0;                                    ///< written so far
   PlanFiles files_;
-  std::optional<pipeline::Result> measurement_;  ///< of the present images
+  std::optional<pipeline::Result> by_images_;  ///< of the present images
   int calibrations_ = 0;
-  std::optional<pipeline::Case> measured_;  ///< of the last measurement, not of a verification
+  std::optional<pipeline::Case> measured_case_;  ///< of the last measurement, not of a verification
   std::optional<case_registration::CaseRegistration> registration_;  ///< of `measured_`
   std::string registered_digest_;
   bool registration_confirmed_ = false;
   bool was_registered_ = false;  ///< earlier images were
-  std::optional<pipeline::Result> result_, newest_;
+  std::optional<pipeline::Result> result_, newest_result_;
   std::optional<tracker::HandEye> hand_eye_;
   std::map<std::string, Planned> planned_;  ///< by tunnel
   std::map<std::string, int> replans_;      ///< by order

@@ -25,7 +25,7 @@ std::optional<robot::Waypoint> back_to_stand_off(const robot::RobotOrder& order,
 
 }  // namespace
 
-Expected<robot::RobotOrder> tunnel_order(const OperationPlan& plan, const PlannedTunnel& tunnel,
+Expected<robot::RobotOrder> tunnel_order(const OperationPlan& plan, const OperationTunnel& tunnel,
                                          const pipeline::Result& result, const tracker::HandEye& hand_eye,
                                          const guidance::Poses& now, const robot::Joints& joints) {
   return guarded([&] {
@@ -56,14 +56,14 @@ robot::RobotOrder withdraw_order(const robot::RobotOrder& order, const Withdrawa
   return robot::slowed_for_joints(std::move(back), limits);
 }
 
-Expected<TunnelOutcome> outcome_of(const PlannedTunnel& tunnel, const pipeline::Result& result,
+Expected<TunnelOutcome> outcome_of(const OperationTunnel& tunnel, const pipeline::Result& result,
                                    const TrackedTool& tool) {
   return guarded([&] {
     const auto end = [&](const std::string& name) {
-      const guidance::PointInFrames* place = place_of(result, tunnel, name);
-      if (!place || !place->in_tool)
+      const guidance::PointInFrames* located = place_of(result, tunnel, name);
+      if (!located || !located->in_tool)
         throw BadInput(Reason::not_seen, fmt::format("{}: is not located in the tool marker's frame", name));
-      return end_miss(place->in_tool->point(), place->in_tool->covariance, tool);
+      return end_miss(located->in_tool->point(), located->in_tool->covariance, tool);
     };
     TunnelOutcome outcome{tunnel.name, {}, end(tunnel.start), end(tunnel.end), {}};
     if (!result.verifications.empty()) outcome.verification = result.verifications.front();

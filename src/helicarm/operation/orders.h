@@ -22,7 +22,7 @@ struct TunnelOutcome {
 };
 
 /// The order to a tunnel from these joints. Fails as `tunnel_in_bone` and `plan_approach`.
-Expected<robot::RobotOrder> tunnel_order(const OperationPlan& plan, const PlannedTunnel& tunnel,
+Expected<robot::RobotOrder> tunnel_order(const OperationPlan& plan, const OperationTunnel& tunnel,
                                          const pipeline::Result& result, const tracker::HandEye& hand_eye,
                                          const guidance::Poses& now, const robot::Joints& joints);
 
@@ -41,7 +41,7 @@ robot::RobotOrder withdraw_order(const robot::RobotOrder& order, const Withdrawa
 
 /// From a measurement with the tool's line; without the closed loop. Refuses (not_seen) an end that is not
 /// located in the tool's frame.
-Expected<TunnelOutcome> outcome_of(const PlannedTunnel& tunnel, const pipeline::Result& result,
+Expected<TunnelOutcome> outcome_of(const OperationTunnel& tunnel, const pipeline::Result& result,
                                    const TrackedTool& tool);
 
 }  // namespace helicarm::operation

@@ -74,8 +74,8 @@ void check_drill(const JsonReader& reader, const HandDrill& drill) {
                   fmt::format("must be at least {:g} mm from \"tip_in_tool\"", shortest_mm));
 }
 
-void complete(const JsonReader& reader, PlannedTunnel& tunnel, const OperationPlan& plan) {
-  const pipeline::ModelTunnelPlan& line = tunnel.of_model.value();
+void complete(const JsonReader& reader, OperationTunnel& tunnel, const OperationPlan& plan) {
+  const pipeline::ModelLine& line = tunnel.of_model.value();
   const auto model = std::ranges::find(plan.models, line.model, &pipeline::CaseModel::name);
   if (!model->moves_with)
     reader.refuse(Reason::bad_value, "bone",

@@ -77,14 +77,14 @@ struct HandDrill {
 
 using pipeline::TunnelEnd;
 
-struct PlannedTunnel {
+struct OperationTunnel {
   std::string name;
   guidance::Bone bone;
   std::string start;  ///< names of picks, or of points of the model's plan
   std::string end;
   TunnelEnd enter_at = TunnelEnd::start;  ///< where the drill enters
   /// Of a model's plan; `start` and `end` are then the ends of its line.
-  std::optional<pipeline::ModelTunnelPlan> of_model = {};
+  std::optional<pipeline::ModelLine> of_model = {};
 };
 
 /// Limits beyond which an order is not carried out or is stopped (plan_stale).
@@ -103,7 +103,7 @@ struct OperationPlan {
   TrackerPlan tracker;
   RobotPlan robot;
   std::optional<HandDrill> drill;  ///< if given, no robot is used
-  std::vector<PlannedTunnel> tunnels;
+  std::vector<OperationTunnel> tunnels;
   std::vector<PlannedCheck> check_points;
   std::vector<pipeline::Pick> picks;  ///< may be set after the acquisition
   double max_error_mm = 2;            ///< limit of a point's 95 % error for robot motion: there is always one

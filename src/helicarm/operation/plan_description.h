@@ -40,7 +40,7 @@ Json json_of_markers(const TrackerPlan& tracker);
 void check_plan(const JsonReader& reader, const OperationPlan& plan);
 void check_drill(const JsonReader& reader, const HandDrill& drill);
 /// The bone with which its model moves, and the names of its line's ends.
-void complete(const JsonReader& reader, PlannedTunnel& tunnel, const OperationPlan& plan);
+void complete(const JsonReader& reader, OperationTunnel& tunnel, const OperationPlan& plan);
 
 template <class Codec, class Tracker>
 void describe_tracker(Codec& codec, Tracker& tracker, const std::vector<guidance::Bone>& bones) {
@@ -140,7 +140,7 @@ void describe_tunnel(Codec& codec, Tunnel& tunnel, Plan& plan) {
       std::vector<pipeline::CaseModel> models;
       pipeline::description::describe_model_line(codec, *tunnel.of_model, models, plan.bones);
     } else {
-      pipeline::ModelTunnelPlan& line = tunnel.of_model.emplace();
+      pipeline::ModelLine& line = tunnel.of_model.emplace();
       line.name = tunnel.name;
       pipeline::description::describe_model_line(codec, line, plan.models, plan.bones);
       codec.check([&](JsonReader& reader) { complete(reader, tunnel, plan); });
@@ -202,7 +202,8 @@ void describe_options(Codec& codec, Plan& plan, const std::string& origin) {
       [&](JsonReader& reader) {
         if constexpr (!std::is_const_v<Plan>)
           if (const Json& history = reader.raw("machine"); !history.is_null())
-            plan.measuring.run.history = value_or_throw(calibration::history_from_json(history, origin + ": machine"));
+            plan.measuring.run.history =
+                value_or_throw(calibration::history_from_json(history, origin + ": machine"));
       },
       [&] {
         const auto& history = plan.measuring.run.history;

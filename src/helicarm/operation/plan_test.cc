@@ -48,7 +48,7 @@ TEST(Plan, ALineOfAModelsPlanIsATunnelOfItsBone) {
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->models.at(0).volume, "/somewhere/ct.nrrd");
   EXPECT_EQ(read->models[0].moves_with, "femur");
-  const PlannedTunnel& tunnel = read->tunnels.at(0);
+  const OperationTunnel& tunnel = read->tunnels.at(0);
   ASSERT_TRUE(tunnel.of_model);
   EXPECT_EQ(tunnel.of_model->diameter_mm, 8);
   EXPECT_EQ(tunnel.start, "F_start");
@@ -68,13 +68,13 @@ TEST(Plan, AModelThatMovesWithNoBoneGuidesNothing) {
 }
 
 TEST(Plan, OptionsOfTheMeasurementsLeadThroughTheFile) {
-  OperationPlan given = plan();
-  given.measuring.run.method = rectification::Method::paper;
-  given.measuring.run.motion_sigma_mm = 0.4;
-  given.measuring.search = {40, 60};
-  given.measuring.run.history = calibration::CArmHistory{
+  OperationPlan settings = plan();
+  settings.measuring.run.method = rectification::Method::paper;
+  settings.measuring.run.motion_sigma_mm = 0.4;
+  settings.measuring.search = {40, 60};
+  settings.measuring.run.history = calibration::CArmHistory{
       {{"digest", "AP", {1000, 1, -2}, Eigen::Vector3d(4, 5, 6).asDiagonal().toDenseMatrix()}}};
-  const auto read = plan_from(to_json(given), "plan.json");
+  const auto read = plan_from(to_json(settings), "plan.json");
   ASSERT_TRUE(read) << read.error().message;
   const auto [options, search] = measuring_options(*read);
   EXPECT_EQ(options.method, rectification::Method::paper);

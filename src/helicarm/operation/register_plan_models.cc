@@ -41,7 +41,7 @@ std::optional<Failure> refusal_of(const case_registration::CaseRegistration& reg
 Expected<void> Operation::register_models() {
   return guarded([&] {
     if (plan_.models.empty()) throw BadInput(Reason::usage, "the plan has no \"models\"");
-    if (!result_ || !measured_) throw BadInput(Reason::usage, "no measurement yet");
+    if (!result_ || !measured_case_) throw BadInput(Reason::usage, "no measurement yet");
     forget_registration();
     notify_(Step::measure, "registration of the plan's models");
     case_registration::Progress progress;
@@ -51,8 +51,8 @@ Expected<void> Operation::register_models() {
     progress.interrupt = [this] {
       if (end_.stop_requested()) throw BadInput(Reason::interrupted, "the registration was stopped");
     };
-    auto found = value_or_throw(operation::register_models(plan_, *measured_, *measurement_, progress));
-    const std::string folder = measured_->folder.filename().string() + "/" + registration_folder;
+    auto found = value_or_throw(operation::register_models(plan_, *measured_case_, *by_images_, progress));
+    const std::string folder = measured_case_->folder.filename().string() + "/" + registration_folder;
     const Digests files = write_with_digests(found, folder_ / folder);
     registered_digest_ = xray::digest(to_text(operation::recorded(found)));
     record(record::Registered{folder, registered_digest_, files});
@@ -68,15 +68,15 @@ Expected<void> Operation::confirm_registration() {
     if (const auto refusal = refusal_of(*registration_)) throw BadInput(*refusal);
     if (registration_confirmed_) return;
     pipeline::Result with_models =
-        value_or_throw(with_registration(*result_, *registration_, plan_, *measured_));
+        value_or_throw(with_registration(*result_, *registration_, plan_, *measured_case_));
     if (with_models.failure) throw BadInput(*with_models.failure);
     record(record::RegistrationConfirmed{registered_digest_, who_});
     registration_confirmed_ = true;
-    result_ = newest_ = std::move(with_models);
+    result_ = newest_result_ = std::move(with_models);
   });
 }
 
-void Operation::check_registered(const PlannedTunnel& tunnel) const {
+void Operation::check_registered(const OperationTunnel& tunnel) const {
   if (!tunnel.of_model || registration_confirmed_) return;
   if (registration_)
     throw BadInput(Reason::registration_not_confirmed,
@@ -100,7 +100,7 @@ void Operation::forget_registration() {
   registration_.reset();
   registration_confirmed_ = false;
   registered_digest_.clear();
-  for (const PlannedTunnel& tunnel : plan_.tunnels)
+  for (const OperationTunnel& tunnel : plan_.tunnels)
     if (tunnel.of_model) {
       planned_.erase(tunnel.name);
       if (guide_ && guide_->tunnel().name == tunnel.name) guide_.reset(), guided_.reset();

@@ -24,7 +24,9 @@ class Replay {
  public:
   explicit Replay(std::filesystem::path session)
       : session_(std::move(session)),
-        orders_([this](const std::string& origin, const std::string& how) { differ(origin, how); }) {}
+        orders_([this](const std::string& origin, const std::string& difference) {
+          differ(origin, difference);
+        }) {}
 
   void take(const SessionRecord& written) {
     const std::string origin = fmt::format("record {}", written.number);
@@ -72,8 +74,8 @@ class Replay {
     std::string origin;
   };
 
-  void differ(const std::string& origin, const std::string& how) {
-    report.differences.push_back(origin + ": " + how);
+  void differ(const std::string& origin, const std::string& difference) {
+    report.differences.push_back(origin + ": " + difference);
   }
   void compare(const Json& then, const Json& now, const std::string& origin, const char* what) {
     if (then != now)
@@ -105,7 +107,7 @@ class Replay {
     compare(content_of(then), content_of(now), origin, "pose");
     if (then.inbox && !received(*then.inbox).contains(then.picture))
       differ(origin, fmt::format("{}: the image of {} is missing or was changed", *then.inbox, then.view));
-    const bool accepted = poses && std::ranges::all_of(plan_.tunnels, [&](const PlannedTunnel& tunnel) {
+    const bool accepted = poses && std::ranges::all_of(plan_.tunnels, [&](const OperationTunnel& tunnel) {
                             return poses->tracker_from(tunnel.bone).has_value();
                           });
     if (!accepted) return;
@@ -155,7 +157,7 @@ class Replay {
   void take(const record::CaseBegun& record, const std::string& origin) {
     const std::string& folder = record.folder;
     list_files(record.files, folder, origin);
-    const Json& recorded = record.given;
+    const Json& recorded = record.case_json;
     const std::string name = folder + "/case.json";
     if (const auto now = read_json(value_or_throw(path_inside(session_, name))); now && *now != recorded)
       differ(origin, fmt::format("{} was changed{}", name, differing_fields(recorded, *now)));
@@ -194,7 +196,7 @@ class Replay {
     if (verifies_) {
       if (!look) throw BadInput(Reason::bad_value, "the poses of its verification are not recorded");
       now = value_or_throw(poses_now(*look, plan_.tracker));
-      const auto tunnel = std::ranges::find(plan_.tunnels, name, &PlannedTunnel::name);
+      const auto tunnel = std::ranges::find(plan_.tunnels, name, &OperationTunnel::name);
       const auto tool = orders_.tool(plan_);
       if (tunnel == plan_.tunnels.end() || !tool || images.empty())
         throw BadInput(Reason::bad_value, "its tool line is of no tunnel of the plan, or of no tool");
@@ -211,7 +213,7 @@ class Replay {
     list_files(record.files, folder, origin);
     const std::filesystem::path inside = value_or_throw(path_inside(session_, folder));
     if (!derived_) return differ(origin, fmt::format("{}: its case does not follow from the record", folder));
-    const auto measured = measure_case(*derived_, plan_, measurement_);
+    const auto measured = measure_by_plan(*derived_, plan_, measurement_);
     if (!measured) return differ(origin, measured.error().message);
     measurement_ = *measured;
     newest_ = *measured;

@@ -13,8 +13,8 @@ namespace {
 
 std::string digest_of(const robot::RobotOrder& order) { return xray::digest(to_text(robot::to_json(order))); }
 
-const PlannedTunnel& tunnel_of(const OperationPlan& plan, const std::string& name) {
-  const auto tunnel = std::ranges::find(plan.tunnels, name, &PlannedTunnel::name);
+const OperationTunnel& tunnel_of(const OperationPlan& plan, const std::string& name) {
+  const auto tunnel = std::ranges::find(plan.tunnels, name, &OperationTunnel::name);
   if (tunnel == plan.tunnels.end()) throw BadInput(Reason::bad_value, name + ": is not a tunnel of the plan");
   return *tunnel;
 }
@@ -110,7 +110,7 @@ robot::RobotOrder OrderReplay::derived(const std::string& name, const Context& a
   }
   if (plan_look_) {
     if (!at.measured || !hand_eye_) missing("no measurement or no registration was made before it");
-    const PlannedTunnel& tunnel = tunnel_of(at.plan, name);
+    const OperationTunnel& tunnel = tunnel_of(at.plan, name);
     const guidance::Poses now = value_or_throw(poses_now(*plan_look_, at.plan.tracker));
     const robot::RobotOrder order =
         value_or_throw(tunnel_order(at.plan, tunnel, *at.measured, *hand_eye_, now, *joints_));

@@ -23,7 +23,7 @@ class OrderReplay {
     const std::optional<pipeline::Result>& newest;
   };
   /// Called with the record's origin and what differs.
-  using Differ = std::function<void(const std::string& origin, const std::string& how)>;
+  using Differ = std::function<void(const std::string& origin, const std::string& difference)>;
 
   explicit OrderReplay(Differ differ) : differ_(std::move(differ)) {}
 

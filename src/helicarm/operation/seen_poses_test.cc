@@ -57,11 +57,11 @@ TEST(SeenPoses, CalibratorPoseIsFusedFromItsFacets) {
 }
 
 TEST(SeenPoses, OneFacetIsEnough) {
-  PoseWindow given = window();
-  given.samples["two"].clear();
-  EXPECT_TRUE(see_calibrator(given, plan()));
-  given.samples["one"].clear();
-  EXPECT_FALSE(see_calibrator(given, plan()));
+  PoseWindow seen = window();
+  seen.samples["two"].clear();
+  EXPECT_TRUE(see_calibrator(seen, plan()));
+  seen.samples["one"].clear();
+  EXPECT_FALSE(see_calibrator(seen, plan()));
 }
 
 TEST(SeenPoses, OccludedBoneIsAbsentFromTheAcquisition) {
@@ -71,9 +71,9 @@ TEST(SeenPoses, OccludedBoneIsAbsentFromTheAcquisition) {
 }
 
 TEST(SeenPoses, BoneThatMovedDuringTheAcquisitionIsRefused) {
-  PoseWindow given = window();
-  given.samples["femur"] = samples_of(at_rest, 1, {4, 0, 0});
-  const auto poses = poses_of_exposure(given, plan());
+  PoseWindow seen = window();
+  seen.samples["femur"] = samples_of(at_rest, 1, {4, 0, 0});
+  const auto poses = poses_of_exposure(seen, plan());
   ASSERT_FALSE(poses);
   EXPECT_EQ(poses.error().reason, Reason::pose_spread);
   EXPECT_NE(poses.error().message.find("femur"), std::string::npos);
@@ -81,17 +81,17 @@ TEST(SeenPoses, BoneThatMovedDuringTheAcquisitionIsRefused) {
 
 TEST(SeenPoses, PresentPosesNeedEveryMarker) {
   EXPECT_FALSE(poses_now(window(), plan()));
-  PoseWindow given = window();
-  given.samples["tibia"] = samples_of(at_rest, 4);
-  EXPECT_TRUE(poses_now(given, plan()));
+  PoseWindow seen = window();
+  seen.samples["tibia"] = samples_of(at_rest, 4);
+  EXPECT_TRUE(poses_now(seen, plan()));
 }
 
 TEST(SeenPoses, WindowIsRecordedToTheLastBit) {
-  const PoseWindow given = window();
-  const PoseWindow read = pose_window_from(Json::parse(to_json(given).dump()), "record").value();
-  EXPECT_EQ(read.middle_s, given.middle_s);
-  ASSERT_EQ(read.samples.size(), given.samples.size());
-  for (const auto& [tool, samples] : given.samples)
+  const PoseWindow seen = window();
+  const PoseWindow read = pose_window_from(Json::parse(to_json(seen).dump()), "record").value();
+  EXPECT_EQ(read.middle_s, seen.middle_s);
+  ASSERT_EQ(read.samples.size(), seen.samples.size());
+  for (const auto& [tool, samples] : seen.samples)
     for (std::size_t i = 0; i < samples.size(); ++i) {
       EXPECT_EQ(read.samples.at(tool)[i].time_s, samples[i].time_s);
       EXPECT_EQ(read.samples.at(tool)[i].tracker_from_tool.matrix(), samples[i].tracker_from_tool.matrix());

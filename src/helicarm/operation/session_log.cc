@@ -144,11 +144,11 @@ Expected<void> SessionLog::intact() {
 }
 
 Expected<void> SessionLog::check_file() {
-  const auto lost = [&](std::string_view how) {
+  const auto lost = [&](std::string_view loss) {
     return fail(Reason::record_lost,
                 fmt::format("{}: the record of this operation {}; nothing may move without it: begin a new "
                             "operation in another folder",
-                            log_.string(), how));
+                            log_.string(), loss));
   };
   struct stat ours, named;
   if (::fstat(file_, &ours) != 0) return lost("cannot be read");

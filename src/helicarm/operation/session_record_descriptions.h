@@ -103,7 +103,7 @@ void describe_hand_eye(Codec& codec, Found& found) {
 /// Of this version, or by bone of an earlier one.
 guidance::Poses recorded_poses(const Json& recorded, const std::string& where);
 /// A case of an earlier version does not say what it is, but has tool lines if it is a verification.
-std::string verified_by(const Json& given);
+std::string verified_by(const Json& case_json);
 
 template <class Kind>
 using Of = std::type_identity<Kind>;
@@ -160,18 +160,18 @@ void describe(Codec& codec, Value& begun, Of<record::CaseBegun>) {
       "case", true, {{"type", "object"}}, "its case.json",
       [&](JsonReader& reader) {
         if constexpr (!std::is_const_v<Value>) {
-          begun.given = reader.raw("case");
-          if (!begun.given.is_object()) reader.refuse(Reason::bad_value, "case", "is missing");
+          begun.case_json = reader.raw("case");
+          if (!begun.case_json.is_object()) reader.refuse(Reason::bad_value, "case", "is missing");
         }
       },
-      [&] { return std::optional(begun.given); });
+      [&] { return std::optional(begun.case_json); });
   describe_files(codec, begun.files);
   codec.custom(
       "verifies", false, {{"type", "string"}}, "the tunnel whose verification it is; `null`: a measurement",
       [&](JsonReader& reader) {
         if constexpr (!std::is_const_v<Value>) {
           const Json& tunnel = reader.raw("verifies");
-          begun.verifies = tunnel.is_string() ? tunnel.get<std::string>() : verified_by(begun.given);
+          begun.verifies = tunnel.is_string() ? tunnel.get<std::string>() : verified_by(begun.case_json);
         }
       },
       [&] { return std::optional(begun.verifies.empty() ? Json() : Json(begun.verifies)); });

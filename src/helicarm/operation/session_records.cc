@@ -22,9 +22,9 @@ guidance::Poses recorded_poses(const Json& recorded, const std::string& where) {
   return poses;
 }
 
-std::string verified_by(const Json& given) {
-  const auto lines = given.find("tool_lines");
-  if (lines == given.end() || !lines->is_array() || lines->empty()) return {};
+std::string verified_by(const Json& case_json) {
+  const auto lines = case_json.find("tool_lines");
+  if (lines == case_json.end() || !lines->is_array() || lines->empty()) return {};
   return JsonReader(lines->at(0), "case.json: tool_lines").text("tunnel");
 }
 

@@ -67,7 +67,7 @@ struct CaseBegun {
   static constexpr const char* kind = "case";
   static constexpr const char* help = "a measurement or a verification begins";
   std::string folder;
-  Json given;  ///< case.json
+  Json case_json;  ///< case.json
   Digests files;
   std::string verifies;  ///< the tunnel whose verification it is; empty: a measurement
 };

@@ -30,15 +30,15 @@ geometry::RigidTransform pose_of(const guidance::Poses& poses, const guidance::B
   return *pose;
 }
 
-Vector3d located(const pipeline::Result& result, const PlannedTunnel& tunnel, const std::string& end) {
-  if (const guidance::PointInFrames* place = place_of(result, tunnel, end))
-    if (const guidance::Place* in_bone = place->in(tunnel.bone)) return in_bone->point();
+Vector3d located(const pipeline::Result& result, const OperationTunnel& tunnel, const std::string& end) {
+  if (const guidance::PointInFrames* located = place_of(result, tunnel, end))
+    if (const guidance::Place* in_bone = located->in(tunnel.bone)) return in_bone->point();
   throw BadInput(Reason::not_seen, fmt::format("{}: is not located in its bone's frame", end));
 }
 
 }  // namespace
 
-const guidance::PointInFrames* place_of(const pipeline::Result& result, const PlannedTunnel& tunnel,
+const guidance::PointInFrames* place_of(const pipeline::Result& result, const OperationTunnel& tunnel,
                                         const std::string& end) {
   if (tunnel.of_model) {
     const auto point = std::ranges::find_if(result.model_points, [&](const pipeline::ModelPoint& each) {
@@ -50,7 +50,7 @@ const guidance::PointInFrames* place_of(const pipeline::Result& result, const Pl
   return point != result.points.end() && point->place ? &*point->place : nullptr;
 }
 
-Expected<TunnelInBone> tunnel_in_bone(const pipeline::Result& result, const PlannedTunnel& tunnel) {
+Expected<TunnelInBone> tunnel_in_bone(const pipeline::Result& result, const OperationTunnel& tunnel) {
   return guarded([&] {
     TunnelInBone in_bone{tunnel.bone, located(result, tunnel, tunnel.start),
                          located(result, tunnel, tunnel.end)};

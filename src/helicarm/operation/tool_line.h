@@ -18,11 +18,11 @@ struct TunnelInBone {
 };
 
 /// An end of the tunnel, by its name: a pick, or a point of the tunnel's model; null if it is not located.
-const guidance::PointInFrames* place_of(const pipeline::Result& result, const PlannedTunnel& tunnel,
+const guidance::PointInFrames* place_of(const pipeline::Result& result, const OperationTunnel& tunnel,
                                         const std::string& end);
 
 /// From the located picks or the registered plan. Refuses (not_seen) an end that is not located.
-Expected<TunnelInBone> tunnel_in_bone(const pipeline::Result& result, const PlannedTunnel& tunnel);
+Expected<TunnelInBone> tunnel_in_bone(const pipeline::Result& result, const OperationTunnel& tunnel);
 
 /// The tunnel in the robot's base frame at the bone's present pose.
 robot::TunnelAxis axis_in_base(const TunnelInBone& tunnel, const guidance::Poses& now,

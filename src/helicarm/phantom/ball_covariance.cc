@@ -20,14 +20,14 @@ Eigen::Index place_of(const JointCovariance& joint, const std::string& label) {
 
 }  // namespace
 
-Expected<Eigen::MatrixXd> checked_covariance(const Eigen::MatrixXd& given) {
-  if (given.size() == 0) return given;
-  const double largest = given.cwiseAbs().maxCoeff();
-  const double asymmetry = (given - given.transpose()).cwiseAbs().maxCoeff();
+Expected<Eigen::MatrixXd> checked_covariance(const Eigen::MatrixXd& covariance_mm2) {
+  if (covariance_mm2.size() == 0) return covariance_mm2;
+  const double largest = covariance_mm2.cwiseAbs().maxCoeff();
+  const double asymmetry = (covariance_mm2 - covariance_mm2.transpose()).cwiseAbs().maxCoeff();
   if (asymmetry > rounding * largest)
     return fail(Reason::bad_value, fmt::format("is not symmetric: elements differ by {:g}", asymmetry),
                 {{"value", asymmetry}, {"limit", rounding * largest}});
-  const Eigen::MatrixXd symmetric = (given + given.transpose()) / 2;
+  const Eigen::MatrixXd symmetric = (covariance_mm2 + covariance_mm2.transpose()) / 2;
   const double least = geometry::symmetric_eigen(symmetric).values[0];
   if (least < -rounding * largest)
     return fail(Reason::bad_value, fmt::format("has the negative eigenvalue {:g}", least),

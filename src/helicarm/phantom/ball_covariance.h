@@ -14,7 +14,7 @@ inline constexpr std::size_t most_correlated_balls = 100;
 
 /// A covariance made exactly symmetric. Refuses (`bad_value`) one that is asymmetric or has a negative
 /// eigenvalue, beyond rounding.
-Expected<Eigen::MatrixXd> checked_covariance(const Eigen::MatrixXd& given);
+Expected<Eigen::MatrixXd> checked_covariance(const Eigen::MatrixXd& covariance_mm2);
 
 /// The size x size matrix (mm^2) under a key, which must be symmetric and without negative eigenvalues, to
 /// rounding.

@@ -29,8 +29,8 @@ Dots nearest_places(const Dots& dots, const Eigen::Matrix2d& steps) {
   const Eigen::Matrix2d inverse = steps.inverse();
   return dots.unaryExpr([&](const std::complex<double>& dot) {
     const Eigen::Vector2d indices = inverse * Eigen::Vector2d(dot.real(), dot.imag());
-    const Eigen::Vector2d place = steps * Eigen::Vector2d(indices.array().round());
-    return std::complex(place.x(), place.y());
+    const Eigen::Vector2d position = steps * Eigen::Vector2d(indices.array().round());
+    return std::complex(position.x(), position.y());
   });
 }
 

@@ -79,7 +79,7 @@ struct Collapse {
   double cost;
   std::uint32_t kept, removed;
   std::uint32_t versions;
-  Eigen::Vector3d place;
+  Eigen::Vector3d position;
 
   bool operator<(const Collapse& other) const {
     return std::tie(other.cost, other.kept, other.removed) < std::tie(cost, kept, removed);
@@ -136,9 +136,9 @@ class Simplifier {
   void push(std::uint32_t i, std::uint32_t j) {
     Quadric sum = quadrics_[i];
     sum += quadrics_[j];
-    const Eigen::Vector3d place = sum.least((corners_[i] + corners_[j]) / 2);
-    if (sum.at(place) <= tolerance2_ * sum.area)
-      queue_.push({sum.at(place), i, j, versions_[i] + versions_[j], place});
+    const Eigen::Vector3d position = sum.least((corners_[i] + corners_[j]) / 2);
+    if (sum.at(position) <= tolerance2_ * sum.area)
+      queue_.push({sum.at(position), i, j, versions_[i] + versions_[j], position});
   }
 
   std::vector<std::uint32_t> neighbours(std::uint32_t corner) const {
@@ -183,7 +183,7 @@ class Simplifier {
         }
         Corners after = corners_of(t);
         for (std::size_t k = 0; k < 3; ++k)
-          if (t[k] == end) after[k] = c.place;
+          if (t[k] == end) after[k] = c.position;
         const Eigen::Vector3d before = normal_of(corners_of(t)), now = normal_of(after);
         constexpr double least_cosine = 0.5, least_twice_area_mm2 = 1e-4;
         const double size = now.norm();
@@ -223,7 +223,7 @@ class Simplifier {
       around_[c.kept].push_back(face);
     }
     around_[c.removed].clear();
-    corners_[c.kept] = c.place;
+    corners_[c.kept] = c.position;
     quadrics_[c.kept] += quadrics_[c.removed];
     ++versions_[c.kept];
     for (const std::uint32_t other : neighbours(c.kept)) push(c.kept, other);

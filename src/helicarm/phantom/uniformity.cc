@@ -17,9 +17,9 @@ struct Cell {
   bool operator<(const Cell& other) const { return bound < other.bound; }
 };
 
-double nearest_mm(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& place) {
+double nearest_mm(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& position) {
   double nearest = std::numeric_limits<double>::infinity();
-  for (const auto& point : points) nearest = std::min(nearest, (point - place).squaredNorm());
+  for (const auto& point : points) nearest = std::min(nearest, (point - position).squaredNorm());
   return std::sqrt(nearest);
 }
 

@@ -26,13 +26,13 @@ std::optional<bool> mirrored(const pipeline::RectifiedView& detected, const pipe
 }
 
 std::vector<std::optional<geometry::View>> labelled_views(
-    const std::vector<pipeline::RectifiedView>& detected, const pipeline::Case& given) {
+    const std::vector<pipeline::RectifiedView>& detected, const pipeline::Case& the_case) {
   std::vector<std::optional<geometry::View>> views;
   for (std::size_t v = 0; v < detected.size(); ++v) {
     fiducials::FiducialOptions options;
-    options.mirrored = given.views[v].mirrored;
+    options.mirrored = the_case.views[v].mirrored;
     const auto labelled = fiducials::label_fiducials(*detected[v].xray_image, detected[v].dots,
-                                                     detected[v].rectification, given.calibrator, options);
+                                                     detected[v].rectification, the_case.calibrator, options);
     views.push_back(labelled ? std::optional(labelled->view) : std::nullopt);
   }
   return views;
@@ -160,8 +160,8 @@ void name_by_size(AdjustedViews& found) {
   };
   std::ranges::sort(order, {}, [&](std::size_t i) { return std::tuple(-found.diameters_mm[i], u_of(i)); });
   found.labels.resize(order.size());
-  for (std::size_t place = 0; place < order.size(); ++place)
-    found.labels[order[place]] = fmt::format("B{}", place + 1);
+  for (std::size_t rank = 0; rank < order.size(); ++rank)
+    found.labels[order[rank]] = fmt::format("B{}", rank + 1);
   found.order = std::move(order);
 }
 
@@ -187,25 +187,25 @@ void warn_of_missing(const Reconstruction& r, const std::vector<std::size_t>& ba
 }  // namespace
 
 Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::RectifiedView>& detected,
-                                       const pipeline::Case& given, KnownCentres known,
+                                       const pipeline::Case& the_case, KnownCentres known,
                                        std::size_t least_views, unsigned threads,
                                        std::vector<Warning>& warnings) {
   const bool from_scratch = known == KnownCentres::none;
-  std::vector<double> kinds = given.diameters_mm;
+  std::vector<double> kinds = the_case.diameters_mm;
   if (!from_scratch)
-    for (const phantom::CalibratorBall& ball : given.calibrator.balls) kinds.push_back(ball.diameter_mm);
+    for (const phantom::CalibratorBall& ball : the_case.calibrator.balls) kinds.push_back(ball.diameter_mm);
   std::ranges::sort(kinds, std::greater{});
   kinds.erase(std::unique(kinds.begin(), kinds.end()), kinds.end());
   std::vector<PreparedView> views(detected.size());
   for (std::size_t v = 0; v < detected.size(); ++v)
-    views[v] = prepared(detected[v], kinds, mirrored(detected[v], given.views[v], from_scratch));
+    views[v] = prepared(detected[v], kinds, mirrored(detected[v], the_case.views[v], from_scratch));
   std::vector<PhantomView> plain;
   for (const PreparedView& view : views) plain.push_back(view.view);
 
   auto r = from_scratch ? reconstruct_from_scratch(plain, kinds)
            : known == KnownCentres::nominal
-               ? reconstruct_nominal(plain, given.calibrator)
-               : reconstruct_views(plain, given.calibrator, labelled_views(detected, given));
+               ? reconstruct_nominal(plain, the_case.calibrator)
+               : reconstruct_views(plain, the_case.calibrator, labelled_views(detected, the_case));
   if (!r) return tl::unexpected<Failure>(r.error());
   for (std::size_t v = 0; v < views.size(); ++v)
     if (r->views[v]) follow_moved(detected[v], views[v], *r, v);
@@ -236,18 +236,18 @@ Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::RectifiedView
     found.ball_of_nominal = balls;
     found.order.resize(balls.size());
     std::iota(found.order.begin(), found.order.end(), std::size_t(0));
-    for (const std::size_t ball : balls) found.labels.push_back(given.calibrator.balls[ball].label);
+    for (const std::size_t ball : balls) found.labels.push_back(the_case.calibrator.balls[ball].label);
   }
-  warn_of_missing(*r, balls, used, views, from_scratch ? nullptr : &given.calibrator, warnings);
+  warn_of_missing(*r, balls, used, views, from_scratch ? nullptr : &the_case.calibrator, warnings);
   return found;
 }
 
-Expected<void> check_handedness(const AdjustedViews& found, const pipeline::Case& given,
+Expected<void> check_handedness(const AdjustedViews& found, const pipeline::Case& the_case,
                                 const std::vector<pipeline::RectifiedView>& detected) {
   for (std::size_t v = 0; v < found.view_of_case.size(); ++v) {
     const std::size_t i = found.view_of_case[v];
     if (!pipeline::is_mirrored_without_statement(found.consistent.fit.views[v].intrinsics.fx < 0,
-                                                 *detected[i].xray_image, given.views[i]))
+                                                 *detected[i].xray_image, the_case.views[i]))
       return {};
   }
   return fail(Reason::ambiguous_handedness,

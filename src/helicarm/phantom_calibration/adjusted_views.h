@@ -33,13 +33,13 @@ enum class KnownCentres {
 /// and adjusts them. Warns of views and balls that are not part of it; `too_few_views` where fewer than
 /// `least_views` are.
 Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::RectifiedView>& detected,
-                                       const pipeline::Case& given, KnownCentres known,
+                                       const pipeline::Case& the_case, KnownCentres known,
                                        std::size_t least_views, unsigned threads,
                                        std::vector<Warning>& warnings);
 
 /// `ambiguous_handedness` where every image is mirrored and neither the case nor a tag says so: the
 /// calibrator file may be a mirror image.
-Expected<void> check_handedness(const AdjustedViews& found, const pipeline::Case& given,
+Expected<void> check_handedness(const AdjustedViews& found, const pipeline::Case& the_case,
                                 const std::vector<pipeline::RectifiedView>& detected);
 
 /// The note that an explained mirror image of every view calls for.

@@ -113,7 +113,7 @@ std::vector<Sizes> possible_sizes(const std::vector<double>& seen, const std::ve
 }
 
 Expected<void> settle_sizes(AdjustedViews& found, const std::vector<pipeline::RectifiedView>& detected,
-                            const pipeline::Case& given, std::optional<double> factor_by_hand,
+                            const pipeline::Case& the_case, std::optional<double> factor_by_hand,
                             std::vector<Warning>& warnings) {
   const double factor = diameter_scale(found).factor;
   std::vector<double> seen;
@@ -121,7 +121,7 @@ Expected<void> settle_sizes(AdjustedViews& found, const std::vector<pipeline::Re
     seen.push_back(diameter.value_or(found.diameters_mm[i] / factor));
     ++i;
   }
-  const std::vector<double> listed = sorted_once(given.diameters_mm);
+  const std::vector<double> listed = sorted_once(the_case.diameters_mm);
   const auto alternatives = possible_by_distances(
       possible_sizes(seen, listed), depth_limits(found, detected).largest_factor, factor_by_hand);
   if (alternatives.size() > 1) return tl::unexpected<Failure>(ambiguous_sizes(alternatives, listed));
@@ -147,17 +147,17 @@ Expected<void> settle_sizes(AdjustedViews& found, const std::vector<pipeline::Re
   return {};
 }
 
-std::vector<Warning> sizes_stated_twice(const pipeline::Case& given) {
+std::vector<Warning> sizes_stated_twice(const pipeline::Case& the_case) {
   std::vector<double> of_file;
-  for (const phantom::CalibratorBall& ball : given.calibrator.balls) of_file.push_back(ball.diameter_mm);
+  for (const phantom::CalibratorBall& ball : the_case.calibrator.balls) of_file.push_back(ball.diameter_mm);
   of_file = sorted_once(std::move(of_file));
-  const std::vector<double> listed = sorted_once(given.diameters_mm);
+  const std::vector<double> listed = sorted_once(the_case.diameters_mm);
   if (of_file.empty() || listed.empty() || of_file == listed) return {};
   return {
       {Reason::scale_disagrees,
        fmt::format("case.json: \"diameters_mm\" lists {} mm, the balls of its calibrator \"{}\" have {} mm: "
                    "correct one of the two",
-                   numbers(listed), given.calibrator.name, numbers(of_file)),
+                   numbers(listed), the_case.calibrator.name, numbers(of_file)),
        {},
        {}}};
 }

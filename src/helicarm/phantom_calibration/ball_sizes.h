@@ -22,10 +22,10 @@ std::vector<Sizes> possible_sizes(const std::vector<double>& seen, const std::ve
 /// source distance, or the measurement is refused (`uncertain`). Warns of listed sizes without a ball
 /// (`not_seen`).
 Expected<void> settle_sizes(AdjustedViews& found, const std::vector<pipeline::RectifiedView>& detected,
-                            const pipeline::Case& given, std::optional<double> factor_by_hand,
+                            const pipeline::Case& the_case, std::optional<double> factor_by_hand,
                             std::vector<Warning>& warnings);
 
 /// Warns (`scale_disagrees`) of a case whose `diameters_mm` and calibrator state different sizes.
-std::vector<Warning> sizes_stated_twice(const pipeline::Case& given);
+std::vector<Warning> sizes_stated_twice(const pipeline::Case& the_case);
 
 }  // namespace helicarm::phantom_calibration

@@ -29,12 +29,12 @@ TEST(PossibleSizes, SizesOfAnotherRatioHaveNoAssignment) {
 }
 
 TEST(StatedSizes, ListThatContradictsTheCalibratorIsWarnedOf) {
-  pipeline::Case given;
-  given.calibrator = phantom::udcsc();
-  given.diameters_mm = {4};
-  EXPECT_TRUE(sizes_stated_twice(given).empty());
-  given.diameters_mm = {5, 4};
-  const auto warnings = sizes_stated_twice(given);
+  pipeline::Case the_case;
+  the_case.calibrator = phantom::udcsc();
+  the_case.diameters_mm = {4};
+  EXPECT_TRUE(sizes_stated_twice(the_case).empty());
+  the_case.diameters_mm = {5, 4};
+  const auto warnings = sizes_stated_twice(the_case);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].message.find("lists 4, 5 mm"), std::string::npos) << warnings[0].message;
 }

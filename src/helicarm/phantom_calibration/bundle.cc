@@ -77,11 +77,11 @@ std::optional<Eigen::MatrixXd> whitening_of(const BundleView& view, bool robust)
   return geometry::whitening(covariance);
 }
 
-void add_images(Blocks& blocks, const BundleProblem& given, std::size_t v, const BundleOptions& options) {
+void add_images(Blocks& blocks, const BundleProblem& problem, std::size_t v, const BundleOptions& options) {
   ViewBlocks& view = blocks.views[v];
   std::vector<Eigen::Vector2d> images;
   std::vector<double*> all = {view.pose.data(), view.intrinsics.data()};
-  for (const FiducialImage& image : given.views[v].images) {
+  for (const FiducialImage& image : problem.views[v].images) {
     double* centre = blocks.centres[image.fiducial].data();
     images.push_back(image.uv);
     all.push_back(centre);
@@ -97,12 +97,12 @@ void add_images(Blocks& blocks, const BundleProblem& given, std::size_t v, const
   blocks.problem.SetManifold(view.pose.data(), new PoseManifold);
 }
 
-bool has_nominal_focal(const BundleProblem& given) {
-  return std::ranges::all_of(given.views, [](const BundleView& v) { return v.prior.focal_px.has_value(); });
+bool has_nominal_focal(const BundleProblem& problem) {
+  return std::ranges::all_of(problem.views, [](const BundleView& v) { return v.prior.focal_px.has_value(); });
 }
 
-void add_priors(Blocks& blocks, const BundleProblem& given, std::size_t v) {
-  const geometry::IntrinsicsPrior& prior = given.views[v].prior;
+void add_priors(Blocks& blocks, const BundleProblem& problem, std::size_t v) {
+  const geometry::IntrinsicsPrior& prior = problem.views[v].prior;
   ViewBlocks& view = blocks.views[v];
   double* own = view.intrinsics.data();
   double* shared = blocks.c_arm.data();
@@ -114,37 +114,37 @@ void add_priors(Blocks& blocks, const BundleProblem& given, std::size_t v) {
       blocks.problem.AddResidualBlock(cost, nullptr, own, shared);
   };
   if (prior.aspect) add(1, prior.aspect->value, 1, prior.aspect->sigma, -1);
-  if (given.c_arm.focal)
-    add(0, has_nominal_focal(given) ? *prior.focal_px : 0, prior.unit_px, given.c_arm.focal->of_view, 0);
-  if (!prior.principal_px || !given.c_arm.principal) return;
-  const double sigma = given.c_arm.principal->of_view;
+  if (problem.c_arm.focal)
+    add(0, has_nominal_focal(problem) ? *prior.focal_px : 0, prior.unit_px, problem.c_arm.focal->of_view, 0);
+  if (!prior.principal_px || !problem.c_arm.principal) return;
+  const double sigma = problem.c_arm.principal->of_view;
   add(2, prior.principal_px->x(), (view.mirrored ? -1 : 1) * prior.unit_px, sigma, 1);
   add(3, prior.principal_px->y(), prior.unit_px, sigma, 2);
 }
 
-void add_c_arm(Blocks& blocks, const BundleProblem& given) {
+void add_c_arm(Blocks& blocks, const BundleProblem& problem) {
   double* shared = blocks.c_arm.data();
   if (!blocks.problem.HasParameterBlock(shared)) return;
-  const bool nominal = has_nominal_focal(given);
-  if (given.c_arm.focal && nominal)
-    blocks.problem.AddResidualBlock(new PriorCost(3, 0, 0, 1, given.c_arm.focal->common), nullptr, shared);
-  if (given.c_arm.principal)
+  const bool nominal = has_nominal_focal(problem);
+  if (problem.c_arm.focal && nominal)
+    blocks.problem.AddResidualBlock(new PriorCost(3, 0, 0, 1, problem.c_arm.focal->common), nullptr, shared);
+  if (problem.c_arm.principal)
     for (const int axis : {1, 2})
-      blocks.problem.AddResidualBlock(new PriorCost(3, axis, 0, 1, given.c_arm.principal->common), nullptr,
+      blocks.problem.AddResidualBlock(new PriorCost(3, axis, 0, 1, problem.c_arm.principal->common), nullptr,
                                       shared);
-  if (given.c_arm.focal && nominal) return;
+  if (problem.c_arm.focal && nominal) return;
   double mean = 0;
-  for (std::size_t v = 0; v < given.views.size(); ++v)
-    mean += blocks.views[v].intrinsics[0] / given.views[v].prior.unit_px / double(given.views.size());
+  for (std::size_t v = 0; v < problem.views.size(); ++v)
+    mean += blocks.views[v].intrinsics[0] / problem.views[v].prior.unit_px / double(problem.views.size());
   shared[0] = mean;
 }
 
-Expected<void> fill(Blocks& blocks, const BundleProblem& given, const BundleOptions& options) {
-  for (const Eigen::Vector3d& centre : given.centres)
+Expected<void> fill(Blocks& blocks, const BundleProblem& problem, const BundleOptions& options) {
+  for (const Eigen::Vector3d& centre : problem.centres)
     blocks.centres.push_back({centre.x(), centre.y(), centre.z()});
-  blocks.views.resize(given.views.size());
-  for (std::size_t v = 0; v < given.views.size(); ++v) {
-    const BundleView& from = given.views[v];
+  blocks.views.resize(problem.views.size());
+  for (std::size_t v = 0; v < problem.views.size(); ++v) {
+    const BundleView& from = problem.views[v];
     ViewBlocks& view = blocks.views[v];
     write_pose(from.start.camera_from_world, view.pose.data());
     write_intrinsics(from.start.intrinsics, view.intrinsics.data());
@@ -154,12 +154,12 @@ Expected<void> fill(Blocks& blocks, const BundleProblem& given, const BundleOpti
       return fail(Reason::uncertain,
                   fmt::format("the covariance of the images in view {} is not positive definite", from.name));
     view.whitening = *std::move(whitening);
-    add_images(blocks, given, v, options);
+    add_images(blocks, problem, v, options);
     blocks.problem.SetParameterLowerBound(view.intrinsics.data(), 0, 1);
     blocks.problem.SetParameterLowerBound(view.intrinsics.data(), 1, 0.5);
   }
-  for (std::size_t v = 0; v < given.views.size(); ++v) add_priors(blocks, given, v);  // after all images
-  add_c_arm(blocks, given);
+  for (std::size_t v = 0; v < problem.views.size(); ++v) add_priors(blocks, problem, v);  // after all images
+  add_c_arm(blocks, problem);
   if (options.fixed_centres)
     for (std::size_t i = 0; i < blocks.centres.size(); ++i)
       if (options.free_centre != i && blocks.problem.HasParameterBlock(blocks.centres[i].data()))
@@ -187,11 +187,11 @@ Linear linearised(Blocks& blocks, const BundleOptions& options) {
     order.push_back(view.intrinsics.data());
   }
   if (blocks.problem.HasParameterBlock(blocks.c_arm.data())) order.push_back(blocks.c_arm.data());
-  ceres::Problem::EvaluateOptions how;
-  how.parameter_blocks = order;
+  ceres::Problem::EvaluateOptions evaluation;
+  evaluation.parameter_blocks = order;
   std::vector<double> residuals;
   ceres::CRSMatrix sparse;
-  blocks.problem.Evaluate(how, nullptr, &residuals, nullptr, &sparse);
+  blocks.problem.Evaluate(evaluation, nullptr, &residuals, nullptr, &sparse);
   linear.residuals = Eigen::Map<Eigen::VectorXd>(residuals.data(), Eigen::Index(residuals.size()));
   linear.jacobian = Eigen::MatrixXd::Zero(sparse.num_rows, sparse.num_cols);
   for (int row = 0; row < sparse.num_rows; ++row)
@@ -262,16 +262,16 @@ std::vector<std::vector<double>> falls_of(const Blocks& blocks, const Linear& li
   return falls;
 }
 
-void describe(BundleFit& fit, const Blocks& blocks, const BundleProblem& given) {
+void describe(BundleFit& fit, const Blocks& blocks, const BundleProblem& problem) {
   double sum = 0;
   std::size_t count = 0;
   for (const auto& centre : blocks.centres) fit.centres.emplace_back(centre.data());
-  for (std::size_t v = 0; v < given.views.size(); ++v) {
+  for (std::size_t v = 0; v < problem.views.size(); ++v) {
     const ViewBlocks& view = blocks.views[v];
     fit.views.push_back(
         {read_intrinsics(view.intrinsics.data(), view.mirrored), read_pose(view.pose.data())});
     auto& residuals = fit.residuals_px.emplace_back();
-    for (const FiducialImage& image : given.views[v].images) {
+    for (const FiducialImage& image : problem.views[v].images) {
       residuals.push_back(fit.views.back().project(fit.centres[image.fiducial]) - image.uv);
       sum += residuals.back().squaredNorm();
       count += 2;
@@ -287,28 +287,28 @@ void silence_ceres() {
 
 }  // namespace
 
-Expected<BundleFit> adjust(const BundleProblem& given, const BundleOptions& options) {
-  for (const BundleView& view : given.views)
+Expected<BundleFit> adjust(const BundleProblem& problem, const BundleOptions& options) {
+  for (const BundleView& view : problem.views)
     if (view.images.empty())
       return fail(Reason::uncertain, fmt::format("no ball is seen in view {}", view.name));
   Blocks blocks;
-  if (const auto filled = fill(blocks, given, options); !filled)
+  if (const auto filled = fill(blocks, problem, options); !filled)
     return tl::unexpected<Failure>(filled.error());
   silence_ceres();
-  ceres::Solver::Options how;
-  how.linear_solver_type = ceres::DENSE_QR;
-  how.max_num_iterations = options.most_iterations;
-  how.function_tolerance = 1e-12;
-  how.parameter_tolerance = 1e-12;
-  how.gradient_tolerance = 1e-14;
-  how.logging_type = ceres::SILENT;
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_QR;
+  solver.max_num_iterations = options.most_iterations;
+  solver.function_tolerance = 1e-12;
+  solver.parameter_tolerance = 1e-12;
+  solver.gradient_tolerance = 1e-14;
+  solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
-  ceres::Solve(how, &blocks.problem, &summary);
+  ceres::Solve(solver, &blocks.problem, &summary);
   if (!summary.IsSolutionUsable())
     return fail(Reason::uncertain,
                 "the images do not determine the phantom: the adjustment does not converge");
   BundleFit fit;
-  describe(fit, blocks, given);
+  describe(fit, blocks, problem);
   fit.chi2 = 2 * summary.final_cost;
   if (options.robust) return fit;
   const Linear linear = linearised(blocks, options);

@@ -91,14 +91,14 @@ void expect_as_others(BundleProblem& alone, const BundleProblem& others, const B
 }
 
 std::optional<double> left_out(const ConsistentFit& all, std::size_t v) {
-  BundleProblem given = all.problem;
-  restart(given, all.fit);
+  BundleProblem restarted = all.problem;
+  restart(restarted, all.fit);
   std::vector<std::size_t> kept;
-  BundleProblem others = without_view(given, v, kept);
+  BundleProblem others = without_view(restarted, v, kept);
   if (others.views.size() < 2 || others.centres.size() < 6) return std::nullopt;
   const auto fit = adjust(others);
   if (!fit) return std::nullopt;
-  BundleProblem alone{fit->centres, {given.views[v]}, given.c_arm};
+  BundleProblem alone{fit->centres, {restarted.views[v]}, restarted.c_arm};
   BundleView& view = alone.views.front();
   for (std::size_t i = view.images.size(); i-- > 0;) {
     const auto found = std::ranges::find(kept, view.images[i].fiducial);
@@ -173,12 +173,12 @@ std::optional<MovedFiducial> moved_fiducial(const ConsistentFit& fit, double lea
           std::max(moved.moved_mm, image->off_px.norm() * view.depth(centre) / view.intrinsics.fy);
     }
     if (ray_observations.size() > 1 && geometry::widest_angle(ray_observations) > 0.1) {
-      const auto place = geometry::intersect(
+      const auto met = geometry::intersect(
           ray_observations, Eigen::MatrixXd::Identity(2 * Eigen::Index(ray_observations.size()),
                                                       2 * Eigen::Index(ray_observations.size())));
       // They must agree among themselves to a pixel.
-      if (!place || place->chi2 > 2.0 * double(ray_observations.size())) continue;
-      moved.moved_mm = (place->point - centre).norm();
+      if (!met || met->chi2 > 2.0 * double(ray_observations.size())) continue;
+      moved.moved_mm = (met->point - centre).norm();
     }
     if (moved.moved_mm < least_mm) continue;
     if (!most || moved.moved_mm > most->moved_mm) most = std::move(moved);

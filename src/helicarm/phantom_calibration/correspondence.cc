@@ -121,10 +121,10 @@ std::optional<Support> best_support(const Reconstruction& r, const std::vector<P
           const geometry::RayObservation ray_observations[] = {{*r.views[i], views[i].candidates[a].uv},
                                                                {*r.views[j], views[j].candidates[b].uv}};
           if (geometry::widest_angle(ray_observations) < 0.05) continue;
-          const auto place = geometry::intersect(ray_observations, Eigen::MatrixXd::Identity(4, 4));
-          if (!place || place->chi2 > 16 * limit_scale(views[i]) * limit_scale(views[i])) continue;
-          if (about && (place->point - *about).norm() > reach_mm) continue;
-          Support support = support_of(r, views, taken, place->point, diameter_mm);
+          const auto met = geometry::intersect(ray_observations, Eigen::MatrixXd::Identity(4, 4));
+          if (!met || met->chi2 > 16 * limit_scale(views[i]) * limit_scale(views[i])) continue;
+          if (about && (met->point - *about).norm() > reach_mm) continue;
+          Support support = support_of(r, views, taken, met->point, diameter_mm);
           if (support.views < int(least_track_views)) continue;
           if (!best ||
               std::tuple(-support.views, support.error_px) < std::tuple(-best->views, best->error_px))

@@ -191,8 +191,9 @@ std::pair<double, double> best_angles(const std::vector<std::array<Vector2d, 3>>
 
 /// Adjusted in perspective, from rotation angles found in parallel projection. `depth_sign` -1: the other of
 /// the two that a parallel projection shows alike.
-Expected<Reconstruction> start_of(const std::vector<PhantomView>& given, const std::vector<PlainView>& views,
-                                  const Triple& t, const std::vector<double>& diameters_mm,
+Expected<Reconstruction> start_of(const std::vector<PhantomView>& phantom_views,
+                                  const std::vector<PlainView>& views, const Triple& t,
+                                  const std::vector<double>& diameters_mm,
                                   const std::pair<double, double>& angles, double depth_sign) {
   std::vector<std::array<Vector2d, 3>> images;
   std::array<Vector2d, 3> means;
@@ -212,14 +213,14 @@ Expected<Reconstruction> start_of(const std::vector<PhantomView>& given, const s
   orthographic_residual(images, rotations, scales, &points);
 
   Reconstruction r;
-  r.views.resize(given.size());
-  r.candidate_of.assign(given.size(), std::vector<int>(t.tracks.size(), -1));
+  r.views.resize(phantom_views.size());
+  r.candidate_of.assign(phantom_views.size(), std::vector<int>(t.tracks.size(), -1));
   std::vector<double> magnifications;  // px / mm in the first view
   for (std::size_t i = 0; i < t.tracks.size(); ++i) {
     const auto first = std::size_t(t.tracks[i][0]);
     const double diameter = diameters_mm[std::size_t(views[t.views[0]].candidates[first].kind)];
     r.diameters_mm.push_back(diameter);
-    magnifications.push_back(2 * given[t.views[0]].candidates[first].radius_px / diameter);
+    magnifications.push_back(2 * phantom_views[t.views[0]].candidates[first].radius_px / diameter);
     for (std::size_t v = 0; v < 3; ++v) r.candidate_of[t.views[v]][i] = t.tracks[i][v];
   }
   const double magnification = median(std::move(magnifications));
@@ -232,11 +233,11 @@ Expected<Reconstruction> start_of(const std::vector<PhantomView>& given, const s
                                           view.principal_px.x(), view.principal_px.y(), 0},
                                          {rotations[v], {shift.x(), shift.y(), depth}}};
   }
-  if (auto adjusted = readjust(r, given); !adjusted) return tl::unexpected<Failure>(adjusted.error());
+  if (auto adjusted = readjust(r, phantom_views); !adjusted) return tl::unexpected<Failure>(adjusted.error());
   return r;
 }
 
-std::optional<Reconstruction> best_start(const std::vector<PhantomView>& given,
+std::optional<Reconstruction> best_start(const std::vector<PhantomView>& phantom_views,
                                          const std::vector<PlainView>& views,
                                          const std::array<std::size_t, 3>& at,
                                          const std::vector<double>& diameters_mm, PairMatches& pairs) {
@@ -258,7 +259,7 @@ std::optional<Reconstruction> best_start(const std::vector<PhantomView>& given,
       for (std::size_t v = 0; v < 3; ++v) image[v] -= means[v];
     const auto angles = best_angles(images, t);
     for (const double sign : {1.0, -1.0}) {
-      auto start = start_of(given, views, t, diameters_mm, angles, sign);
+      auto start = start_of(phantom_views, views, t, diameters_mm, angles, sign);
       if (!start || start->rms_px > limit * largest_rms_px) continue;
       const auto rank = [&](const Reconstruction& r) {
         return std::tuple(-double(r.centres.size()) + (r.rms_px > limit * good_rms_px ? 4 : 0), r.rms_px);
@@ -318,13 +319,13 @@ Expected<void> check_handedness(const Reconstruction& r) {
 
 }  // namespace
 
-Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>& given,
+Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>& phantom_views,
                                                   const std::vector<double>& diameters_mm) {
-  if (given.size() < 3)
+  if (phantom_views.size() < 3)
     return fail(Reason::too_few_views, "at least three views are required to measure a phantom",
-                {{"views", double(given.size())}, {"needed", 3}});
+                {{"views", double(phantom_views.size())}, {"needed", 3}});
   std::vector<PlainView> views;
-  for (const PhantomView& view : given) {
+  for (const PhantomView& view : phantom_views) {
     if (!view.labelling.mirrored) {
       Failure failure{Reason::ambiguous_handedness,
                       "the images do not distinguish a phantom from its mirror image in mirrored images: "
@@ -345,18 +346,18 @@ Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>
   Reconstruction best;
   PairMatches pairs;
   for (std::size_t i = 0; i < std::min(order.size(), most_tries); ++i) {
-    auto start = best_start(given, views, order[i], diameters_mm, pairs);
+    auto start = best_start(phantom_views, views, order[i], diameters_mm, pairs);
     if (!start) continue;
-    if (!complete(*start, given)) continue;
-    add_fiducials(*start, given, diameters_mm);
-    if (!complete(*start, given)) continue;
+    if (!complete(*start, phantom_views)) continue;
+    add_fiducials(*start, phantom_views, diameters_mm);
+    if (!complete(*start, phantom_views)) continue;
     drop_unsupported(*start);
     if (start->centres.size() < 6) continue;
     const auto rank = [](const Reconstruction& r) {
       return std::tuple(-double(count_views(r)), -double(r.centres.size()), r.rms_px);
     };
     if (best.views.empty() || rank(*start) < rank(best)) best = *std::move(start);
-    if (count_views(best) == given.size() && best.rms_px < views[0].limit_scale * good_rms_px) break;
+    if (count_views(best) == phantom_views.size() && best.rms_px < views[0].limit_scale * good_rms_px) break;
   }
   if (count_views(best) < 3)
     return fail(
@@ -364,7 +365,7 @@ Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>
         "no three views agree on six fiducials: take further views, each 10 to 30 degrees from the next",
         {{"views", double(count_views(best))}});
   Reconstruction other = reversed(best);
-  if (readjust(other, given)) {
+  if (readjust(other, phantom_views)) {
     best.reversed_rms_px = other.rms_px;
     if (other.rms_px < best.rms_px) {
       other.reversed_rms_px = best.rms_px;

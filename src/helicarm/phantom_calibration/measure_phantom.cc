@@ -176,24 +176,24 @@ void describe_views(const AdjustedViews& found, const PhantomOptions& options, P
 phantom::JointCovariance joint_covariance(const ScaledPoints& points, const AdjustedViews& found) {
   const auto n = Eigen::Index(found.order.size());
   phantom::JointCovariance joint{{}, Eigen::MatrixXd(3 * n, 3 * n)};
-  const auto place = [&](Eigen::Index ball) { return 3 * Eigen::Index(found.order[std::size_t(ball)]); };
+  const auto first_row = [&](Eigen::Index ball) { return 3 * Eigen::Index(found.order[std::size_t(ball)]); };
   for (Eigen::Index row = 0; row < n; ++row) {
     joint.labels.push_back(found.labels[found.order[std::size_t(row)]]);
     for (Eigen::Index column = 0; column < n; ++column)
       joint.mm2.block<3, 3>(3 * row, 3 * column) =
-          points.covariance_mm2.block<3, 3>(place(row), place(column));
+          points.covariance_mm2.block<3, 3>(first_row(row), first_row(column));
   }
   return joint;
 }
 
 void describe_balls(const ScaledPoints& points, const AdjustedViews& found, PhantomResult& result) {
   result.calibrator.balls.clear();
-  std::vector<std::size_t> place(found.order.size());
-  for (std::size_t k = 0; k < place.size(); ++k) place[found.order[k]] = k;
-  result.pair.a = place[result.pair.a];
-  result.pair.b = place[result.pair.b];
+  std::vector<std::size_t> rank(found.order.size());
+  for (std::size_t k = 0; k < rank.size(); ++k) rank[found.order[k]] = k;
+  result.pair.a = rank[result.pair.a];
+  result.pair.b = rank[result.pair.b];
   for (MeasuredView& view : result.views)
-    for (auto& residual : view.residuals_px) residual.first = place[residual.first];
+    for (auto& residual : view.residuals_px) residual.first = rank[residual.first];
   for (const std::size_t i : found.order) {
     const auto at = 3 * Eigen::Index(i);
     MeasuredBall ball{found.labels[i], points.centres[i], points.covariance_mm2.block<3, 3>(at, at), {}, 0};
@@ -223,7 +223,7 @@ void describe_source(const PhantomOptions& options, PhantomResult& result) {
 }
 
 /// Everything after the adjustment; stops at the first refusal.
-Expected<void> conclude(AdjustedViews& found, const pipeline::Case& given,
+Expected<void> conclude(AdjustedViews& found, const pipeline::Case& the_case,
                         const std::vector<pipeline::RectifiedView>& detected, const PhantomOptions& options,
                         PhantomResult& result) {
   const BundleFit& fit = found.consistent.fit;
@@ -232,7 +232,7 @@ Expected<void> conclude(AdjustedViews& found, const pipeline::Case& given,
   result.dof = fit.dof;
   describe_views(found, options, result);
   if (result.nominal)
-    if (auto handed = check_handedness(found, given, detected); !handed) return handed;
+    if (auto handed = check_handedness(found, the_case, detected); !handed) return handed;
   result.notes = handedness_notes(found);
   if (auto apart = check_apart(found); !apart) return apart;
   if (auto unmoved = check_unmoved(found); !unmoved) return unmoved;
@@ -245,7 +245,8 @@ Expected<void> conclude(AdjustedViews& found, const pipeline::Case& given,
          {{"off_px", rejected.off_px.norm()}}});
   const double variance_scale = variance_scale_of(fit, result);
   if (options.from_scratch)
-    if (auto settled = settle_sizes(found, detected, given, factor_by_hand(found, options), result.warnings);
+    if (auto settled =
+            settle_sizes(found, detected, the_case, factor_by_hand(found, options), result.warnings);
         !settled)
       return settled;
   auto points = scaled(found, detected, variance_scale * fit.covariance_mm2, options, result);
@@ -258,12 +259,12 @@ Expected<void> conclude(AdjustedViews& found, const pipeline::Case& given,
 }
 
 /// What the correspondences start from.
-Expected<void> check_balls_known(const pipeline::Case& given, bool from_scratch) {
-  if (from_scratch && given.diameters_mm.empty())
+Expected<void> check_balls_known(const pipeline::Case& the_case, bool from_scratch) {
+  if (from_scratch && the_case.diameters_mm.empty())
     return fail(Reason::bad_value,
                 "case.json: \"diameters_mm\": is missing: a measurement from scratch requires the diameters "
                 "of the balls, such as [4]");
-  if (!from_scratch && given.calibrator.balls.empty())
+  if (!from_scratch && the_case.calibrator.balls.empty())
     return fail(Reason::bad_value,
                 "case.json: \"calibrator\": is null: name the nominal file, or measure from scratch");
   return {};
@@ -273,10 +274,10 @@ Expected<void> check_balls_known(const pipeline::Case& given, bool from_scratch)
 
 std::string today() { return fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))); }
 
-Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const PhantomOptions& options) {
+Expected<PhantomResult> measure_phantom(const pipeline::Case& the_case, const PhantomOptions& options) {
   PhantomResult result;
-  result.warnings = given.warnings;
-  if (!options.from_scratch) result.nominal = given.calibrator;
+  result.warnings = the_case.warnings;
+  if (!options.from_scratch) result.nominal = the_case.calibrator;
   result.calibrator = result.nominal.value_or(phantom::Calibrator{});
   result.calibrator.tolerance_mm = 0;
   constexpr std::string_view mark = "-measured";
@@ -289,26 +290,27 @@ Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const Phant
     result.failure = failure;
     return result;
   };
-  if (const auto known = check_balls_known(given, options.from_scratch); !known) return refuse(known.error());
+  if (const auto known = check_balls_known(the_case, options.from_scratch); !known)
+    return refuse(known.error());
   constexpr std::size_t least_views = 3;
-  if (given.views.size() < least_views)
+  if (the_case.views.size() < least_views)
     return refuse({Reason::too_few_views,
                    fmt::format("{} views: at least {} are required to measure a phantom, 6 to 10 are advised",
-                               given.views.size(), least_views),
+                               the_case.views.size(), least_views),
                    {},
-                   {{"views", double(given.views.size())}, {"needed", double(least_views)}}});
+                   {{"views", double(the_case.views.size())}, {"needed", double(least_views)}}});
   pipeline::RunOptions stages;
   stages.threads = options.threads;
-  for (Warning& warning : sizes_stated_twice(given)) result.warnings.push_back(std::move(warning));
-  const auto detected = pipeline::rectified_views(given, stages, {options.on_stage, options.on_view});
+  for (Warning& warning : sizes_stated_twice(the_case)) result.warnings.push_back(std::move(warning));
+  const auto detected = pipeline::rectified_views(the_case, stages, {options.on_stage, options.on_view});
   if (!detected) return refuse(detected.error().failure);
   if (options.on_stage) options.on_stage("adjust");
   const auto begin = std::chrono::steady_clock::now();
   auto found =
-      adjusted_views(*detected, given, options.from_scratch ? KnownCentres::none : KnownCentres::nominal,
+      adjusted_views(*detected, the_case, options.from_scratch ? KnownCentres::none : KnownCentres::nominal,
                      least_views, options.threads, result.warnings);
   if (!found) return refuse(found.error());
-  const auto concluded = conclude(*found, given, *detected, options, result);
+  const auto concluded = conclude(*found, the_case, *detected, options, result);
   result.solve_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   add_images(*detected, found->view_of_case, options.threads, result);

@@ -90,7 +90,7 @@ struct PhantomResult {
 
 /// Measures the phantom of a case by bundle adjustment of its views (docs/method.md). Refusals are results;
 /// only unusable input fails.
-Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const PhantomOptions& options);
+Expected<PhantomResult> measure_phantom(const pipeline::Case& the_case, const PhantomOptions& options);
 
 /// result.json, `helicarm-phantom/1` (docs/formats.md).
 Json to_json(const PhantomResult& result);

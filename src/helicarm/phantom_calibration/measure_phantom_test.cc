@@ -22,8 +22,8 @@ const simulation::SimulatedCase& five_views() {
 
 /// What the file would say of a glued phantom: all balls 0.2 mm off, P3 by 3 mm.
 void misplace(PhantomFolder& folder) {
-  for (phantom::CalibratorBall& ball : folder.given.calibrator.balls) {
-    const double turn = 2.4 * double(&ball - folder.given.calibrator.balls.data());
+  for (phantom::CalibratorBall& ball : folder.the_case.calibrator.balls) {
+    const double turn = 2.4 * double(&ball - folder.the_case.calibrator.balls.data());
     ball.centre_in_calibrator += 0.2 * Vector3d(std::cos(turn), std::sin(turn), std::cos(3 * turn));
   }
   folder.ball("P3").centre_in_calibrator += Vector3d(2, -1, 2);
@@ -42,21 +42,21 @@ double largest_error(const PhantomResult& result, const phantom::Calibrator& tru
   return largest;
 }
 
-PhantomResult measured(const pipeline::Case& given, PhantomOptions options = {}) {
+PhantomResult measured(const pipeline::Case& the_case, PhantomOptions options = {}) {
   options.threads = 2;
-  const auto result = measure_phantom(given, options);
+  const auto result = measure_phantom(the_case, options);
   EXPECT_TRUE(result) << result.error().message;
   return result.value_or(PhantomResult{});
 }
 
 TEST(MeasurePhantom, BallsThatTheFileMisplacesAreMeasured) {
   PhantomFolder folder(five_views());
-  const phantom::Calibrator truth = folder.given.calibrator;
+  const phantom::Calibrator truth = folder.the_case.calibrator;
   misplace(folder);
   PhantomOptions options;
   options.distances = {
       {"P1", "P3", (truth.balls[0].centre_in_calibrator - truth.balls[2].centre_in_calibrator).norm()}};
-  const auto result = measured(folder.given, options);
+  const auto result = measured(folder.the_case, options);
   ASSERT_FALSE(result.failure) << result.failure->message;
   ASSERT_EQ(result.balls.size(), 12u);
   EXPECT_LT(largest_error(result, truth), 0.2);  // a third of a pixel
@@ -67,11 +67,11 @@ TEST(MeasurePhantom, BallsThatTheFileMisplacesAreMeasured) {
 PhantomResult measured_from_scratch(const simulation::SimulatedCase& simulated,
                                     std::vector<double> diameters_mm = {4}, PhantomOptions options = {}) {
   PhantomFolder folder(simulated);
-  folder.given.calibrator = {};
-  folder.given.diameters_mm = std::move(diameters_mm);
-  for (pipeline::CaseView& view : folder.given.views) view.mirrored = false;
+  folder.the_case.calibrator = {};
+  folder.the_case.diameters_mm = std::move(diameters_mm);
+  for (pipeline::CaseView& view : folder.the_case.views) view.mirrored = false;
   options.from_scratch = true;
-  return measured(folder.given, options);
+  return measured(folder.the_case, options);
 }
 
 const Warning* find_reason(const std::vector<Warning>& warnings, Reason reason) {
@@ -81,12 +81,12 @@ const Warning* find_reason(const std::vector<Warning>& warnings, Reason reason) 
 
 /// P1 to P3 as a caliper shows it over both balls, or its multiple.
 PhantomResult with_distance(const PhantomFolder& folder, double factor, bool outer) {
-  const auto& balls = folder.given.calibrator.balls;
+  const auto& balls = folder.the_case.calibrator.balls;
   const double centres_mm = (balls[0].centre_in_calibrator - balls[2].centre_in_calibrator).norm();
   PhantomOptions options;
   options.outer = outer;
   options.distances = {{"P1", "P3", factor * (centres_mm + balls[0].diameter_mm)}};
-  return measured(folder.given, options);
+  return measured(folder.the_case, options);
 }
 
 TEST(MeasurePhantom, OuterDistanceTakenAsThatOfTheCentresIsWarnedOf) {
@@ -120,7 +120,7 @@ TEST(MeasurePhantom, OneDistanceIsNotedAsUnchecked) {
 
 TEST(MeasurePhantom, DistancesOfTheOtherKindAreNamed) {
   const PhantomFolder folder(five_views());
-  const auto& balls = folder.given.calibrator.balls;
+  const auto& balls = folder.the_case.calibrator.balls;
   PhantomOptions options;
   for (const auto& [a, b] : {std::pair(0, 2), {0, 1}}) {
     const double centres_mm =
@@ -128,26 +128,26 @@ TEST(MeasurePhantom, DistancesOfTheOtherKindAreNamed) {
     options.distances.push_back(
         {balls[std::size_t(a)].label, balls[std::size_t(b)].label, centres_mm + balls[0].diameter_mm});
   }
-  const PhantomResult wrong = measured(folder.given, options);
+  const PhantomResult wrong = measured(folder.the_case, options);
   ASSERT_TRUE(wrong.failure);
   EXPECT_EQ(wrong.failure->reason, Reason::distances_disagree);
   EXPECT_NE(wrong.failure->message.find("--distance-is"), std::string::npos) << wrong.failure->message;
   options.outer = true;
-  const PhantomResult right = measured(folder.given, options);
+  const PhantomResult right = measured(folder.the_case, options);
   EXPECT_FALSE(right.failure) << right.failure->message;
   EXPECT_FALSE(find_reason(right.notes, Reason::scale_unverified));
 }
 
 TEST(MeasurePhantom, SimilarDistancesOfTheOtherKindEnterTheScaleSigma) {
   const PhantomFolder folder(five_views());
-  const auto& balls = folder.given.calibrator.balls;
+  const auto& balls = folder.the_case.calibrator.balls;
   PhantomOptions options;
   for (const auto& [a, b] : {std::pair(0, 2), {1, 3}}) {
     const phantom::CalibratorBall &from = balls[std::size_t(a)], &to = balls[std::size_t(b)];
     options.distances.push_back(
         {from.label, to.label, (from.centre_in_calibrator - to.centre_in_calibrator).norm() + 4});
   }
-  const PhantomResult result = measured(folder.given, options);
+  const PhantomResult result = measured(folder.the_case, options);
   ASSERT_FALSE(result.failure) << result.failure->message;
   const Warning* warning = find_reason(result.warnings, Reason::scale_disagrees);
   ASSERT_TRUE(warning);
@@ -158,10 +158,11 @@ TEST(MeasurePhantom, SimilarDistancesOfTheOtherKindEnterTheScaleSigma) {
 TEST(MeasurePhantom, MirroredNominalFileIsRefused) {
   for (const bool stated : {false, true}) {
     PhantomFolder folder(five_views());
-    for (phantom::CalibratorBall& ball : folder.given.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
+    for (phantom::CalibratorBall& ball : folder.the_case.calibrator.balls)
+      ball.centre_in_calibrator.x() *= -1;
     if (stated)
-      for (pipeline::CaseView& view : folder.given.views) view.mirrored = false;
-    const PhantomResult result = measured(folder.given);
+      for (pipeline::CaseView& view : folder.the_case.views) view.mirrored = false;
+    const PhantomResult result = measured(folder.the_case);
     ASSERT_TRUE(result.failure);
     if (!stated) {
       EXPECT_EQ(result.failure->reason, Reason::ambiguous_handedness) << result.failure->message;
@@ -187,7 +188,7 @@ TEST(MeasurePhantom, FromScratchWithoutDiametersIsRefused) {
   const PhantomFolder folder(five_views());
   PhantomOptions options;
   options.from_scratch = true;
-  const auto result = measure_phantom(folder.given, options);
+  const auto result = measure_phantom(folder.the_case, options);
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::bad_value);
   EXPECT_NE(result.error().message.find("diameters_mm"), std::string::npos) << result.error().message;
@@ -195,9 +196,9 @@ TEST(MeasurePhantom, FromScratchWithoutDiametersIsRefused) {
 
 TEST(MeasurePhantom, NullCalibratorIsRefusedUnlessFromScratch) {
   PhantomFolder folder(five_views());
-  folder.given.calibrator = {};
-  folder.given.diameters_mm = {4};
-  const auto result = measure_phantom(folder.given, {});
+  folder.the_case.calibrator = {};
+  folder.the_case.diameters_mm = {4};
+  const auto result = measure_phantom(folder.the_case, {});
   ASSERT_FALSE(result);
   EXPECT_NE(result.error().message.find("\"calibrator\""), std::string::npos) << result.error().message;
 }
@@ -212,7 +213,7 @@ TEST(MeasurePhantom, StagesAreAnnouncedAndAnExceptionBetweenViewsEndsIt) {
   options.on_view = [&] {
     if (++views > 7) throw std::runtime_error("stop");
   };
-  EXPECT_THROW(measure_phantom(folder.given, options), std::runtime_error);
+  EXPECT_THROW(measure_phantom(folder.the_case, options), std::runtime_error);
   EXPECT_EQ(stages, (std::vector<std::string>{"read", "detect"}));
 }
 
@@ -258,7 +259,7 @@ TEST(MeasurePhantom, BallThatMovedBetweenTheViewsIsPhantomChanged) {
   for (int y = v - 12; y <= v + 12; ++y)
     for (int x = u + 16; x >= u - 12; --x) last.pixels(x, y) = last.pixels(x - 4, y);
   PhantomFolder folder(simulated);
-  const auto result = measured(folder.given);
+  const auto result = measured(folder.the_case);
   ASSERT_TRUE(result.failure);
   EXPECT_EQ(result.failure->reason, Reason::phantom_changed);
   EXPECT_EQ(result.failure->message.substr(0, 2), "P4") << result.failure->message;
@@ -266,29 +267,29 @@ TEST(MeasurePhantom, BallThatMovedBetweenTheViewsIsPhantomChanged) {
 
 TEST(MeasurePhantom, ViewsAFewDegreesApartAreTooClose) {
   PhantomFolder folder(simulated_phantom({0, 3, 6}));
-  const auto result = measured(folder.given);
+  const auto result = measured(folder.the_case);
   ASSERT_TRUE(result.failure);
   EXPECT_EQ(result.failure->reason, Reason::views_too_close) << result.failure->message;
 }
 
 TEST(MeasurePhantom, TwoViewsAreTooFew) {
   PhantomFolder folder(five_views());
-  folder.given.views.resize(2);
-  EXPECT_EQ(measured(folder.given).failure->reason, Reason::too_few_views);
+  folder.the_case.views.resize(2);
+  EXPECT_EQ(measured(folder.the_case).failure->reason, Reason::too_few_views);
 }
 
 TEST(MeasurePhantom, UnknownLabelOfADistanceIsUnusableInput) {
   PhantomFolder folder(five_views());
   PhantomOptions options;
   options.distances = {{"P1", "Q7", 80}};
-  const auto result = measure_phantom(folder.given, options);
+  const auto result = measure_phantom(folder.the_case, options);
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::bad_value);
 }
 
 TEST(MeasurePhantom, ReportShowsTheImagesWithTheBallsLabels) {
   PhantomFolder folder(five_views());
-  const auto result = measured(folder.given);
+  const auto result = measured(folder.the_case);
   ASSERT_FALSE(result.failure) << result.failure->message;
   const std::string html = phantom_report_html(result);
   const auto count = [&](const std::string& text) {

@@ -157,16 +157,17 @@ Warning unchecked(std::size_t distances, const PhantomResult& result) {
 Expected<std::vector<CentreDistance>> distances_of(const AdjustedViews& found, const PhantomOptions& options,
                                                    bool outer) {
   std::vector<CentreDistance> distances;
-  for (const HandDistance& given : options.distances) {
-    const auto a = fiducial_named(given.a, found);
-    const auto b = fiducial_named(given.b, found);
+  for (const HandDistance& distance : options.distances) {
+    const auto a = fiducial_named(distance.a, found);
+    const auto b = fiducial_named(distance.b, found);
     if (!a) return tl::unexpected<Failure>(a.error());
     if (!b) return tl::unexpected<Failure>(b.error());
     const double over = outer ? (found.diameters_mm[*a] + found.diameters_mm[*b]) / 2 : 0;
-    if (*a == *b || !(given.mm - over > 0))
-      return fail(Reason::bad_value,
-                  fmt::format("distance: {:g} mm cannot be the distance of two different balls", given.mm));
-    distances.push_back({*a, *b, given.mm - over, options.distance_sigma_mm});
+    if (*a == *b || !(distance.mm - over > 0))
+      return fail(
+          Reason::bad_value,
+          fmt::format("distance: {:g} mm cannot be the distance of two different balls", distance.mm));
+    distances.push_back({*a, *b, distance.mm - over, options.distance_sigma_mm});
   }
   return distances;
 }

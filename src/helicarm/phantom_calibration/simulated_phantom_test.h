@@ -33,15 +33,15 @@ class PhantomFolder {
  public:
   explicit PhantomFolder(const simulation::SimulatedCase& simulated) {
     EXPECT_TRUE(simulation::write_case(folder_.path() / "case", simulated));
-    given = *pipeline::read_case(folder_.path() / "case", pipeline::Purpose::phantom);
-    given.calibrator.targets.clear();
+    the_case = *pipeline::read_case(folder_.path() / "case", pipeline::Purpose::phantom);
+    the_case.calibrator.targets.clear();
   }
 
   phantom::CalibratorBall& ball(const std::string& label) {
-    return *std::ranges::find(given.calibrator.balls, label, &phantom::CalibratorBall::label);
+    return *std::ranges::find(the_case.calibrator.balls, label, &phantom::CalibratorBall::label);
   }
 
-  pipeline::Case given;
+  pipeline::Case the_case;
 
  private:
   TemporaryFolder folder_;

@@ -242,7 +242,7 @@ Warning not_verified(const VerifiedBall& ball) {
 }
 
 /// The file's scale, by the diameters of the balls' images and the distance from the source.
-void compare_scale(const AdjustedViews& found, const pipeline::Case& given,
+void compare_scale(const AdjustedViews& found, const pipeline::Case& the_case,
                    const std::vector<pipeline::RectifiedView>& detected, PhantomVerification& result) {
   constexpr double warned_sigmas = 3, refused_sigmas = 10;  // as a run's
   const auto evidence_of = [](const DiameterScale& scale) {
@@ -251,7 +251,7 @@ void compare_scale(const AdjustedViews& found, const pipeline::Case& given,
   result.scale = evidence_of(diameter_scale(found));
   if (const auto by_tag = depth_limits(found, detected).by_tag)
     result.scale = pipeline::combined(result.scale, evidence_of(*by_tag));
-  const double sigma = std::hypot(result.scale.sigma, given.calibrator.scale_sigma);
+  const double sigma = std::hypot(result.scale.sigma, the_case.calibrator.scale_sigma);
   const double excess = std::abs(result.scale.excess);
   if (excess <= warned_sigmas * sigma) return;
   Failure disagreement{
@@ -290,11 +290,11 @@ Warning scale_note(const phantom::Calibrator& file, const pipeline::ScaleEvidenc
       {{"file_over_true", 1 + scale.excess}, {"sigma", scale.sigma}, {"distance_mm", longest}}};
 }
 
-void describe(const AdjustedViews& found, const pipeline::Case& given,
+void describe(const AdjustedViews& found, const pipeline::Case& the_case,
               const std::vector<pipeline::RectifiedView>& detected, unsigned threads,
               PhantomVerification& result) {
-  const auto covariances = phantom::ball_covariances(given.calibrator);
-  BundleProblem problem = with_file_centres(found, given.calibrator, covariances);
+  const auto covariances = phantom::ball_covariances(the_case.calibrator);
+  BundleProblem problem = with_file_centres(found, the_case.calibrator, covariances);
   std::vector<bool> out(problem.centres.size(), false);
   const auto places = places_of(problem, found, covariances, out, threads);
   BundleOptions fixed;
@@ -305,13 +305,13 @@ void describe(const AdjustedViews& found, const pipeline::Case& given,
     return;
   }
   result.rms_px = fit->rms_px;
-  for (std::size_t ball = 0; ball < given.calibrator.balls.size(); ++ball) {
-    const phantom::CalibratorBall& in_file = given.calibrator.balls[ball];
+  for (std::size_t ball = 0; ball < the_case.calibrator.balls.size(); ++ball) {
+    const phantom::CalibratorBall& in_file = the_case.calibrator.balls[ball];
     VerifiedBall verified{in_file.label, {}, 0, BallState::as_in_file, 0};
     const auto at = std::ranges::find(found.ball_of_nominal, ball);
     const std::size_t i = std::size_t(at - found.ball_of_nominal.begin());
     if (at == found.ball_of_nominal.end() || !places[i] || places[i]->gap_px > largest_gap_px) {
-      verified.state = unlocated(in_file, given.calibrator, detected, fit->views, found.view_of_case);
+      verified.state = unlocated(in_file, the_case.calibrator, detected, fit->views, found.view_of_case);
     } else {
       for (const BundleView& view : problem.views)
         verified.views += int(std::ranges::count(view.images, i, &FiducialImage::fiducial));
@@ -345,26 +345,26 @@ std::string_view word(BallState state) {
   return "";
 }
 
-Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsigned threads) {
+Expected<PhantomVerification> verify_phantom(const pipeline::Case& the_case, unsigned threads) {
   PhantomVerification result;
-  result.warnings = given.warnings;
-  result.calibrator = digest_of(given.calibrator);
+  result.warnings = the_case.warnings;
+  result.calibrator = digest_of(the_case.calibrator);
   const auto refuse = [&](const Failure& failure) -> Expected<PhantomVerification> {
     if (exit_code(failure.reason) == 2) return tl::unexpected<Failure>(failure);
     result.failure = failure;
     return result;
   };
-  if (given.views.size() < least_views)
+  if (the_case.views.size() < least_views)
     return refuse({Reason::too_few_views,
                    "at least two views are required to verify a phantom",
                    {},
-                   {{"views", double(given.views.size())}, {"needed", double(least_views)}}});
+                   {{"views", double(the_case.views.size())}, {"needed", double(least_views)}}});
   pipeline::RunOptions stages;
   stages.threads = threads;
-  const auto detected = pipeline::rectified_views(given, stages);
+  const auto detected = pipeline::rectified_views(the_case, stages);
   if (!detected) return refuse(detected.error().failure);
   const auto found =
-      adjusted_views(*detected, given, KnownCentres::file, least_views, threads, result.warnings);
+      adjusted_views(*detected, the_case, KnownCentres::file, least_views, threads, result.warnings);
   if (!found) {
     Failure failure = found.error();
     if (failure.reason == Reason::too_few_fiducials)
@@ -374,12 +374,13 @@ Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsign
           "them";
     return refuse(failure);
   }
-  if (const auto handed = check_handedness(*found, given, *detected); !handed) return refuse(handed.error());
+  if (const auto handed = check_handedness(*found, the_case, *detected); !handed)
+    return refuse(handed.error());
   std::erase_if(result.warnings, [](const Warning& w) { return w.reason == Reason::not_seen; });
-  describe(*found, given, *detected, threads, result);
-  compare_scale(*found, given, *detected, result);
+  describe(*found, the_case, *detected, threads, result);
+  compare_scale(*found, the_case, *detected, result);
   result.notes = handedness_notes(*found);
-  if (!result.balls.empty()) result.notes.push_back(scale_note(given.calibrator, result.scale));
+  if (!result.balls.empty()) result.notes.push_back(scale_note(the_case.calibrator, result.scale));
   return result;
 }
 

@@ -50,7 +50,7 @@ struct PhantomVerification {
 /// from views that the others calibrate. The scale is not verified: it is compared with the balls' diameters
 /// as a run does (`scale_disagrees`). A refusal (`calibrator_mismatch`, `too_few_views`, ...) is a result;
 /// only unusable input fails.
-Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsigned threads);
+Expected<PhantomVerification> verify_phantom(const pipeline::Case& the_case, unsigned threads);
 
 Json to_json(const PhantomVerification& verification);
 

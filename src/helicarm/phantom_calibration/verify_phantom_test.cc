@@ -23,7 +23,7 @@ std::vector<std::string> labels_of(const PhantomVerification& result, BallState 
 
 TEST(VerifyPhantom, UnchangedPhantomPasses) {
   PhantomFolder folder(three_views());
-  const auto result = verify_phantom(folder.given, 2);
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_FALSE(result->failure) << result->failure->message;
   EXPECT_EQ(labels_of(*result, BallState::as_in_file).size(), 12u);
@@ -33,7 +33,7 @@ TEST(VerifyPhantom, UnchangedPhantomPasses) {
 TEST(VerifyPhantom, BallHalfAMillimetreOffIsNamed) {
   PhantomFolder folder(three_views());
   folder.ball("P4").centre_in_calibrator += Eigen::Vector3d(0.3, -0.4, 0);
-  const auto result = verify_phantom(folder.given, 2);
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::calibrator_mismatch);
@@ -45,7 +45,7 @@ TEST(VerifyPhantom, TwoDisplacedFiducialsAreBothNamed) {
   PhantomFolder folder(three_views());
   folder.ball("P5").centre_in_calibrator += Eigen::Vector3d(0, 0, 0.7);
   folder.ball("P9").centre_in_calibrator -= Eigen::Vector3d(0, 0, 0.7);
-  const auto result = verify_phantom(folder.given, 2);
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(labels_of(*result, BallState::moved), (std::vector<std::string>{"P5", "P9"}));
@@ -54,7 +54,7 @@ TEST(VerifyPhantom, TwoDisplacedFiducialsAreBothNamed) {
 TEST(VerifyPhantom, TwoViewsNameABallThreeMillimetresOff) {
   PhantomFolder folder(simulated_phantom({0, 75}));
   folder.ball("P4").centre_in_calibrator += Eigen::Vector3d(2, 1, -2);
-  const auto result = verify_phantom(folder.given, 2);
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::calibrator_mismatch) << result->failure->message;
@@ -68,7 +68,7 @@ TEST(VerifyPhantom, BallThatOneViewAloneShowsSlightlyOffIsNotVerified) {
   PhantomFolder folder(simulated);
   Eigen::Vector3d& centre = folder.ball("P4").centre_in_calibrator;
   centre += 0.2 * (centre - simulated.views[0].true_view.view.source_in_world()).normalized();
-  const auto result = verify_phantom(folder.given, 2);
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_FALSE(result->failure) << result->failure->message;
   EXPECT_EQ(labels_of(*result, BallState::not_verified), std::vector<std::string>{"P4"});
@@ -79,15 +79,15 @@ TEST(VerifyPhantom, BallThatOneViewAloneShowsSlightlyOffIsNotVerified) {
 TEST(VerifyPhantom, BallFarOffDoesNotTakeOthersWithIt) {
   PhantomFolder folder(three_views());
   folder.ball("P9").centre_in_calibrator += Eigen::Vector3d(0, 4, 0);
-  const auto result = verify_phantom(folder.given, 2);
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_EQ(labels_of(*result, BallState::moved), std::vector<std::string>{"P9"});
 }
 
 TEST(VerifyPhantom, MirroredFileIsRefused) {
   PhantomFolder folder(three_views());
-  for (phantom::CalibratorBall& ball : folder.given.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
-  const auto result = verify_phantom(folder.given, 2);
+  for (phantom::CalibratorBall& ball : folder.the_case.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::ambiguous_handedness) << result->failure->message;
@@ -95,15 +95,15 @@ TEST(VerifyPhantom, MirroredFileIsRefused) {
 
 /// The file's balls farther apart, as if the phantom were larger.
 void grow(PhantomFolder& folder, double factor) {
-  const Eigen::Vector3d middle = phantom::middle_of(folder.given.calibrator);
-  for (phantom::CalibratorBall& ball : folder.given.calibrator.balls)
+  const Eigen::Vector3d middle = phantom::middle_of(folder.the_case.calibrator);
+  for (phantom::CalibratorBall& ball : folder.the_case.calibrator.balls)
     ball.centre_in_calibrator = middle + factor * (ball.centre_in_calibrator - middle);
 }
 
 TEST(VerifyPhantom, ScaleIsStatedAsNotVerified) {
   PhantomFolder folder(three_views());
   grow(folder, 1.02);
-  const auto result = verify_phantom(folder.given, 2);
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_FALSE(result->failure) << result->failure->message;
   ASSERT_EQ(result->notes.size(), 1u);
@@ -117,7 +117,7 @@ TEST(VerifyPhantom, ScaleIsStatedAsNotVerified) {
 TEST(VerifyPhantom, FileThatTheDiametersContradictIsWarnedOf) {
   PhantomFolder folder(three_views());
   grow(folder, 1.07);
-  const auto result = verify_phantom(folder.given, 2);
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   std::vector<Warning> found = result->warnings;
   if (result->failure) found.push_back(*result->failure);
@@ -127,7 +127,7 @@ TEST(VerifyPhantom, FileThatTheDiametersContradictIsWarnedOf) {
 TEST(VerifyPhantom, BallOfAnotherSizeIsNamedAsSwapped) {
   PhantomFolder folder(three_views());
   folder.ball("P8").diameter_mm = 6;
-  const auto result = verify_phantom(folder.given, 2);
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::calibrator_mismatch);
@@ -136,7 +136,7 @@ TEST(VerifyPhantom, BallOfAnotherSizeIsNamedAsSwapped) {
 
 TEST(VerifyPhantom, LostBallIsNamed) {
   PhantomFolder folder(simulated_phantom({0, 30, 75}, {"P8"}));
-  const auto result = verify_phantom(folder.given, 2);
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::calibrator_mismatch);
@@ -145,8 +145,8 @@ TEST(VerifyPhantom, LostBallIsNamed) {
 
 TEST(VerifyPhantom, OneViewIsTooFew) {
   PhantomFolder folder(three_views());
-  folder.given.views.resize(1);
-  const auto result = verify_phantom(folder.given, 2);
+  folder.the_case.views.resize(1);
+  const auto result = verify_phantom(folder.the_case, 2);
   ASSERT_TRUE(result) << result.error().message;
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::too_few_views) << result->failure->message;

@@ -15,10 +15,10 @@ namespace helicarm::pipeline {
 
 namespace {
 
-Expected<CArmAcquisitions> measured_acquisitions(const Case& given, unsigned threads) {
+Expected<CArmAcquisitions> measured_acquisitions(const Case& the_case, unsigned threads) {
   RunOptions options;
   options.threads = threads;
-  return measure(given, options).and_then([](const Result& result) -> Expected<CArmAcquisitions> {
+  return measure(the_case, options).and_then([](const Result& result) -> Expected<CArmAcquisitions> {
     if (result.failure) return tl::unexpected<Failure>(*result.failure);
     if (result.calibration->entries.empty())
       return fail(
@@ -47,7 +47,7 @@ Expected<CArmAcquisitions> c_arm_acquisitions(const std::filesystem::path& from,
     const auto holds = [&](const char* name) { return std::filesystem::exists(from / name); };
     if (holds("case.json") || (!holds("result.json") && !holds("sweep.json")))
       return read_case(from).and_then(
-          [&](const Case& given) { return measured_acquisitions(given, threads); });
+          [&](const Case& the_case) { return measured_acquisitions(the_case, threads); });
     result /= holds("result.json") ? "result.json" : "sweep.json";
   }
   return read_json(result).and_then([&](const Json& json) {

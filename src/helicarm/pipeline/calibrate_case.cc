@@ -89,52 +89,53 @@ Eigen::Vector3d centre_of(const calibration::CalibrationResult& calibration) {
 
 /// As `check_views_apart`, in the calibrator's frame or in the tracker's: a calibrator on the receiver turns
 /// with the C-arm and looks alike in all views.
-Expected<void> check_apart(const calibration::CalibrationResult& calibration, const Case& given) {
+Expected<void> check_apart(const calibration::CalibrationResult& calibration, const Case& the_case) {
   if (calibration.views.size() < 2) return {};
   const Eigen::Vector3d centre = centre_of(calibration);
   auto apart = calibration::check_views_apart(calibration.views, centre);
   const auto pose = [](const CaseView& view) { return view.poses.tracker_from_calibrator; };
   if (apart ||
-      !std::ranges::all_of(given.views, [&](const CaseView& view) { return pose(view).has_value(); }))
+      !std::ranges::all_of(the_case.views, [&](const CaseView& view) { return pose(view).has_value(); }))
     return apart;
   std::vector<calibration::CalibratedView> views = calibration.views;
   for (std::size_t i = 0; i < views.size(); ++i) {
     geometry::RigidTransform& camera_from_world = views[i].view.camera_from_world;
-    camera_from_world = camera_from_world * pose(given.views[i])->inverse();
+    camera_from_world = camera_from_world * pose(the_case.views[i])->inverse();
   }
-  return calibration::check_views_apart(views, *pose(given.views.front()) * centre);
+  return calibration::check_views_apart(views, *pose(the_case.views.front()) * centre);
 }
 
-Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& given,
+Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& the_case,
                                      const RunOptions& options) {
   std::vector<calibration::ViewFiducials> fiducials;
   for (const LabelledView& view : views) fiducials.push_back(fiducials_of(view));
-  calibration::CalibrationOptions how;
-  how.common = common_prior(given.calibrator);
+  calibration::CalibrationOptions calibration_options;
+  calibration_options.common = common_prior(the_case.calibrator);
   std::optional<calibration::LearnedIntrinsics> history;
   std::optional<Warning> change;
   if (options.history) {
     const auto prior = prior_from_history(views, *options.history);
     if (!prior) return tl::unexpected<Failure>(prior.error());
-    change = contradiction_of(views, fiducials, *options.history, how.common);
+    change = contradiction_of(views, fiducials, *options.history, calibration_options.common);
     if (!change) history = *prior;
   }
   if (history) {
-    how.common.c_arm = history->prior;
+    calibration_options.common.c_arm = history->prior;
     for (std::size_t i = 0; i < views.size(); ++i)
       fiducials[i].prior =
           calibration::learned_prior(fiducials[i].prior, *history, views[i].fiducials.mirrored);
   }
-  return (options.method == rectification::Method::paper ? calibration::calibrate_paper(fiducials, how)
-                                                         : calibration::calibrate(fiducials, how))
+  return (options.method == rectification::Method::paper
+              ? calibration::calibrate_paper(fiducials, calibration_options)
+              : calibration::calibrate(fiducials, calibration_options))
       .and_then([&](calibration::CalibrationResult result) {
-        return check_apart(result, given).map([&] {
-          CaseCalibration made{std::move(result), {}, history, {}, {}};
+        return check_apart(result, the_case).map([&] {
+          CaseCalibration calibrated_case{std::move(result), {}, history, {}, {}};
           if (change) {
-            made.is_record_contradicted = true;
-            made.warnings.push_back(*change);
+            calibrated_case.is_record_contradicted = true;
+            calibrated_case.warnings.push_back(*change);
           }
-          return made;
+          return calibrated_case;
         });
       });
 }
@@ -142,28 +143,28 @@ Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& giv
 /// Warns of image changes that explain the residuals. Refuses if one view's magnification explains them,
 /// which otherwise require offsets of the fiducials: a wrong tag is the simpler cause.
 Expected<CaseCalibration> with_explanations(CaseCalibration calibration, const LabelledViews& views,
-                                            const Case& given, const RunOptions& options) {
+                                            const Case& the_case, const RunOptions& options) {
   if (options.method == rectification::Method::paper) return calibration;
-  for (Warning& warning : explain_residuals(views, calibration, common_prior(given.calibrator))) {
+  for (Warning& warning : explain_residuals(views, calibration, common_prior(the_case.calibrator))) {
     if (warning.reason == Reason::intrinsics_inconsistent && calibration.found_tolerance_mm > 0) {
       warning.reason = Reason::calibrator_mismatch;
       return tl::unexpected<Failure>(std::move(warning));
     }
     calibration.warnings.push_back(std::move(warning));
   }
-  for (Warning& warning : doubtful_intrinsics(views, calibration, common_prior(given.calibrator)))
+  for (Warning& warning : doubtful_intrinsics(views, calibration, common_prior(the_case.calibrator)))
     calibration.warnings.push_back(std::move(warning));
   return calibration;
 }
 
 /// 2.2, Eq. 4-7: all views jointly, or each alone by the paper's method.
-OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& given,
+OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& the_case,
                                            const RunOptions& options) {
   auto calibration =
-      calibrated(views, given, options)
-          .and_then([&](CaseCalibration done) { return check_calibrator(std::move(done), views, given); })
+      calibrated(views, the_case, options)
+          .and_then([&](CaseCalibration done) { return check_calibrator(std::move(done), views, the_case); })
           .and_then([&](CaseCalibration done) {
-            return with_explanations(std::move(done), views, given, options);
+            return with_explanations(std::move(done), views, the_case, options);
           });
   if (!calibration) {
     Refusal refusal{calibration.error(), Stage::calibrate, {}};
@@ -171,37 +172,38 @@ OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& give
     return tl::unexpected(std::move(refusal));
   }
   calibration->images = std::move(views);
-  calibration->entries = new_entries(*calibration, common_prior(given.calibrator));
+  calibration->entries = new_entries(*calibration, common_prior(the_case.calibrator));
   return *std::move(calibration);
 }
 
 /// The best labels of the views that were not labelled, to be shown.
-void add_guesses(Refusal& refusal, const Case& given, const RunOptions& options) {
+void add_guesses(Refusal& refusal, const Case& the_case, const RunOptions& options) {
   for (std::size_t i = 0; i < refusal.views.size(); ++i) {
     ViewResult& view = refusal.views[i];
     if (!view.found && view.rectification)
-      view.guessed = fiducials::guess_labels(*view.xray_image, *view.dots, *view.rectification,
-                                             given.calibrator, {options.method, {}, given.views[i].mirrored});
+      view.guessed =
+          fiducials::guess_labels(*view.xray_image, *view.dots, *view.rectification, the_case.calibrator,
+                                  {options.method, {}, the_case.views[i].mirrored});
   }
 }
 
 }  // namespace
 
-OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options,
+OrRefusal<CaseCalibration> calibrate_case(const Case& the_case, const RunOptions& options,
                                           const Progress& progress) {
   Timing time;
   const auto stage = [&](std::string_view name, std::optional<double>& ms, auto work) {
     return [&, name, work](auto views) {
       progress.begin(name);
       const Stopwatch watch(ms);
-      return work(std::move(views), given, options, progress);
+      return work(std::move(views), the_case, options, progress);
     };
   };
   const auto calibrate_all = [](LabelledViews views, const Case& of, const RunOptions& by, const Progress&) {
     return calibrate_views(std::move(views), of, by);
   };
   progress.begin("read");
-  return timed(time.read, [&] { return read_views(given, options, progress); })
+  return timed(time.read, [&] { return read_views(the_case, options, progress); })
       .and_then(stage("detect", time.detect, detect_in_views))      // 2.1
       .and_then(stage("rectify", time.rectify, rectify_views))      // 2.1, Eq. 1-3
       .and_then(stage("label", time.label, label_views))            // 2.3.4
@@ -211,8 +213,8 @@ OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& o
         return calibration;
       })
       .map_error([&](Refusal refusal) {
-        refusal.failure = with_cause(refusal, given, options);
-        add_guesses(refusal, given, options);
+        refusal.failure = with_cause(refusal, the_case, options);
+        add_guesses(refusal, the_case, options);
         refusal.timing_ms = time;
         return refusal;
       });

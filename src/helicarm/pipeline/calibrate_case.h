@@ -22,7 +22,7 @@ struct CaseCalibration : calibration::CalibrationResult {
 
 /// From image files to calibrated views (2.1, 2.2, 2.3.4; Eq. 1-7). Refuses `views_too_close` unless two of
 /// several differ by `least_view_angle_deg`: what is located in them needs it.
-OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options,
+OrRefusal<CaseCalibration> calibrate_case(const Case& the_case, const RunOptions& options,
                                           const Progress& progress = {});
 
 }  // namespace helicarm::pipeline

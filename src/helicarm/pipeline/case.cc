@@ -107,19 +107,19 @@ std::vector<std::string> marker_names_from(JsonReader& reader) {
   return list.get<std::vector<std::string>>();
 }
 
-std::vector<AnyTunnel> all_tunnels(const Case& given) {
+std::vector<AnyTunnel> all_tunnels(const Case& the_case) {
   std::vector<AnyTunnel> all;
-  for (const TunnelPlan& tunnel : given.tunnels) all.push_back({tunnel.name, tunnel.start, tunnel.end});
-  for (const ModelTunnelPlan& line : given.model_tunnels) all.push_back({line.name, {}, {}, line});
+  for (const CaseTunnel& tunnel : the_case.tunnels) all.push_back({tunnel.name, tunnel.start, tunnel.end});
+  for (const ModelLine& line : the_case.model_tunnels) all.push_back({line.name, {}, {}, line});
   return all;
 }
 
-void set_tunnels(Case& given, const std::vector<AnyTunnel>& tunnels) {
+void set_tunnels(Case& the_case, const std::vector<AnyTunnel>& tunnels) {
   for (const AnyTunnel& tunnel : tunnels)
     if (tunnel.line)
-      given.model_tunnels.push_back(*tunnel.line);
+      the_case.model_tunnels.push_back(*tunnel.line);
     else
-      given.tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
+      the_case.tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
 }
 
 void read_plate(Case& read, JsonReader& reader) {
@@ -129,12 +129,13 @@ void read_plate(Case& read, JsonReader& reader) {
 
 }  // namespace description
 
-bool brings_camera(const Case& given, const CaseView& view) {
-  return view.camera || view.calibration || given.calibration;
+bool brings_camera(const Case& the_case, const CaseView& view) {
+  return view.camera || view.calibration || the_case.calibration;
 }
 
-bool brings_cameras(const Case& given) {
-  return std::ranges::all_of(given.views, [&](const CaseView& view) { return brings_camera(given, view); });
+bool brings_cameras(const Case& the_case) {
+  return std::ranges::all_of(the_case.views,
+                             [&](const CaseView& view) { return brings_camera(the_case, view); });
 }
 
 Json to_json(const Case& written) {
@@ -162,18 +163,18 @@ Json case_schema() {
   return schema;
 }
 
-Expected<Case> checked_case(Case given) {
+Expected<Case> checked_case(Case the_case) {
   return guarded([&] {
     Json picks = Json::array();
-    for (const Pick& pick : given.picks) picks.push_back(to_json(pick));
-    value_or_throw(picks_from(picks, "case.json", given.views, given.bones));
-    for (const Pick& pick : given.picks)
-      if (description::find_named(given.calibrator.targets, pick.name, &phantom::CalibratorTarget::name))
+    for (const Pick& pick : the_case.picks) picks.push_back(to_json(pick));
+    value_or_throw(picks_from(picks, "case.json", the_case.views, the_case.bones));
+    for (const Pick& pick : the_case.picks)
+      if (description::find_named(the_case.calibrator.targets, pick.name, &phantom::CalibratorTarget::name))
         throw BadInput(Reason::name_clash,
                        fmt::format("pick \"{}\": is the name of a target of the calibrator", pick.name));
-    refuse_metres(given);
-    warn_of_name(given);
-    return std::move(given);
+    refuse_metres(the_case);
+    warn_of_name(the_case);
+    return std::move(the_case);
   });
 }
 

@@ -66,7 +66,7 @@ Expected<std::vector<Pick>> picks_from(const Json& picks, const std::string& ori
                                        const std::vector<guidance::Bone>& bones);
 
 /// A tunnel runs from the pick `start` to the pick `end`.
-struct TunnelPlan {
+struct CaseTunnel {
   std::string name;
   std::string start;
   std::string end;
@@ -102,10 +102,10 @@ struct Case {
   guidance::Poses poses_now;
   guidance::TrackerNoise tracker;
   std::vector<Pick> picks;
-  std::vector<TunnelPlan> tunnels;
+  std::vector<CaseTunnel> tunnels;
   std::vector<guidance::ToolLine> tool_lines;
   std::vector<CaseModel> models;
-  std::vector<ModelTunnelPlan> model_tunnels;        ///< of the models' plans
+  std::vector<ModelLine> model_tunnels;              ///< of the models' plans
   std::vector<double> diameters_mm;                  ///< of the fiducials of a phantom without a file
   std::optional<CaseMarkers> markers;                ///< of a sequence
   std::vector<CaseBody> bodies;                      ///< likewise
@@ -123,8 +123,8 @@ struct Case {
 Expected<Case> read_case(const std::filesystem::path& path, Purpose purpose = Purpose::run);
 
 /// Whether a view, or all of them, bring cameras of other programs, whose world the case then has.
-bool brings_camera(const Case& given, const CaseView& view);
-bool brings_cameras(const Case& given);
+bool brings_camera(const Case& the_case, const CaseView& view);
+bool brings_cameras(const Case& the_case);
 
 /// case.json, the inverse of `read_case`. Its images, calibrator and plate must lie in the folder.
 Json to_json(const Case& written);
@@ -134,7 +134,7 @@ Json case_schema();
 
 /// What `read_case` checks of picks and poses, for values that are from no file; adds the warnings. Fails as
 /// `picks_from`, with name_clash for a pick named as a target, and with bad_value for poses in metres.
-Expected<Case> checked_case(Case given);
+Expected<Case> checked_case(Case the_case);
 
 /// The case.json of a case given by its folder or by that file, and its folder.
 std::filesystem::path case_file(const std::filesystem::path& path);

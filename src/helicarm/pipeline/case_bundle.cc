@@ -48,7 +48,7 @@ Json listed(const Json& json, const char* list) {
 /// The folder of the bundled case, while it is made.
 class Bundler {
  public:
-  Bundler(const Case& given, Json json) : given_(given), json_(std::move(json)) {
+  Bundler(const Case& the_case, Json json) : given_(the_case), json_(std::move(json)) {
     for (const char* list : {"picks", "tunnels", "tool_lines"}) json_[list] = listed(json_, list);
     views_ = numbered(json_, "views", "V");
     picks_ = numbered(json_, "picks", "pick");
@@ -271,8 +271,8 @@ constexpr std::array always_kept{"format",  "helicarm-result/1", "status", "ok",
 
 Expected<CaseBundle> bundle_case(const fs::path& path, const BundleOptions& options) {
   return guarded([&] {
-    const Case given = value_or_throw(read_case(path));
-    Bundler bundler(given, value_or_throw(read_json(case_file(path))));
+    const Case the_case = value_or_throw(read_case(path));
+    Bundler bundler(the_case, value_or_throw(read_json(case_file(path))));
     bundler.write();
     CaseBundle bundle = std::move(bundler.bundle());
     std::string log =

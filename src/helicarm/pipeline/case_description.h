@@ -196,22 +196,22 @@ void describe_picks(Codec& codec, Picks& picks, const std::vector<CaseView>& vie
 }
 
 template <class Codec, class CaseValue>
-void describe_views(Codec& codec, CaseValue& given, Purpose purpose) {
+void describe_views(Codec& codec, CaseValue& the_case, Purpose purpose) {
   std::set<std::string> names;
-  codec.list("views", given.views, true, purpose == Purpose::sweep ? most_frames : most_views,
+  codec.list("views", the_case.views, true, purpose == Purpose::sweep ? most_frames : most_views,
              "at least one; one view is calibrated, points need two", [&](auto& entry, auto& view) {
-               describe_view(entry, view, given.folder, given.bones, purpose);
+               describe_view(entry, view, the_case.folder, the_case.bones, purpose);
                entry.check([&](JsonReader& reader) {
                  take_name(reader, names, view.name);
-                 if (view.plate_image && !given.plate)
+                 if (view.plate_image && !the_case.plate)
                    reader.refuse(Reason::bad_value, "plate_image", "is given, but the case has no plate");
                });
              });
   codec.check([&](JsonReader& reader) {
-    if (given.views.empty())
+    if (the_case.views.empty())
       reader.refuse(Reason::bad_value, "views", "is empty: at least one view is required");
-    const auto brings = [&](const CaseView& view) { return brings_camera(given, view); };
-    if (std::ranges::any_of(given.views, brings) && !brings_cameras(given))
+    const auto brings = [&](const CaseView& view) { return brings_camera(the_case, view); };
+    if (std::ranges::any_of(the_case.views, brings) && !brings_cameras(the_case))
       reader.refuse(Reason::bad_value, "views",
                     purpose == Purpose::track
                         ? "\"camera\" or \"calibration\" must be given for all views or "
@@ -224,58 +224,58 @@ void describe_views(Codec& codec, CaseValue& given, Purpose purpose) {
 /// An element of "tunnels": from pick to pick, or a line of a model's plan.
 struct AnyTunnel {
   std::string name, start, end;
-  std::optional<ModelTunnelPlan> line = {};
+  std::optional<ModelLine> line = {};
 };
-std::vector<AnyTunnel> all_tunnels(const Case& given);
-void set_tunnels(Case& given, const std::vector<AnyTunnel>& tunnels);
+std::vector<AnyTunnel> all_tunnels(const Case& the_case);
+void set_tunnels(Case& the_case, const std::vector<AnyTunnel>& tunnels);
 
 template <class Codec, class Tunnel>
-void describe_any_tunnel(Codec& codec, Tunnel& tunnel, const Case& given, std::vector<CaseModel>& models) {
+void describe_any_tunnel(Codec& codec, Tunnel& tunnel, const Case& the_case, std::vector<CaseModel>& models) {
   codec.text("name", tunnel.name, "unique");
   codec.form("model", false, !tunnel.line, [&] {
     codec.text("start", tunnel.start, "name of a pick");
     codec.text("end", tunnel.end, "name of a pick");
     codec.check([&](JsonReader& reader) {
       for (const auto& [key, pick] : {std::pair{"start", &tunnel.start}, {"end", &tunnel.end}})
-        if (!find_named(given.picks, *pick, &Pick::name))
+        if (!find_named(the_case.picks, *pick, &Pick::name))
           reader.refuse(Reason::bad_value, key, fmt::format("\"{}\" is not a pick of the case", *pick));
     });
   });
   codec.form("model", true, tunnel.line.has_value(), [&] {
     if constexpr (std::is_const_v<Tunnel>) {
-      describe_model_line(codec, *tunnel.line, models, given.bones);
+      describe_model_line(codec, *tunnel.line, models, the_case.bones);
     } else {
       tunnel.line.emplace().name = tunnel.name;
-      describe_model_line(codec, *tunnel.line, models, given.bones);
+      describe_model_line(codec, *tunnel.line, models, the_case.bones);
     }
   });
 }
 
 template <class Codec, class CaseValue>
-void describe_tunnels(Codec& codec, CaseValue& given) {
+void describe_tunnels(Codec& codec, CaseValue& the_case) {
   std::set<std::string> names;
-  std::vector<AnyTunnel> tunnels = all_tunnels(given);
-  std::vector<CaseModel> models = given.models;
+  std::vector<AnyTunnel> tunnels = all_tunnels(the_case);
+  std::vector<CaseModel> models = the_case.models;
   codec.list("tunnels", tunnels, false, most_picks, "from pick to pick, or a line of a model's plan",
              [&](auto& entry, auto& tunnel) {
-               describe_any_tunnel(entry, tunnel, given, models);
+               describe_any_tunnel(entry, tunnel, the_case, models);
                entry.check([&](JsonReader& reader) { take_name(reader, names, tunnel.name); });
              });
   if constexpr (!std::is_const_v<CaseValue>) {
-    set_tunnels(given, tunnels);
-    given.models = std::move(models);  // a line may say with which bone its model moves
+    set_tunnels(the_case, tunnels);
+    the_case.models = std::move(models);  // a line may say with which bone its model moves
   }
 }
 
 template <class Codec, class CaseValue>
-void describe_tool_lines(Codec& codec, CaseValue& given) {
+void describe_tool_lines(Codec& codec, CaseValue& the_case) {
   std::set<std::string> lines;
-  codec.list("tool_lines", given.tool_lines, false, most_picks, "the instrument's axis as it was measured",
+  codec.list("tool_lines", the_case.tool_lines, false, most_picks, "the instrument's axis as it was measured",
              [&](auto& entry, auto& line) {
                describe_tool_line(entry, line);
                entry.check([&](JsonReader& reader) {
                  take_name(reader, lines, line.name);
-                 if (!find_named(given.tunnels, line.tunnel, &TunnelPlan::name))
+                 if (!find_named(the_case.tunnels, line.tunnel, &CaseTunnel::name))
                    reader.refuse(Reason::bad_value, "tunnel",
                                  fmt::format("\"{}\" is not a tunnel of the case", line.tunnel));
                  if ((line.p2_in_calibrator - line.p1_in_calibrator).norm() < 1)
@@ -309,24 +309,24 @@ void describe_body(Codec& codec, Body& body, const std::filesystem::path& folder
 }
 
 template <class Codec, class CaseValue>
-void describe_sequence(Codec& codec, CaseValue& given, Purpose purpose) {
+void describe_sequence(Codec& codec, CaseValue& the_case, Purpose purpose) {
   check_track(codec, "markers", purpose);
-  codec.object("markers", given.markers, "of [`helicarm track`](motion.md#run-it)",
+  codec.object("markers", the_case.markers, "of [`helicarm track`](motion.md#run-it)",
                [](auto& inner, auto& markers) {
                  inner.number("diameter_mm", markers.diameter_mm, {0.1, 30}, "of the markers");
                });
   std::set<std::string> names;
   check_track(codec, "bodies", purpose);
-  if (codec.wants(!given.bodies.empty()))
-    codec.list("bodies", given.bodies, false, most_bodies, "of `helicarm track`: rigid sets of markers",
+  if (codec.wants(!the_case.bodies.empty()))
+    codec.list("bodies", the_case.bodies, false, most_bodies, "of `helicarm track`: rigid sets of markers",
                [&](auto& entry, auto& body) {
-                 describe_body(entry, body, given.folder);
+                 describe_body(entry, body, the_case.folder);
                  entry.check([&](JsonReader& reader) { take_name(reader, names, body.name); });
                });
   check_track(codec, "frame_rate_hz", purpose);
-  codec.number("frame_rate_hz", given.frame_rate_hz, {0.01, 1e5}, "of `helicarm track`");
+  codec.number("frame_rate_hz", the_case.frame_rate_hz, {0.01, 1e5}, "of `helicarm track`");
   check_track(codec, "calibration", purpose);
-  codec.file("calibration", given.calibration, given.folder,
+  codec.file("calibration", the_case.calibration, the_case.folder,
              "of `helicarm track`: as `calibration` of every view");
 }
 
@@ -337,7 +337,7 @@ void read_plate(Case& read, JsonReader& reader);
 void check_calibrator(const Case& read, JsonReader& reader, Purpose purpose);
 
 template <class Codec, class CaseValue>
-void describe_case(Codec& codec, CaseValue& given, Purpose purpose) {
+void describe_case(Codec& codec, CaseValue& the_case, Purpose purpose) {
   constexpr bool reads = !std::is_const_v<CaseValue>;
   const auto named = [](const auto& name) { return name.empty() ? Json() : Json(name); };
   codec.custom(
@@ -347,54 +347,56 @@ void describe_case(Codec& codec, CaseValue& given, Purpose purpose) {
         reader.choice("format", {"helicarm-case/2", "helicarm-case/1"});
       },
       [] { return std::optional<Json>("helicarm-case/2"); });
-  describe_sequence(codec, given, purpose);
+  describe_sequence(codec, the_case, purpose);
   codec.custom(
       "calibrator", true, {{"type", {"string", "null"}}},
       "`\"udcsc\"` or path of a [calibrator.json](#calibratorjson); may be `null` for `phantom measure "
       "--from-scratch`",
       [&](JsonReader& reader) {
-        if constexpr (reads) read_calibrator(given, reader);
+        if constexpr (reads) read_calibrator(the_case, reader);
       },
-      [&] { return std::optional(named(given.calibrator_name)); });
+      [&] { return std::optional(named(the_case.calibrator_name)); });
   codec.custom(
       "plate", false, {{"type", "string"}},
       "`\"plate48\"` or path of a [plate.json](#platejson); `null` or absent: flat panel",
       [&](JsonReader& reader) {
-        if constexpr (reads) read_plate(given, reader);
+        if constexpr (reads) read_plate(the_case, reader);
       },
-      [&] { return std::optional(given.plate_name ? Json(*given.plate_name) : Json()); });
+      [&] { return std::optional(the_case.plate_name ? Json(*the_case.plate_name) : Json()); });
   codec.custom(
       "bones", false, {{"type", "array"}, {"items", {{"type", "string"}}}, {"maxItems", most_bones}},
       "names of the bones that carry markers, each 1 to 100 characters, none of them that of another frame "
       "(`tool`, "
       "`calibrator`, ...). Default `[\"femur\", \"tibia\"]`",
       [&](JsonReader& reader) {
-        if constexpr (reads) given.bones = bones_from(reader);
+        if constexpr (reads) the_case.bones = bones_from(reader);
       },
-      [&] { return std::optional(Json(given.bones)); });
-  describe_views(codec, given, purpose);
+      [&] { return std::optional(Json(the_case.bones)); });
+  describe_views(codec, the_case, purpose);
   codec.check([&](JsonReader& reader) {
-    if constexpr (reads) check_calibrator(given, reader, purpose);
+    if constexpr (reads) check_calibrator(the_case, reader, purpose);
   });
   describe_poses(
-      codec, "poses_now", given.poses_now, given.bones, OtherMarker::tool,
+      codec, "poses_now", the_case.poses_now, the_case.bones, OtherMarker::tool,
       "current poses: `tracker_from_bone` (`{\"L4\": pose, ...}`, those of the case's bones that are seen), "
       "`tracker_from_tool`");
-  if (codec.wants(given.tracker.sigma_mm > 0 || given.tracker.sigma_deg > 0))
-    codec.object("tracker", given.tracker, "noise of the tracker's readings",
+  if (codec.wants(the_case.tracker.sigma_mm > 0 || the_case.tracker.sigma_deg > 0))
+    codec.object("tracker", the_case.tracker, "noise of the tracker's readings",
                  [](auto& inner, auto& noise) { describe_tracker(inner, noise); });
-  describe_picks(codec, given.picks, given.views, given.bones, given.calibrator.targets, purpose);
-  if (codec.wants(!given.models.empty()))
-    describe_models(codec, given.models, purpose == Purpose::registration, given.folder, given.bones);
+  describe_picks(codec, the_case.picks, the_case.views, the_case.bones, the_case.calibrator.targets, purpose);
+  if (codec.wants(!the_case.models.empty()))
+    describe_models(codec, the_case.models, purpose == Purpose::registration, the_case.folder,
+                    the_case.bones);
   codec.check([&](JsonReader& reader) {
-    if (purpose == Purpose::registration && given.models.empty())
+    if (purpose == Purpose::registration && the_case.models.empty())
       reader.refuse(Reason::bad_value, "models", "is empty: name a volume or a surface");
   });
-  describe_tunnels(codec, given);
-  describe_tool_lines(codec, given);
-  codec.numbers("diameters_mm", given.diameters_mm, 10, {0.5, 30},
+  describe_tunnels(codec, the_case);
+  describe_tool_lines(codec, the_case);
+  codec.numbers("diameters_mm", the_case.diameters_mm, 10, {0.5, 30},
                 "of the balls; required for `phantom measure --from-scratch`, also beside a `calibrator`");
-  if (codec.wants(!given.notes.empty())) codec.text_or_default("notes", given.notes, "ignored", {0, 100000});
+  if (codec.wants(!the_case.notes.empty()))
+    codec.text_or_default("notes", the_case.notes, "ignored", {0, 100000});
 }
 
 }  // namespace helicarm::pipeline::description

@@ -13,14 +13,15 @@ constexpr std::string_view placeholder = "{frame";
 
 std::string numbered(const std::string& name, int number) {
   static const std::regex forms(R"(\{frame(?::0([1-9])d)?\})");
-  std::string made, rest = name;
+  std::string filled, rest = name;
   for (std::smatch match; std::regex_search(rest, match, forms); rest = match.suffix())
-    made += match.prefix().str() + fmt::format("{:0{}}", number, match[1].matched ? std::stoi(match[1]) : 1);
-  if (made.empty() || rest.find(placeholder) != std::string::npos)
+    filled +=
+        match.prefix().str() + fmt::format("{:0{}}", number, match[1].matched ? std::stoi(match[1]) : 1);
+  if (filled.empty() || rest.find(placeholder) != std::string::npos)
     throw BadInput(Reason::bad_value, fmt::format("views: \"image\": \"{}\": write {{frame}} or, for leading "
                                                   "zeros, {{frame:03d}}",
                                                   name));
-  return made + rest;
+  return filled + rest;
 }
 
 }  // namespace
@@ -29,7 +30,7 @@ bool is_numbered(const CaseView& view) {
   return view.image.filename().string().find(placeholder) != std::string::npos;
 }
 
-bool is_sequence(const Case& given) { return std::ranges::any_of(given.views, is_numbered); }
+bool is_sequence(const Case& the_case) { return std::ranges::any_of(the_case.views, is_numbered); }
 
 Expected<CaseView> at_number(CaseView view, int number) {
   return guarded([&] {
@@ -41,11 +42,11 @@ Expected<CaseView> at_number(CaseView view, int number) {
   });
 }
 
-Expected<Case> at_frame(Case given, int frame) {
+Expected<Case> at_frame(Case the_case, int frame) {
   return guarded([&] {
-    for (CaseView& view : given.views)
+    for (CaseView& view : the_case.views)
       view = value_or_throw(at_number(std::move(view), frame + view.frame_offset.value_or(0)));
-    return std::move(given);
+    return std::move(the_case);
   });
 }
 

@@ -9,7 +9,7 @@ namespace helicarm::pipeline {
 bool is_numbered(const CaseView& view);
 
 /// Whether a view of the case is.
-bool is_sequence(const Case& given);
+bool is_sequence(const Case& the_case);
 
 /// The view at an image's number: in its file's name {frame} or, with leading zeros, {frame:03d} is replaced
 /// by it; an image without it is a file with several frames, the first of which is 1. Fails with bad_value
@@ -17,6 +17,6 @@ bool is_sequence(const Case& given);
 Expected<CaseView> at_number(CaseView view, int number);
 
 /// All views at a frame of the sequence: their numbers are the frame and the view's `frame_offset`.
-Expected<Case> at_frame(Case given, int frame);
+Expected<Case> at_frame(Case the_case, int frame);
 
 }  // namespace helicarm::pipeline

@@ -7,12 +7,12 @@
 
 namespace helicarm::pipeline {
 
-void description::check_model_line(const JsonReader& reader, const ModelTunnelPlan& tunnel,
+void description::check_model_line(const JsonReader& reader, const ModelLine& tunnel,
                                    const std::optional<guidance::Bone>& bone,
                                    std::vector<CaseModel>& models) {
   const auto model = std::ranges::find(models, tunnel.model, &CaseModel::name);
-  const auto refuse = [&](const char* key, const std::string& how) {
-    reader.refuse(Reason::bad_value, key, how);
+  const auto refuse = [&](const char* key, const std::string& problem) {
+    reader.refuse(Reason::bad_value, key, problem);
   };
   if (model == models.end()) refuse("model", fmt::format("\"{}\" is not one of \"models\"", tunnel.model));
   if (!model->plan)

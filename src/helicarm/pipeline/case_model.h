@@ -41,7 +41,7 @@ enum class TunnelEnd { start, end };
 inline constexpr std::array<std::string_view, 2> tunnel_end_words{"start", "end"};
 
 /// An element of "tunnels" that names a model: a line of its plan as a tunnel with a diameter.
-struct ModelTunnelPlan {
+struct ModelLine {
   std::string name;
   std::string model;
   std::string line;                       ///< in the model's plan; its name unless given

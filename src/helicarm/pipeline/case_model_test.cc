@@ -76,7 +76,7 @@ TEST(CaseModel, TheLabelOfAMaskIsReadAndWritten) {
 }
 
 /// The tunnel of a case with a model, or why it is refused.
-Expected<ModelTunnelPlan> tunnel_from(const char* tunnel, bool outlined = true) {
+Expected<ModelLine> tunnel_from(const char* tunnel, bool outlined = true) {
   const Json json = Json::parse(tunnel);
   CaseModel model;
   model.name = "femur", model.volume = "ct.nrrd", model.plan = "plan.mrk.json", model.moves_with = "femur";
@@ -84,7 +84,7 @@ Expected<ModelTunnelPlan> tunnel_from(const char* tunnel, bool outlined = true) 
   return guarded([&] {
     JsonReader reader(json, "tunnels[0]");
     std::vector<CaseModel> models{model};
-    ModelTunnelPlan read;
+    ModelLine read;
     read.name = reader.text("name");
     FromJson codec(reader);
     description::describe_model_line(codec, read, models, guidance::knee_bones());

@@ -35,10 +35,10 @@ Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::fil
     if (table.rows() == 0) throw BadInput(Reason::bad_value, "picks: the table has no rows");
     PickedCase picked{std::move(json)};
     Json& picks = picks_of(picked.json);
-    std::set<std::pair<std::string, std::string>> given;
+    std::set<std::pair<std::string, std::string>> rows;
     for (std::size_t row = 0; row < table.rows(); ++row) {
       const std::string &name = table.text(row, "name"), &view = table.text(row, "view");
-      if (!given.emplace(name, view).second)
+      if (!rows.emplace(name, view).second)
         throw BadInput(Reason::name_clash,
                        fmt::format("picks: row {}: \"{}\" is given twice in \"{}\"", row + 1, name, view));
       auto pick = std::find_if(picks.begin(), picks.end(), [&](const Json& other) {
@@ -59,7 +59,7 @@ Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::fil
 }
 
 Expected<Json> with_all_picks(Json json, const std::vector<Pick>& picks,
-                              const std::vector<TunnelPlan>& tunnels, const std::filesystem::path& folder) {
+                              const std::vector<CaseTunnel>& tunnels, const std::filesystem::path& folder) {
   return guarded([&] {
     const Case before = value_or_throw(case_from_json(json, "case.json", folder));
     json["picks"] = Json::array();
@@ -68,9 +68,9 @@ Expected<Json> with_all_picks(Json json, const std::vector<Pick>& picks,
     const auto is_picked = [&](const std::string& name) {
       return std::ranges::find(picks, name, &Pick::name) != picks.end();
     };
-    for (const TunnelPlan& tunnel : tunnels)
+    for (const CaseTunnel& tunnel : tunnels)
       if (is_picked(tunnel.start) && is_picked(tunnel.end) &&
-          std::ranges::find(before.tunnels, tunnel.name, &TunnelPlan::name) == before.tunnels.end())
+          std::ranges::find(before.tunnels, tunnel.name, &CaseTunnel::name) == before.tunnels.end())
         json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
     if (json["tunnels"].empty()) json.erase("tunnels");
     value_or_throw(case_from_json(json, "case.json", folder));

@@ -24,6 +24,6 @@ Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::fil
 /// A case.json with these picks in place of its own, and with those tunnels that it does not name and whose
 /// ends are picked. Fails as `case_from_json` of the result: a tunnel of the case must keep its ends.
 Expected<Json> with_all_picks(Json json, const std::vector<Pick>& picks,
-                              const std::vector<TunnelPlan>& tunnels, const std::filesystem::path& folder);
+                              const std::vector<CaseTunnel>& tunnels, const std::filesystem::path& folder);
 
 }  // namespace helicarm::pipeline

@@ -48,15 +48,16 @@ void append_warnings(std::vector<Finding>& warnings, const calibration::Calibrat
         {warning, warning.reason == Reason::residual_distortion ? Stage::rectify : Stage::calibrate});
 }
 
-Result initial_result(const Case& given, const RunOptions& options, std::vector<ViewResult> views) {
+Result initial_result(const Case& the_case, const RunOptions& options, std::vector<ViewResult> views) {
   Result result;
   result.options = options;
-  result.bones = given.bones;
-  result.calibrator = {given.calibrator.name, given.calibrator.tolerance_mm, given.calibrator.scale_sigma,
-                       given.calibrator.measured, given.calibrator.balls};
+  result.bones = the_case.bones;
+  result.calibrator = {the_case.calibrator.name, the_case.calibrator.tolerance_mm,
+                       the_case.calibrator.scale_sigma, the_case.calibrator.measured,
+                       the_case.calibrator.balls};
   result.views = std::move(views);
-  result.tool_lines = given.tool_lines;
-  append(result.warnings, given.warnings, Stage::read);
+  result.tool_lines = the_case.tool_lines;
+  append(result.warnings, the_case.warnings, Stage::read);
   append_warnings(result.warnings, result.views);
   append(result.notes, notes_of(result.views), Stage::read);
   append(result.warnings, reused_uids(result.views), Stage::read);
@@ -64,14 +65,14 @@ Result initial_result(const Case& given, const RunOptions& options, std::vector<
   return result;
 }
 
-Result initial_result(const Case& given, const CaseCalibration& calibration, const RunOptions& options) {
+Result initial_result(const Case& the_case, const CaseCalibration& calibration, const RunOptions& options) {
   std::vector<ViewResult> views;
   for (std::size_t i = 0; i < calibration.images.size(); ++i) {
     views.push_back(reported(calibration.images[i]));
     views[i].found->fiducials = calibration.fiducials[i];
     views[i].calibrated = calibration.views[i];
   }
-  Result result = initial_result(given, options, std::move(views));
+  Result result = initial_result(the_case, options, std::move(views));
   append_warnings(result.warnings, calibration);
   append(result.notes, calibration.notes, Stage::calibrate);
   result.timing_ms = calibration.timing_ms;
@@ -79,10 +80,10 @@ Result initial_result(const Case& given, const CaseCalibration& calibration, con
 }
 
 /// `read_case` refuses such a case; picks may have changed since.
-Expected<void> check_tunnel_ends(const Case& given) {
-  for (const TunnelPlan& tunnel : given.tunnels)
+Expected<void> check_tunnel_ends(const Case& the_case) {
+  for (const CaseTunnel& tunnel : the_case.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end})
-      if (std::ranges::find(given.picks, end, &Pick::name) == given.picks.end())
+      if (std::ranges::find(the_case.picks, end, &Pick::name) == the_case.picks.end())
         return fail(Reason::bad_value,
                     fmt::format("tunnel \"{}\": \"{}\" is not a pick of the case", tunnel.name, end));
   return {};
@@ -90,40 +91,42 @@ Expected<void> check_tunnel_ends(const Case& given) {
 
 }  // namespace
 
-Expected<Result> locate_case(const Case& given, std::shared_ptr<const CaseCalibration> calibrated,
+Expected<Result> locate_case(const Case& the_case, std::shared_ptr<const CaseCalibration> calibrated,
                              const RunOptions& options, const Progress& progress) {
   const CaseCalibration& calibration = *calibrated;
-  if (auto valid = check_tunnel_ends(given); !valid) return tl::unexpected<Failure>(std::move(valid).error());
+  if (auto valid = check_tunnel_ends(the_case); !valid)
+    return tl::unexpected<Failure>(std::move(valid).error());
   progress.begin("locate");
-  Result result = initial_result(given, calibration, options);
+  Result result = initial_result(the_case, calibration, options);
   result.calibration = std::move(calibrated);
   const auto located = timed(result.timing_ms.locate, [&] {
-    return observe_points(given, calibration, options.threads).map([&](std::vector<PointResult> points) {
+    return observe_points(the_case, calibration, options.threads).map([&](std::vector<PointResult> points) {
       append(result.warnings,
-             locate_points(given, calibration, points, options.motion_sigma_mm),  // Eq. 8, Eq. 16
+             locate_points(the_case, calibration, points, options.motion_sigma_mm),  // Eq. 8, Eq. 16
              Stage::locate);
-      append(result.warnings, picks_on_fiducials(given, calibration, points), Stage::locate);
-      append(result.notes, note_motion(given, calibration, points, options.motion_sigma_mm), Stage::locate);
+      append(result.warnings, picks_on_fiducials(the_case, calibration, points), Stage::locate);
+      append(result.notes, note_motion(the_case, calibration, points, options.motion_sigma_mm),
+             Stage::locate);
       result.points = std::move(points);
     });
   });
   if (!located) return tl::unexpected<Failure>(located.error());
-  result.accuracy = measure_accuracy(given.calibrator, calibration, result.points);  // Eq. 10-12
-  append(result.warnings, diagnose(given, result), Stage::calibrate);
+  result.accuracy = measure_accuracy(the_case.calibrator, calibration, result.points);  // Eq. 10-12
+  append(result.warnings, diagnose(the_case, result), Stage::calibrate);
   append(result.notes, handedness_notes(calibration), Stage::label);
   append(result.notes, one_view_notes(calibration), Stage::calibrate);
-  append(result.notes, scale_notes(given, calibration, result.points), Stage::calibrate);
-  result.tunnel_ends = tunnel_ends(given.tunnels, result.points);
+  append(result.notes, scale_notes(the_case, calibration, result.points), Stage::calibrate);
+  result.tunnel_ends = tunnel_ends(the_case.tunnels, result.points);
   const auto done = check_picks_agree(result.points, calibration)
-                        .and_then([&] { return plan_tunnels(given, result); })  // Eq. 16
+                        .and_then([&] { return plan_tunnels(the_case, result); })  // Eq. 16
                         .and_then([&](std::vector<guidance::Tunnel> tunnels) {
                           result.tunnels = std::move(tunnels);
-                          return verify_tool_lines(given, calibration.views, result);  // Eq. 17
+                          return verify_tool_lines(the_case, calibration.views, result);  // Eq. 17
                         })
                         .and_then([&](std::vector<guidance::Verification> verifications) {
                           append(result.warnings, lines_off_plan(verifications), Stage::locate);
                           result.verifications = std::move(verifications);
-                          return check_certain(result.points, options.max_error_mm, given.calibrator);
+                          return check_certain(result.points, options.max_error_mm, the_case.calibrator);
                         })
                         .map([&](const std::vector<Warning>& warnings) {
                           append(result.warnings, warnings, Stage::locate);
@@ -132,9 +135,9 @@ Expected<Result> locate_case(const Case& given, std::shared_ptr<const CaseCalibr
   return result;
 }
 
-Expected<Result> result_of_refusal(const Case& given, Refusal refusal, const RunOptions& options) {
+Expected<Result> result_of_refusal(const Case& the_case, Refusal refusal, const RunOptions& options) {
   if (exit_code(refusal.failure.reason) == 2) return tl::unexpected<Failure>(refusal.failure);
-  Result result = initial_result(given, options, std::move(refusal.views));
+  Result result = initial_result(the_case, options, std::move(refusal.views));
   result.failure = std::move(refusal.failure);
   result.refused_at = refusal.stage;
   result.timing_ms = refusal.timing_ms;

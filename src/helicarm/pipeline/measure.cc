@@ -30,11 +30,11 @@ bool ask_for_one_calibration(const RunOptions& a, const RunOptions& b) {
 
 }  // namespace
 
-Expected<Result> measure(const Case& given, const RunOptions& options, const Progress& progress) {
+Expected<Result> measure(const Case& the_case, const RunOptions& options, const Progress& progress) {
   return in_total([&]() -> Expected<Result> {
-    auto calibration = calibrate_case(given, options, progress);
-    if (!calibration) return result_of_refusal(given, std::move(calibration).error(), options);
-    return locate_case(given, std::make_shared<const CaseCalibration>(*std::move(calibration)), options,
+    auto calibration = calibrate_case(the_case, options, progress);
+    if (!calibration) return result_of_refusal(the_case, std::move(calibration).error(), options);
+    return locate_case(the_case, std::make_shared<const CaseCalibration>(*std::move(calibration)), options,
                        progress);
   });
 }

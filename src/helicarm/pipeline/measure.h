@@ -12,7 +12,7 @@ namespace helicarm::pipeline {
 
 /// The paper's method from images to tunnels. A refusal is in `Result::failure`, with all results before it;
 /// unreadable input (exit code 2) fails.
-Expected<Result> measure(const Case& given, const RunOptions& options, const Progress& progress = {});
+Expected<Result> measure(const Case& the_case, const RunOptions& options, const Progress& progress = {});
 
 /// As `measure`, of the same images, calibrator and plate, by the earlier calibration: picks, tunnels, tool
 /// lines, present poses and the tracker's noise may differ. Calibrates where there is no calibration, or one

@@ -17,8 +17,8 @@
 namespace helicarm::pipeline {
 namespace {
 
-Expected<Result> result_of(const Case& given, const RunOptions& options, const Progress& progress = {}) {
-  return measure(given, options, progress);
+Expected<Result> result_of(const Case& the_case, const RunOptions& options, const Progress& progress = {}) {
+  return measure(the_case, options, progress);
 }
 
 /// One simulated case for all tests: 512 x 512 pixels, tunnels, tracker and tool lines.

@@ -112,7 +112,9 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
       "`coordinateSystem` LPS, RAS or LAS, `coordinateUnits` of length are converted) or `.fcsv` (points; "
       "its `#` lines must state `CoordinateSystem`, LPS, RAS, LAS, 0 or 1, and `columns`)");
   codec.check([&](JsonReader& reader) {
-    const auto refuse = [&](const char* key, const char* how) { reader.refuse(Reason::bad_value, key, how); };
+    const auto refuse = [&](const char* key, const char* problem) {
+      reader.refuse(Reason::bad_value, key, problem);
+    };
     if (model.volume && model.surface) refuse("surface", "cannot be combined with \"volume\"");
     if (model.mask && !model.volume) refuse("mask", "needs a \"volume\"");
     if (model.mask_label && !model.mask) refuse("mask_label", "needs a \"mask\"");
@@ -136,7 +138,7 @@ void describe_models(Codec& codec, Models& models, bool required, const std::fil
 }
 
 /// What a line needs of its model; a bone that the tunnel names is the model's.
-void check_model_line(const JsonReader& reader, const ModelTunnelPlan& tunnel,
+void check_model_line(const JsonReader& reader, const ModelLine& tunnel,
                       const std::optional<guidance::Bone>& bone, std::vector<CaseModel>& models);
 
 /// The keys beside "name"; reading sets the `moves_with` of its model where `bone` gives it.

@@ -43,19 +43,19 @@ bool lies_in(const fs::path& file, const fs::path& folder) {
 }
 
 /// The file's name in case.json; it is copied unless it lies in the folder.
-std::string brought(NewCase& made, const fs::path& file, const fs::path& folder, const std::string& name) {
+std::string brought(NewCase& draft, const fs::path& file, const fs::path& folder, const std::string& name) {
   if (lies_in(file, folder))
     return fs::weakly_canonical(file).lexically_relative(fs::weakly_canonical(folder)).generic_string();
-  made.copies.push_back({file, name});
+  draft.copies.push_back({file, name});
   return name;
 }
 
-std::string brought_image(NewCase& made, const fs::path& file, const fs::path& folder,
+std::string brought_image(NewCase& draft, const fs::path& file, const fs::path& folder,
                           const std::string& name) {
   const std::string ending = file.has_extension() ? file.extension().string() : ".dcm";
-  const std::string to = brought(made, file, folder, plain(name) + ending);
+  const std::string to = brought(draft, file, folder, plain(name) + ending);
   const auto sidecar = ending == ".dcm" ? xray::full_sidecar_of(file) : xray::sidecar_of(file);
-  if (sidecar && !lies_in(file, folder)) made.copies.push_back({*sidecar, to + ".json"});
+  if (sidecar && !lies_in(file, folder)) draft.copies.push_back({*sidecar, to + ".json"});
   return to;
 }
 
@@ -97,13 +97,13 @@ void check_images(const std::vector<InspectedImage>& images) {
   value_or_throw(check_images_belong_together(views));
 }
 
-void warn(NewCase& made, const std::vector<InspectedImage>& images) {
+void warn(NewCase& draft, const std::vector<InspectedImage>& images) {
   double widest = 0;
   bool known = images.size() > 1;
   for (std::size_t i = 0; i < images.size(); ++i) {
     for (Warning warning : images[i].xray_image.warnings) {
       warning.view = images[i].view;
-      made.warnings.push_back(std::move(warning));
+      draft.warnings.push_back(std::move(warning));
     }
     for (std::size_t j = 0; j < i; ++j)
       if (const auto angle =
@@ -113,7 +113,7 @@ void warn(NewCase& made, const std::vector<InspectedImage>& images) {
         known = false;
   }
   if (known && widest < least_angle_deg)
-    made.warnings.push_back(
+    draft.warnings.push_back(
         {Reason::views_too_close,
          fmt::format("by their positioner angles the views are {:.0f} degrees apart, at least {:.0f} are "
                      "needed",
@@ -122,20 +122,20 @@ void warn(NewCase& made, const std::vector<InspectedImage>& images) {
          {{"angle_deg", widest}}});
 }
 
-void set_calibrator(NewCase& made, const std::string& name, const fs::path& folder) {
+void set_calibrator(NewCase& draft, const std::string& name, const fs::path& folder) {
   if (name.empty())
     throw BadInput(Reason::usage,
                    "--calibrator is missing: give calibrator.json, or udcsc for the built-in one");
   const bool is_file = fs::is_regular_file(name);
   const phantom::Calibrator calibrator =
       value_or_throw(is_file ? phantom::read_calibrator(name) : phantom::calibrator_named(name, folder));
-  made.given.calibrator_name = is_file ? brought(made, name, folder, "calibrator.json") : name;
-  made.findings.push_back(fmt::format("calibrator: {}, {} balls, {} targets",
-                                      without_control_characters(calibrator.name), calibrator.balls.size(),
-                                      calibrator.targets.size()));
+  draft.the_case.calibrator_name = is_file ? brought(draft, name, folder, "calibrator.json") : name;
+  draft.findings.push_back(fmt::format("calibrator: {}, {} balls, {} targets",
+                                       without_control_characters(calibrator.name), calibrator.balls.size(),
+                                       calibrator.targets.size()));
 }
 
-void set_plate(NewCase& made, const std::vector<InspectedImage>& images, const NewCaseOptions& options,
+void set_plate(NewCase& draft, const std::vector<InspectedImage>& images, const NewCaseOptions& options,
                const fs::path& folder) {
   PlateChoice choice{options.plate, "as given"};
   if (!choice.plate && options.maps.size() == images.size()) choice = {"none", "every view has a map"};
@@ -150,27 +150,27 @@ void set_plate(NewCase& made, const std::vector<InspectedImage>& images, const N
                     "--plate-image, a map with --map, or --plate none if the images are free of "
                     "distortion",
                     choice.why));
-  made.findings.push_back(fmt::format("plate: {} ({})", printable(*choice.plate), choice.why));
+  draft.findings.push_back(fmt::format("plate: {} ({})", printable(*choice.plate), choice.why));
   if (*choice.plate == "none") return;
   const bool is_file = fs::is_regular_file(*choice.plate);
   value_or_throw(is_file ? phantom::read_plate(*choice.plate) : phantom::plate_named(*choice.plate, folder));
-  made.given.plate_name = is_file ? brought(made, *choice.plate, folder, "plate.json") : *choice.plate;
+  draft.the_case.plate_name = is_file ? brought(draft, *choice.plate, folder, "plate.json") : *choice.plate;
 }
 
-void set_views(NewCase& made, const std::vector<InspectedImage>& images, const NewCaseOptions& options,
+void set_views(NewCase& draft, const std::vector<InspectedImage>& images, const NewCaseOptions& options,
                const fs::path& folder) {
   for (const InspectedImage& image : images) {
-    CaseView& view = made.given.views.emplace_back();
+    CaseView& view = draft.the_case.views.emplace_back();
     view.name = image.view;
-    view.image = folder / brought_image(made, image.file, folder, image.view);
+    view.image = folder / brought_image(draft, image.file, folder, image.view);
     view.frame = image.frame;
     view.pixel_mm = options.stated.pixel_mm;
     view.source_detector_mm = options.stated.source_detector_mm;
     for (const auto& [name, file] : options.plate_images)
       if (name == image.view)
-        view.plate_image = folder / brought_image(made, file, folder, image.view + "_plate");
+        view.plate_image = folder / brought_image(draft, file, folder, image.view + "_plate");
     for (const auto& [name, file] : options.maps)
-      if (name == image.view) view.map = folder / brought(made, file, folder, plain(name) + "_map.json");
+      if (name == image.view) view.map = folder / brought(draft, file, folder, plain(name) + "_map.json");
   }
   for (const auto& [name, file] : options.plate_images) image_named(images, name, "--plate-image");
   for (const auto& [name, file] : options.maps) image_named(images, name, "--map");
@@ -275,24 +275,24 @@ Expected<NewCase> new_case(std::vector<InspectedImage> images, const NewCaseOpti
     for (InspectedImage& image : images)
       value_or_throw(xray::state_geometry(image.xray_image, options.stated, image.view));
     check_images(images);
-    NewCase made;
-    for (const InspectedImage& image : images) made.findings.push_back(description_of(image));
-    made.given.folder = folder;
-    set_calibrator(made, options.calibrator, folder);
-    set_plate(made, images, options, folder);
-    set_views(made, images, options, folder);
-    made.given.notes = fmt::format("{}", fmt::join(made.findings, "; "));
-    warn(made, images);
-    return made;
+    NewCase draft;
+    for (const InspectedImage& image : images) draft.findings.push_back(description_of(image));
+    draft.the_case.folder = folder;
+    set_calibrator(draft, options.calibrator, folder);
+    set_plate(draft, images, options, folder);
+    set_views(draft, images, options, folder);
+    draft.the_case.notes = fmt::format("{}", fmt::join(draft.findings, "; "));
+    warn(draft, images);
+    return draft;
   });
 }
 
-Expected<void> write_new_case(const NewCase& made, const fs::path& folder) {
+Expected<void> write_new_case(const NewCase& draft, const fs::path& folder) {
   return guarded([&] {
     if (fs::exists(folder / "case.json"))
       throw BadInput(Reason::cannot_write,
                      fmt::format("{} holds a case.json: choose another folder", folder.string()));
-    for (const NewCase::Copy& copy : made.copies) {
+    for (const NewCase::Copy& copy : draft.copies) {
       if (fs::exists(folder / copy.to))
         throw BadInput(Reason::cannot_write,
                        fmt::format("{} exists: choose another folder", (folder / copy.to).string()));
@@ -300,7 +300,7 @@ Expected<void> write_new_case(const NewCase& made, const fs::path& folder) {
       value_or_throw(
           write_private_file(folder / copy.to, value_or_throw(read_file(copy.from, most_copied_bytes))));
     }
-    value_or_throw(write_file(folder / "case.json", to_text(to_json(made.given)) + "\n"));
+    value_or_throw(write_file(folder / "case.json", to_text(to_json(draft.the_case)) + "\n"));
     value_or_throw(read_case(folder));
   });
 }

@@ -59,7 +59,7 @@ struct NewCase {
   struct Copy {
     std::filesystem::path from, to;  ///< `to` is relative to the case's folder
   };
-  Case given;  ///< without the contents of its calibrator and plate
+  Case the_case;  ///< without the contents of its calibrator and plate
   std::vector<Copy> copies;
   std::vector<std::string> findings;
   std::vector<Warning> warnings;
@@ -73,6 +73,6 @@ Expected<NewCase> new_case(std::vector<InspectedImage> images, const NewCaseOpti
                            const std::filesystem::path& folder);
 
 /// Writes the files, case.json last. Refuses `cannot_write`, also where the folder holds a case.
-Expected<void> write_new_case(const NewCase& made, const std::filesystem::path& folder);
+Expected<void> write_new_case(const NewCase& draft, const std::filesystem::path& folder);
 
 }  // namespace helicarm::pipeline

@@ -45,7 +45,7 @@ TEST_F(NewCaseOf, AnIntensifierNamesViewsByAnglesAndFindsThePlate) {
   simulate(simulation::CaseKind::accuracy);
   const auto made_case = new_case(images(), {.calibrator = (files() / "calibrator.json").string()}, made());
   ASSERT_TRUE(made_case) << made_case.error().message;
-  EXPECT_EQ(made_case->given.plate_name, "plate48");
+  EXPECT_EQ(made_case->the_case.plate_name, "plate48");
   ASSERT_TRUE(write_new_case(*made_case, made()));
   const auto read_back = read_case(made());
   ASSERT_TRUE(read_back) << read_back.error().message;
@@ -59,8 +59,8 @@ TEST_F(NewCaseOf, AFlatPanelHasNoPlate) {
   simulate(simulation::CaseKind::flat);
   const auto made_case = new_case(images(), {.calibrator = "udcsc"}, made());
   ASSERT_TRUE(made_case) << made_case.error().message;
-  EXPECT_FALSE(made_case->given.plate_name);
-  EXPECT_EQ(made_case->given.calibrator_name, "udcsc");
+  EXPECT_FALSE(made_case->the_case.plate_name);
+  EXPECT_EQ(made_case->the_case.calibrator_name, "udcsc");
 }
 
 TEST_F(NewCaseOf, FilesInItsFolderNamesThemWhereTheyAre) {
@@ -69,7 +69,7 @@ TEST_F(NewCaseOf, FilesInItsFolderNamesThemWhereTheyAre) {
   const auto made_case = new_case(images(), {.calibrator = "udcsc"}, files());
   ASSERT_TRUE(made_case) << made_case.error().message;
   EXPECT_TRUE(made_case->copies.empty());
-  EXPECT_EQ(to_json(made_case->given)["views"][1]["image"], "im2.dcm");
+  EXPECT_EQ(to_json(made_case->the_case)["views"][1]["image"], "im2.dcm");
 }
 
 TEST_F(NewCaseOf, StatedPixelSizeStandsInItsViewsUnlessAnImageContradictsIt) {
@@ -79,7 +79,7 @@ TEST_F(NewCaseOf, StatedPixelSizeStandsInItsViewsUnlessAnImageContradictsIt) {
   const auto made_case =
       new_case(bare, {.calibrator = "udcsc", .stated = {.pixel_mm = 0.25, .source_detector_mm = {}}}, made());
   ASSERT_TRUE(made_case) << made_case.error().message;
-  for (const CaseView& view : made_case->given.views) {
+  for (const CaseView& view : made_case->the_case.views) {
     EXPECT_EQ(view.pixel_mm, 0.25);
     EXPECT_FALSE(view.source_detector_mm);
   }

@@ -54,24 +54,24 @@ localization::Accuracy measure_accuracy(const phantom::Calibrator& calibrator,
   return accuracy;
 }
 
-std::vector<TunnelEnds> tunnel_ends(const std::vector<TunnelPlan>& plans,
+std::vector<TunnelEnds> tunnel_ends(const std::vector<CaseTunnel>& plans,
                                     const std::vector<PointResult>& points) {
   std::vector<TunnelEnds> ends;
-  for (const TunnelPlan& plan : plans)
+  for (const CaseTunnel& plan : plans)
     ends.push_back({index_of(points, plan.start), index_of(points, plan.end)});
   return ends;
 }
 
-Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& given, const Result& result) {
-  const std::vector<TunnelPlan>& plans = given.tunnels;
+Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& the_case, const Result& result) {
+  const std::vector<CaseTunnel>& plans = the_case.tunnels;
   return guarded([&] {
     std::vector<guidance::Tunnel> tunnels;
     for (std::size_t i = 0; i < plans.size(); ++i) {
       const auto& start = result.points[result.tunnel_ends[i].start].place;
       const auto& end = result.points[result.tunnel_ends[i].end].place;
       tunnels.push_back(start && end
-                            ? value_or_throw(guidance::plan_tunnel(plans[i].name, *start, *end,
-                                                                   joint_covariance(result), given.tracker))
+                            ? value_or_throw(guidance::plan_tunnel(
+                                  plans[i].name, *start, *end, joint_covariance(result), the_case.tracker))
                             : guidance::Tunnel{plans[i].name, {}, {}, {}, {}});
     }
     return tunnels;
@@ -79,14 +79,14 @@ Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& given, const Re
 }
 
 Expected<std::vector<guidance::Verification>> verify_tool_lines(
-    const Case& given, const std::vector<calibration::CalibratedView>& calibrated, const Result& result) {
+    const Case& the_case, const std::vector<calibration::CalibratedView>& calibrated, const Result& result) {
   std::vector<geometry::View> views;
   for (const calibration::CalibratedView& view : calibrated) views.push_back(view.view);
   return guarded([&] {
     std::vector<guidance::Verification> verifications;
-    for (const guidance::ToolLine& line : given.tool_lines) {
+    for (const guidance::ToolLine& line : the_case.tool_lines) {
       const auto plan =
-          std::ranges::find(given.tunnels, line.tunnel, &TunnelPlan::name) - given.tunnels.begin();
+          std::ranges::find(the_case.tunnels, line.tunnel, &CaseTunnel::name) - the_case.tunnels.begin();
       const TunnelEnds& ends = result.tunnel_ends[static_cast<std::size_t>(plan)];
       verifications.push_back({line.name, error_at(result.points[ends.start], views, line),
                                error_at(result.points[ends.end], views, line)});
@@ -142,9 +142,9 @@ std::optional<double> tunnel_end_error_in_tool(const Result& result, const std::
       std::ranges::find(result.tunnels, tunnel, &guidance::Tunnel::name) - result.tunnels.begin();
   if (std::size_t(found) >= result.tunnel_ends.size()) return {};
   const TunnelEnds& ends = result.tunnel_ends[std::size_t(found)];
-  const auto& place = result.points[start ? ends.start : ends.end].place;
-  if (!place || !place->in_tool) return {};
-  return localization::length_at_95(place->in_tool->covariance);
+  const auto& located = result.points[start ? ends.start : ends.end].place;
+  if (!located || !located->in_tool) return {};
+  return localization::length_at_95(located->in_tool->covariance);
 }
 
 std::vector<Warning> reused_uids(const std::vector<ViewResult>& views) {
@@ -183,8 +183,8 @@ std::vector<Warning> exchanged_views(const std::vector<ViewResult>& views) {
   return warnings;
 }
 
-std::vector<Warning> diagnose(const Case& given, const Result& result) {
-  const phantom::Calibrator& calibrator = given.calibrator;
+std::vector<Warning> diagnose(const Case& the_case, const Result& result) {
+  const phantom::Calibrator& calibrator = the_case.calibrator;
   constexpr double largest_ratio = 3;
   std::vector<Warning> warnings;
   for (const localization::TargetError& target : result.accuracy.targets)

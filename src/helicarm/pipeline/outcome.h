@@ -16,15 +16,15 @@ localization::Accuracy measure_accuracy(const phantom::Calibrator& calibrator,
                                         const std::vector<PointResult>& points);
 
 /// Index of each tunnel's start and end among the points.
-std::vector<TunnelEnds> tunnel_ends(const std::vector<TunnelPlan>& plans,
+std::vector<TunnelEnds> tunnel_ends(const std::vector<CaseTunnel>& plans,
                                     const std::vector<PointResult>& points);
 
 /// Eq. 16; a tunnel with an unlocated end has only a name. Refuses as `plan_tunnel`.
-Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& given, const Result& result);
+Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& the_case, const Result& result);
 
 /// Eq. 17; unlocated ends are omitted. Refuses as `distance_to_line`.
 Expected<std::vector<guidance::Verification>> verify_tool_lines(
-    const Case& given, const std::vector<calibration::CalibratedView>& views, const Result& result);
+    const Case& the_case, const std::vector<calibration::CalibratedView>& views, const Result& result);
 
 /// Tool lines that pass an end of their tunnel at more than `most_off_plan_mm` (off_target).
 std::vector<Warning> lines_off_plan(const std::vector<guidance::Verification>& verifications);
@@ -44,7 +44,7 @@ std::vector<Warning> reused_uids(const std::vector<ViewResult>& views);
 std::vector<Warning> exchanged_views(const std::vector<ViewResult>& views);
 
 /// Diagnostics of a calibrated case: errors of check targets, fiducials rejected in several views.
-std::vector<Warning> diagnose(const Case& given, const Result& result);
+std::vector<Warning> diagnose(const Case& the_case, const Result& result);
 
 /// `uncertain` if a located point's 95 % error exceeds the limit: a failure for a given limit, a warning for
 /// the default of 2 mm. The message names the calibrator's `scale_sigma` where it causes most of the error.

@@ -15,8 +15,8 @@ namespace {
 
 constexpr double least_sigma_px = 0.01;  ///< of an exact pick among other rays
 
-double radius_px(double diameter_mm, const geometry::View& camera, const Eigen::Vector3d& place) {
-  return 0.5 * diameter_mm * std::abs(camera.intrinsics.fy) / camera.depth(place);
+double radius_px(double diameter_mm, const geometry::View& camera, const Eigen::Vector3d& position) {
+  return 0.5 * diameter_mm * std::abs(camera.intrinsics.fy) / camera.depth(position);
 }
 
 Expected<fiducials::ImagePoint> ball_at(const Pick& pick, const xray::XrayImage& image,
@@ -83,10 +83,10 @@ Expected<fiducials::ImagePoint> observe_target(const phantom::CalibratorTarget& 
                                                const phantom::Calibrator& calibrator) {
   const rectification::DistortionMap& map = image.rectification.map;
   const geometry::View& camera = calibrated.view;
-  const Eigen::Vector3d& place = target.point_in_calibrator;
-  if (calibrated.by_paper && target.kind == phantom::TargetKind::ball && camera.depth(place) > 0)
-    return fiducials::circle_near(*image.xray_image, map, camera.project(place),
-                                  radius_px(target.diameter_mm, camera, place));
+  const Eigen::Vector3d& position = target.point_in_calibrator;
+  if (calibrated.by_paper && target.kind == phantom::TargetKind::ball && camera.depth(position) > 0)
+    return fiducials::circle_near(*image.xray_image, map, camera.project(position),
+                                  radius_px(target.diameter_mm, camera, position));
   return fiducials::find_target(*image.xray_image, map, camera, target,
                                 detections_of(image, camera, fiducials, calibrator), image.dots.noise);
 }
@@ -99,8 +99,8 @@ struct Task {
   const phantom::CalibratorTarget* target;  ///< or this
 };
 
-std::vector<Task> tasks_of(const Case& given, std::vector<PointResult>& points) {
-  const std::size_t views = given.views.size();
+std::vector<Task> tasks_of(const Case& the_case, std::vector<PointResult>& points) {
+  const std::size_t views = the_case.views.size();
   const auto add = [&](const std::string& name, localization::PointSource source,
                        std::optional<guidance::Bone> moves_with) {
     points.push_back(
@@ -109,13 +109,13 @@ std::vector<Task> tasks_of(const Case& given, std::vector<PointResult>& points) 
   };
   std::vector<Task> tasks;
   std::map<std::string, std::size_t> index;
-  for (const Pick& pick : given.picks) {
+  for (const Pick& pick : the_case.picks) {
     if (!index.contains(pick.name))
       index[pick.name] = add(pick.name, localization::PointSource::pick, pick.moves_with);
-    const auto view = std::ranges::find(given.views, pick.view, &CaseView::name) - given.views.begin();
+    const auto view = std::ranges::find(the_case.views, pick.view, &CaseView::name) - the_case.views.begin();
     tasks.push_back({index[pick.name], static_cast<std::size_t>(view), &pick, nullptr});
   }
-  for (const phantom::CalibratorTarget& target : given.calibrator.targets) {
+  for (const phantom::CalibratorTarget& target : the_case.calibrator.targets) {
     const std::size_t point = add(target.name, localization::PointSource::target, {});
     for (std::size_t view = 0; view < views; ++view) tasks.push_back({point, view, nullptr, &target});
   }
@@ -134,10 +134,10 @@ struct Located {
 };
 
 /// The bone in whose frame the rays intersect; nothing if there is none or a pose is missing.
-std::optional<guidance::Bone> anchor_of(const PointResult& point, const Case& given) {
+std::optional<guidance::Bone> anchor_of(const PointResult& point, const Case& the_case) {
   if (!point.moves_with) return std::nullopt;
   for (std::size_t i = 0; i < point.seen.size(); ++i)
-    if (point.seen[i] && !guidance::calibrator_from(*point.moves_with, given.views[i].poses))
+    if (point.seen[i] && !guidance::calibrator_from(*point.moves_with, the_case.views[i].poses))
       return std::nullopt;
   return point.moves_with;
 }
@@ -147,15 +147,15 @@ bool may_move(const PointResult& point, std::optional<guidance::Bone> anchor) {
   return point.source == localization::PointSource::pick && !anchor;
 }
 
-Expected<Located> intersect_rays(const PointResult& point, const Case& given,
+Expected<Located> intersect_rays(const PointResult& point, const Case& the_case,
                                  const calibration::Calibration& calibration, double motion_sigma_mm) {
-  const auto anchor = anchor_of(point, given);
+  const auto anchor = anchor_of(point, the_case);
   const double motion = may_move(point, anchor) ? motion_sigma_mm : 0;
   std::vector<localization::PointObservation> observations;
   std::vector<guidance::DatedView> views;
   for (std::size_t i = 0; i < point.seen.size(); ++i) {
     if (!point.seen[i]) continue;
-    const guidance::Poses& poses = given.views[i].poses;
+    const guidance::Poses& poses = the_case.views[i].poses;
     const double sigma = point.seen[i]->sigma_px;
     observations.push_back(
         {i, point.seen[i]->uv, sigma * sigma * Eigen::Matrix2d::Identity(),
@@ -164,10 +164,10 @@ Expected<Located> intersect_rays(const PointResult& point, const Case& given,
   }
   auto located = localization::locate(point.name, point.source, observations, calibration, motion);
   // Independent tracker samples displace each ray independently, shared ones all rays equally.
-  if (located && anchor && given.tracker.samples == guidance::Samples::independent) {
+  if (located && anchor && the_case.tracker.samples == guidance::Samples::independent) {
     for (localization::PointObservation& observation : observations)
       observation.anchor_covariance = guidance::noise_of_poses(
-          located->point_in_anchor, *anchor, given.views[observation.view].poses, given.tracker);
+          located->point_in_anchor, *anchor, the_case.views[observation.view].poses, the_case.tracker);
     located = localization::locate(point.name, point.source, observations, calibration);
   }
   return located.map([&](const localization::LocatedPoint& found) { return Located{found, anchor, views}; });
@@ -175,11 +175,11 @@ Expected<Located> intersect_rays(const PointResult& point, const Case& given,
 
 }  // namespace
 
-Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseCalibration& calibration,
+Expected<std::vector<PointResult>> observe_points(const Case& the_case, const CaseCalibration& calibration,
                                                   unsigned threads) {
   std::vector<PointResult> points;
-  const std::vector<Task> tasks = tasks_of(given, points);
-  const Eigen::Vector3d centre = phantom::middle_of(given.calibrator);
+  const std::vector<Task> tasks = tasks_of(the_case, points);
+  const Eigen::Vector3d centre = phantom::middle_of(the_case.calibrator);
   std::vector<std::optional<Failure>> failures(tasks.size());
   const auto done = guarded([&] {
     for (const Task& task : tasks)
@@ -193,7 +193,7 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
     const auto seen = task.pick ? observe_pick(*task.pick, *image.xray_image, image.rectification.map,
                                                image.dots.noise, view, centre)
                                 : observe_target(*task.target, image, view, calibration.fiducials[task.view],
-                                                 given.calibrator);
+                                                 the_case.calibrator);
     if (seen)
       points[task.point].seen[task.view] = *seen;
     else
@@ -202,16 +202,16 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
   for (std::size_t i = 0; i < tasks.size(); ++i)
     if (failures[i] && !points[tasks[i].point].reason) {
       points[tasks[i].point].reason = failures[i];
-      points[tasks[i].point].reason->view = given.views[tasks[i].view].name;
+      points[tasks[i].point].reason->view = the_case.views[tasks[i].view].name;
     }
   return points;
 }
 
-std::vector<Warning> locate_points(const Case& given, const calibration::Calibration& calibration,
+std::vector<Warning> locate_points(const Case& the_case, const calibration::Calibration& calibration,
                                    std::vector<PointResult>& points, double motion_sigma_mm) {
   std::vector<Warning> warnings;
   for (PointResult& point : points) {
-    auto located = intersect_rays(point, given, calibration, motion_sigma_mm);
+    auto located = intersect_rays(point, the_case, calibration, motion_sigma_mm);
     if (!located) {
       if (!point.reason) point.reason = located.error();
       continue;
@@ -220,8 +220,8 @@ std::vector<Warning> locate_points(const Case& given, const calibration::Calibra
     if (located->point.missing_rays) add_warning(point, warnings, *located->point.missing_rays);
     point.rays_miss = located->point.missing_rays.has_value();
     point.ray_gap_mm = located->point.ray_gap_mm;
-    point.place =
-        guidance::guide(located->point, located->anchor, located->views, given.poses_now, given.tracker);
+    point.place = guidance::guide(located->point, located->anchor, located->views, the_case.poses_now,
+                                  the_case.tracker);
     if (point.moves_with && !located->anchor)
       add_warning(
           point, warnings,
@@ -235,11 +235,11 @@ std::vector<Warning> locate_points(const Case& given, const calibration::Calibra
   return warnings;
 }
 
-std::vector<Warning> note_motion(const Case& given, const calibration::Calibration& calibration,
+std::vector<Warning> note_motion(const Case& the_case, const calibration::Calibration& calibration,
                                  std::vector<PointResult>& points, double motion_sigma_mm) {
   std::vector<Warning> notes;
   for (PointResult& point : points) {
-    if (!point.place || !may_move(point, anchor_of(point, given))) continue;
+    if (!point.place || !may_move(point, anchor_of(point, the_case))) continue;
     const auto first = std::ranges::find_if(point.seen, [](const auto& seen) { return seen.has_value(); });
     point.notes.push_back(localization::unobservable_motion(
         point.name, point.place->in_calibrator, calibration.views[std::size_t(first - point.seen.begin())],
@@ -249,7 +249,7 @@ std::vector<Warning> note_motion(const Case& given, const calibration::Calibrati
   return notes;
 }
 
-std::vector<Warning> picks_on_fiducials(const Case& given, const calibration::Calibration& calibration,
+std::vector<Warning> picks_on_fiducials(const Case& the_case, const calibration::Calibration& calibration,
                                         std::vector<PointResult>& points) {
   std::vector<Warning> warnings;
   for (PointResult& point : points) {
@@ -258,7 +258,7 @@ std::vector<Warning> picks_on_fiducials(const Case& given, const calibration::Ca
     for (std::size_t i = 0; i < point.seen.size(); ++i)
       if (point.seen[i]) observations.push_back({i, point.seen[i]->uv, Eigen::Matrix2d::Zero()});
     const auto warning = localization::pick_on_fiducial(point.name, observations, calibration,
-                                                        given.calibrator.balls, point.rays_miss);
+                                                        the_case.calibrator.balls, point.rays_miss);
     if (!warning) continue;
     add_warning(point, warnings, *warning);
     point.reason = warning;

@@ -23,8 +23,8 @@ std::vector<detection::Dot> unlabelled_candidates(const ViewResult& view) {
   return fiducials::ball_candidates(*view.dots, *view.rectification);
 }
 
-std::vector<std::pair<guidance::Bone, TunnelInBone>> ends_in_bones(const guidance::Tunnel& tunnel) {
-  std::vector<std::pair<guidance::Bone, TunnelInBone>> bones;
+std::vector<std::pair<guidance::Bone, TunnelByBone>> ends_in_bones(const guidance::Tunnel& tunnel) {
+  std::vector<std::pair<guidance::Bone, TunnelByBone>> bones;
   for (const auto& [bone, start] : tunnel.start_in_bones)
     if (const auto end = tunnel.end_in_bones.find(bone); end != tunnel.end_in_bones.end())
       bones.push_back({bone, {&start, &end->second}});
@@ -66,24 +66,25 @@ void describe_observations(Output& output, const PointResult& point, const std::
 template <class Output>
 void describe_point(Output& output, const PointResult& point, const Result& result) {
   using guidance::PointInFrames;
-  const auto& place = point.place;
+  const auto& located = point.place;
   output.value("name", point.name, "of a pick or a target of the calibrator");
   output.word(
       "source", [&] { return word(point.source); }, localization::source_words, "");
-  output.value("xyz_mm", if_set(place, &PointInFrames::in_calibrator),
+  output.value("xyz_mm", if_set(located, &PointInFrames::in_calibrator),
                "at the time of the first view; `null` if not located");
   output.value("frame", "calibrator", "of `xyz_mm`");
-  output.value("covariance_mm2", if_set(place, &PointInFrames::covariance_in_calibrator), "");
-  output.value("sigma_mm",
-               if_set(place, [](const PointInFrames& of) { return sigmas<3>(of.covariance_in_calibrator); }),
-               "square roots of its diagonal");
+  output.value("covariance_mm2", if_set(located, &PointInFrames::covariance_in_calibrator), "");
+  output.value(
+      "sigma_mm",
+      if_set(located, [](const PointInFrames& of) { return sigmas<3>(of.covariance_in_calibrator); }),
+      "square roots of its diagonal");
   output.value(
       "error_95_mm",
-      if_set(place,
+      if_set(located,
              [](const PointInFrames& of) { return localization::length_at_95(of.covariance_in_calibrator); }),
       "length that 95 % of errors with this covariance do not exceed");
   output.value(
-      "ray_gap_mm", if_set(place, [&](const PointInFrames&) { return point.ray_gap_mm; }),
+      "ray_gap_mm", if_set(located, [&](const PointInFrames&) { return point.ray_gap_mm; }),
       "largest distance between two of the rays; with two views `error_95_mm` is never below half of it");
   describe_observations(output, point, result.views);
   output.value("reason", if_set(point.reason, [](const Failure& of) { return code(of.reason); }),
@@ -91,7 +92,7 @@ void describe_point(Output& output, const PointResult& point, const Result& resu
   output.value("message", if_set(point.reason, &Failure::message), "likewise, for people");
   describe_failures(output, "warnings", point.warnings, "that concern this point");
   describe_failures(output, "notes", point.notes, "likewise");
-  describe_in_frames(output, place ? &*place : nullptr, result.bones);
+  describe_in_frames(output, located ? &*located : nullptr, result.bones);
 }
 
 template <class Output>

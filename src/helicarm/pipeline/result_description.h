@@ -83,13 +83,13 @@ void describe_in_frames(Output& output, const guidance::PointInFrames* place,
 }
 
 /// Both ends of a tunnel in a bone.
-struct TunnelInBone {
+struct TunnelByBone {
   const guidance::Place* start = nullptr;
   const guidance::Place* end = nullptr;
 };
 
 /// Bones in which both ends are known.
-std::vector<std::pair<guidance::Bone, TunnelInBone>> ends_in_bones(const guidance::Tunnel& tunnel);
+std::vector<std::pair<guidance::Bone, TunnelByBone>> ends_in_bones(const guidance::Tunnel& tunnel);
 
 template <class Output>
 void describe_tunnel(Output& output, const guidance::Tunnel& tunnel) {
@@ -97,7 +97,7 @@ void describe_tunnel(Output& output, const guidance::Tunnel& tunnel) {
   output.value("name", tunnel.name, "of the tunnel");
   output.map(
       "in_bones", [&] { return ends_in_bones(tunnel); }, "of each bone in which both ends are known",
-      [](auto& row, const TunnelInBone& ends) {
+      [](auto& row, const TunnelByBone& ends) {
         const auto add = [&](const char* key, const guidance::Place* end) {
           static const guidance::Place none{};
           row.object(key, true, "as a point's",

@@ -20,12 +20,12 @@ namespace {
 template <class Work>
 auto of_each(std::size_t count, const RunOptions& options, const Progress& progress, Work&& work) {
   using Given = std::invoke_result_t<Work, std::size_t>;
-  std::vector<Given> given(count, Given(tl::unexpect, Failure{Reason::interrupted, {}}));
+  std::vector<Given> results(count, Given(tl::unexpect, Failure{Reason::interrupted, {}}));
   parallel_for(count, options.threads, [&](std::size_t i) {
     if (progress.view) progress.view();
-    given[i] = work(i);
+    results[i] = work(i);
   });
-  return given;
+  return results;
 }
 
 /// Every view with the stage's result; if it failed for one, a refusal with all results.
@@ -77,28 +77,28 @@ Expected<rectification::Rectification> rectify_view(DetectedView& view, const Ca
 }
 
 /// Of a fiducial's image, with a margin; 0 where the pixel size or the fiducials' sizes are unknown.
-double least_fiducial_px(const xray::XrayImage& xray_image, const Case& given) {
+double least_fiducial_px(const xray::XrayImage& xray_image, const Case& the_case) {
   constexpr double margin = 0.9;
   const auto& pixel = xray_image.acquisition.pixel_mm;
   if (!pixel) return 0;
   const double pixel_mm = std::sqrt(pixel->x() * pixel->y());
-  if (!given.calibrator.balls.empty())
-    return margin * fiducials::ball_radii_px(given.calibrator, pixel_mm).low;
-  if (given.diameters_mm.empty()) return 0;
-  return margin * std::ranges::min(given.diameters_mm) / 2 / pixel_mm;
+  if (!the_case.calibrator.balls.empty())
+    return margin * fiducials::ball_radii_px(the_case.calibrator, pixel_mm).low;
+  if (the_case.diameters_mm.empty()) return 0;
+  return margin * std::ranges::min(the_case.diameters_mm) / 2 / pixel_mm;
 }
 
 /// The dots that the rectification and the labelling choose from.
 detection::ImageDots detect_in_view(const xray::XrayImage& xray_image, const CaseView& from,
-                                    const Case& given) {
-  const bool plated = shows_plate(from, given.plate);
-  const double of_plate = plated ? rectification::least_dot_radius_px(xray_image, *given.plate)
-                                 : rectification::least_checked_radius_px(xray_image, given.plate);
+                                    const Case& the_case) {
+  const bool plated = shows_plate(from, the_case.plate);
+  const double of_plate = plated ? rectification::least_dot_radius_px(xray_image, *the_case.plate)
+                                 : rectification::least_checked_radius_px(xray_image, the_case.plate);
   const double of_fiducials =
-      std::max(detection::DotOptions{}.min_radius_px, least_fiducial_px(xray_image, given));
+      std::max(detection::DotOptions{}.min_radius_px, least_fiducial_px(xray_image, the_case));
   detection::ImageDots dots = detection::unsearched(xray_image, std::min(of_plate, of_fiducials));
   detection::dots_of(dots, xray_image, detection::Polarity::dark);
-  if (plated && given.plate->kind == phantom::DotKind::holes)
+  if (plated && the_case.plate->kind == phantom::DotKind::holes)
     detection::dots_of(dots, xray_image, detection::Polarity::bright);
   return dots;
 }
@@ -108,14 +108,14 @@ bool is_ambiguous(const Expected<fiducials::LabelledFiducials>& labels) {
 }
 
 /// The plate's kind determines the polarity of metal: it is wrong if the opposite polarity gives labels.
-bool is_plate_of_other_kind(RectifiedView view, const Case& given,
+bool is_plate_of_other_kind(RectifiedView view, const Case& the_case,
                             const fiducials::FiducialOptions& options) {
   if (view.rectification.dots_found == 0) return false;
   detection::Polarity& metal = view.rectification.metal;
   metal = detection::opposite(metal);
   detection::dots_of(view.dots, *view.xray_image, metal);
-  const auto labels =
-      fiducials::label_fiducials(*view.xray_image, view.dots, view.rectification, given.calibrator, options);
+  const auto labels = fiducials::label_fiducials(*view.xray_image, view.dots, view.rectification,
+                                                 the_case.calibrator, options);
   return labels || is_ambiguous(labels);
 }
 
@@ -146,12 +146,12 @@ Expected<void> check_images_belong_together(const std::vector<ReadView>& views) 
   return {};
 }
 
-OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions& options,
+OrRefusal<std::vector<ReadView>> read_views(const Case& the_case, const RunOptions& options,
                                             const Progress& progress) {
   std::vector<NamedView> views;
-  for (const CaseView& view : given.views) views.push_back({view.name});
+  for (const CaseView& view : the_case.views) views.push_back({view.name});
   auto images = of_each(views.size(), options, progress, [&](std::size_t i) {
-    return image_of(given.views[i]).map([](xray::XrayImage xray_image) {
+    return image_of(the_case.views[i]).map([](xray::XrayImage xray_image) {
       return std::make_shared<const xray::XrayImage>(std::move(xray_image));
     });
   });
@@ -165,34 +165,34 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
       });
 }
 
-OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<ReadView> views, const Case& given,
+OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<ReadView> views, const Case& the_case,
                                                      const RunOptions& options, const Progress& progress) {
   auto dots = of_each(views.size(), options, progress, [&](std::size_t i) -> Expected<detection::ImageDots> {
     return rectification::check_usable(*views[i].xray_image).map([&] {
-      return detect_in_view(*views[i].xray_image, given.views[i], given);
+      return detect_in_view(*views[i].xray_image, the_case.views[i], the_case);
     });
   });
   return joined<DetectedView>(Stage::rectify, std::move(views), std::move(dots));
 }
 
-OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<DetectedView> views, const Case& given,
+OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<DetectedView> views, const Case& the_case,
                                                     const RunOptions& options, const Progress& progress) {
   auto rectified = of_each(views.size(), options, progress, [&](std::size_t i) {
-    return rectify_view(views[i], given.views[i], given.plate, options);
+    return rectify_view(views[i], the_case.views[i], the_case.plate, options);
   });
   return joined<RectifiedView>(Stage::rectify, std::move(views), std::move(rectified));
 }
 
-OrRefusal<std::vector<RectifiedView>> rectified_views(const Case& given, const RunOptions& options,
+OrRefusal<std::vector<RectifiedView>> rectified_views(const Case& the_case, const RunOptions& options,
                                                       const Progress& progress) {
   const auto stage = [&](std::string_view name, auto work) {
     return [&, name, work](auto views) {
       progress.begin(name);
-      return work(std::move(views), given, options, progress);
+      return work(std::move(views), the_case, options, progress);
     };
   };
   progress.begin("read");
-  return read_views(given, options, progress)
+  return read_views(the_case, options, progress)
       .and_then(stage("detect", detect_in_views))
       .and_then(stage("rectify", rectify_views));
 }
@@ -206,13 +206,14 @@ calibration::ViewFiducials fiducials_of(const LabelledView& view) {
           view.fiducials.view, map.covariance_px2(used)};
 }
 
-OrRefusal<std::vector<LabelledView>> label_views(std::vector<RectifiedView> views, const Case& given,
+OrRefusal<std::vector<LabelledView>> label_views(std::vector<RectifiedView> views, const Case& the_case,
                                                  const RunOptions& options, const Progress& progress) {
   const auto label = [&](std::size_t i, std::optional<double> radius_bias) {
-    const fiducials::FiducialOptions how{options.method, radius_bias, given.views[i].mirrored};
+    const fiducials::FiducialOptions fiducial_options{options.method, radius_bias,
+                                                      the_case.views[i].mirrored};
     auto labels = fiducials::label_fiducials(*views[i].xray_image, views[i].dots, views[i].rectification,
-                                             given.calibrator, how);
-    if (!labels && !is_ambiguous(labels) && is_plate_of_other_kind(views[i], given, how))
+                                             the_case.calibrator, fiducial_options);
+    if (!labels && !is_ambiguous(labels) && is_plate_of_other_kind(views[i], the_case, fiducial_options))
       labels = fail(Reason::plate_mismatch,
                     "the calibrator is found with the opposite polarity of metal: exchange \"holes\" and "
                     "\"balls\" in the "

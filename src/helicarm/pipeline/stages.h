@@ -56,23 +56,23 @@ using OrRefusal = tl::expected<T, Refusal>;
 
 /// Reads the image files. Refuses `patient_mismatch` for images of different patients or studies, and
 /// `views_too_close` for two copies of one image; fails as `read_xray_image`.
-OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions& options,
+OrRefusal<std::vector<ReadView>> read_views(const Case& the_case, const RunOptions& options,
                                             const Progress& progress = {});
 
 /// As `read_views` refuses.
 Expected<void> check_images_belong_together(const std::vector<ReadView>& views);
 
 /// 2.1: the dots of every image, of the plate and of metal.
-OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<ReadView> views, const Case& given,
+OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<ReadView> views, const Case& the_case,
                                                      const RunOptions& options,
                                                      const Progress& progress = {});
 
 /// 2.1, Eq. 1-3: by the plate among the dots, a separate plate image, a known map, or none (flat panel).
-OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<DetectedView> views, const Case& given,
+OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<DetectedView> views, const Case& the_case,
                                                     const RunOptions& options, const Progress& progress = {});
 
 /// These three stages, announced by `progress`.
-OrRefusal<std::vector<RectifiedView>> rectified_views(const Case& given, const RunOptions& options,
+OrRefusal<std::vector<RectifiedView>> rectified_views(const Case& the_case, const RunOptions& options,
                                                       const Progress& progress = {});
 
 /// The calibration's input from a labelled view.
@@ -80,7 +80,7 @@ calibration::ViewFiducials fiducials_of(const LabelledView& view);
 
 /// 2.3.4. Ambiguous labels of a view are tried again with the radius bias of the view with the largest
 /// margin.
-OrRefusal<std::vector<LabelledView>> label_views(std::vector<RectifiedView> views, const Case& given,
+OrRefusal<std::vector<LabelledView>> label_views(std::vector<RectifiedView> views, const Case& the_case,
                                                  const RunOptions& options, const Progress& progress = {});
 
 }  // namespace helicarm::pipeline

@@ -169,7 +169,7 @@ Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int
 
   // Then in rectified pixels: raw scale and no rotation at the image centre.
   fit.rectified_from_plate = *similarity;
-  for (Vector2d& place : places) place = fit.rectified_from_plate * place;
+  for (Vector2d& position : places) position = fit.rectified_from_plate * position;
   normalised = normalisation_of(places);
   data = gather(dots, places, normalised, fit.used);
   data.image_centre = normalised(middle);

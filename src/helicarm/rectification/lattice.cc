@@ -21,11 +21,11 @@ class Cells {
     for (std::size_t i = 0; i < dots.size(); ++i) cells_[key(dots[i].centre_px)].push_back(i);
   }
   /// Nearest dot to a position within `reach` (at most the cell size), or -1.
-  int nearest(const Vector2d& place, double reach) const {
+  int nearest(const Vector2d& position, double reach) const {
     int best = -1;
     double least = reach;
-    visit(place, [&](std::size_t i) {
-      if (const double d = (dots_[i].centre_px - place).norm(); d < least) {
+    visit(position, [&](std::size_t i) {
+      if (const double d = (dots_[i].centre_px - position).norm(); d < least) {
         least = d;
         best = static_cast<int>(i);
       }
@@ -33,8 +33,8 @@ class Cells {
     return best;
   }
   template <class Visit>
-  void visit(const Vector2d& place, Visit&& see) const {
-    const auto [x, y] = key(place);
+  void visit(const Vector2d& position, Visit&& see) const {
+    const auto [x, y] = key(position);
     for (int dy = -1; dy <= 1; ++dy)
       for (int dx = -1; dx <= 1; ++dx)
         if (const auto cell = cells_.find({x + dx, y + dy}); cell != cells_.end())
@@ -50,14 +50,25 @@ class Cells {
   std::map<std::pair<int, int>, std::vector<std::size_t>> cells_;
 };
 
-double commonest_spacing(const std::vector<detection::Dot>& dots) {
-  std::vector<double> nearest;
-  for (const detection::Dot& dot : dots) {
-    double least = 1e9;
-    for (const detection::Dot& other : dots)
-      if (&other != &dot) least = std::min(least, (dot.centre_px - other.centre_px).norm());
-    nearest.push_back(least);
+/// Of each dot to another, in order of their columns, which end each search.
+std::vector<double> nearest_distances(const std::vector<detection::Dot>& dots) {
+  std::vector<Vector2d> by_column;
+  for (const detection::Dot& dot : dots) by_column.push_back(dot.centre_px);
+  std::ranges::sort(by_column, {}, [](const Vector2d& centre) { return centre.x(); });
+  std::vector<double> nearest(dots.size(), 1e9);
+  for (std::size_t i = 0; i < by_column.size(); ++i) {
+    const auto is_near = [&](std::size_t j) {
+      nearest[i] = std::min(nearest[i], (by_column[j] - by_column[i]).norm());
+      return std::abs(by_column[j].x() - by_column[i].x()) < nearest[i];
+    };
+    for (std::size_t j = i + 1; j < by_column.size() && is_near(j); ++j) continue;
+    for (std::size_t j = i; j > 0 && is_near(j - 1); --j) continue;
   }
+  return nearest;
+}
+
+double commonest_spacing(const std::vector<detection::Dot>& dots) {
+  std::vector<double> nearest = nearest_distances(dots);
   std::sort(nearest.begin(), nearest.end());
   // The densest interval: most values within 8 % of one another.
   std::size_t most = 0;
@@ -101,10 +112,10 @@ std::vector<Seed> seeds(const std::vector<detection::Dot>& dots, const Cells& ce
       double misfit = (b - rotate * a).norm();
       int there = 0;
       for (const Vector2i& step : steps_of(kind)) {
-        const Vector2d place = here + step.x() * a + step.y() * b;
-        if (const int n = cells.nearest(place, 0.2 * pitch); n >= 0) {
+        const Vector2d position = here + step.x() * a + step.y() * b;
+        if (const int n = cells.nearest(position, 0.2 * pitch); n >= 0) {
           ++there;
-          misfit += (dots[static_cast<std::size_t>(n)].centre_px - place).norm();
+          misfit += (dots[static_cast<std::size_t>(n)].centre_px - position).norm();
         } else {
           misfit += pitch;
         }
@@ -167,8 +178,8 @@ Places grow(const std::vector<detection::Dot>& dots, const Cells& cells, phantom
       for (int gap = 1; gap <= options.max_gap; ++gap) {
         const Vector2i next = at + gap * step;
         if (places.contains(next)) break;
-        const Vector2d place = here + gap * (step.x() * frame.a + step.y() * frame.b);
-        const int n = cells.nearest(place, options.match_tolerance * pitch);
+        const Vector2d position = here + gap * (step.x() * frame.a + step.y() * frame.b);
+        const int n = cells.nearest(position, options.match_tolerance * pitch);
         if (n < 0 || taken[static_cast<std::size_t>(n)]) continue;
         places[next] = static_cast<std::size_t>(n);
         frames[next] = frame;

@@ -36,8 +36,8 @@ std::vector<PixelPath> raw_paths(const DistortionMap& map, std::span<const Vecto
   const auto cut = [&] {
     if (!paths.back().empty()) paths.emplace_back();
   };
-  const auto add = [&](const Vector2d& place) {
-    if (const auto raw = raw_in_image(map, place))
+  const auto add = [&](const Vector2d& position) {
+    if (const auto raw = raw_in_image(map, position))
       paths.back().push_back(*raw);
     else
       cut();

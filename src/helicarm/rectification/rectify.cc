@@ -68,12 +68,12 @@ void fit_missing_dots(const xray::XrayImage& xray_image, const phantom::Plate& p
   if (plate.dots_mm.empty() || plate_dots.empty()) return;
   double radius = 0;
   for (const detection::Dot& dot : plate_dots) radius += dot.radius_px / double(plate_dots.size());
-  for (const Vector2d& place : plate.dots_mm) {
+  for (const Vector2d& position : plate.dots_mm) {
     const bool known =
-        std::any_of(seen.begin(), seen.end(), [&](const auto& c) { return c.place_mm == place; });
+        std::any_of(seen.begin(), seen.end(), [&](const auto& c) { return c.place_mm == position; });
     if (known) continue;
     detection::Dot start;
-    start.centre_px = fit.map.raw_from_rectified(fit.rectified_from_plate * place);
+    start.centre_px = fit.map.raw_from_rectified(fit.rectified_from_plate * position);
     start.radius_px = radius;
     const auto dot = detection::refit_dots(xray_image, {start}, appearance, all);
     if (dot.empty() || dot[0].sigma_px > 0.2 || dot[0].misfit > 0.3) continue;
@@ -81,7 +81,7 @@ void fit_missing_dots(const xray::XrayImage& xray_image, const phantom::Plate& p
     if (std::abs(dot[0].contrast) < 0.3 * std::abs(plate_dots[plate_dots.size() / 2].contrast)) continue;
     if ((dot[0].centre_px - start.centre_px).norm() > 1.5 || std::abs(dot[0].radius_px / radius - 1) > 0.15)
       continue;
-    seen.push_back({place, dot[0].centre_px, dot[0].error_px()});
+    seen.push_back({position, dot[0].centre_px, dot[0].error_px()});
     plate_dots.push_back(dot[0]);
   }
 }

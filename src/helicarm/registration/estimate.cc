@@ -45,25 +45,26 @@ RigidEquations equations_of(const Observation& observation, const std::vector<bo
 
 }  // namespace
 
-Scene::Scene(const Model& model, const std::vector<RegistrationView>& views, unsigned threads)
+RegistrationProblem::RegistrationProblem(const Model& model, const std::vector<RegistrationView>& views,
+                                         unsigned threads)
     : model_(&model), views_(&views), threads_(threads), full_(views.size()) {
   parallel_for(views.size(), threads, [&](std::size_t i) { full_[i] = attenuation_raster(views[i]); });
 }
 
-Scene::Scene(const Scene& other, const Model& model)
+RegistrationProblem::RegistrationProblem(const RegistrationProblem& other, const Model& model)
     : model_(&model), views_(other.views_), threads_(other.threads_), full_(other.full_) {}
 
-double Scene::pixel_mm(const Vector3d& at) const {
+double RegistrationProblem::pixel_mm(const Vector3d& at) const {
   double finest = 1e9;
   for (const RegistrationView& view : *views_) finest = std::min(finest, pixel_mm_of(view.view, at));
   return finest;
 }
 
-double Scene::comparison_px(const Level& level, std::size_t view) const {
+double RegistrationProblem::comparison_px(const Level& level, std::size_t view) const {
   return prepared(level).rasters[view].factor * (level.contour ? contour_spacing : PatchOptions{}.side);
 }
 
-void Scene::prepare(const Level& level, const Vector3d& near) {
+void RegistrationProblem::prepare(const Level& level, const Vector3d& near) {
   if (levels_.contains({level.contour, level.spacing_mm})) return;
   Prepared made;
   for (std::size_t i = 0; i < views_->size(); ++i) {
@@ -77,12 +78,13 @@ void Scene::prepare(const Level& level, const Vector3d& near) {
   levels_.emplace(std::pair(level.contour, level.spacing_mm), std::move(made));
 }
 
-const Scene::Prepared& Scene::prepared(const Level& level) const {
+const RegistrationProblem::Prepared& RegistrationProblem::prepared(const Level& level) const {
   return levels_.at({level.contour, level.spacing_mm});
 }
 
-Observation Scene::observe(const Level& level, const geometry::RigidTransform& pose, bool derivatives,
-                           unsigned threads, const std::vector<bool>& which) const {
+Observation RegistrationProblem::observe(const Level& level, const geometry::RigidTransform& pose,
+                                         bool derivatives, unsigned threads,
+                                         const std::vector<bool>& which) const {
   const Prepared& made = prepared(level);
   const Vector3d centre = pose * model_->centre;
   Observation observation;
@@ -116,7 +118,7 @@ RigidEquations rigid_equations(const ViewObservation& view) {
   return {map.transpose() * information.topLeftCorner<12, 12>() * map, map.transpose() * gradient.head<12>()};
 }
 
-Estimate refine(const Scene& scene, const Level& level, const geometry::RigidTransform& start,
+Estimate refine(const RegistrationProblem& scene, const Level& level, const geometry::RigidTransform& start,
                 const RefineOptions& options) {
   const Model& model = scene.model();
   Estimate best{start, scene.observe(level, start, true, options.threads, options.views), 0};

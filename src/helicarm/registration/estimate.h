@@ -20,11 +20,11 @@ struct Level {
 };
 
 /// Model and views prepared for comparisons at any level; rasters and densities are made once.
-class Scene {
+class RegistrationProblem {
  public:
-  Scene(const Model& model, const std::vector<RegistrationView>& views, unsigned threads);
+  RegistrationProblem(const Model& model, const std::vector<RegistrationView>& views, unsigned threads);
   /// The same views for another model of the same kind.
-  Scene(const Scene& other, const Model& model);
+  RegistrationProblem(const RegistrationProblem& other, const Model& model);
 
   const Model& model() const { return *model_; }
   const std::vector<RegistrationView>& views() const { return *views_; }
@@ -84,7 +84,7 @@ struct RefineOptions {
 
 /// Gauss-Newton with damping (Levenberg-Marquardt) from a pose. A step is accepted if the score does not
 /// fall.
-Estimate refine(const Scene& scene, const Level& level, const geometry::RigidTransform& start,
+Estimate refine(const RegistrationProblem& scene, const Level& level, const geometry::RigidTransform& start,
                 const RefineOptions& options);
 
 }  // namespace helicarm::registration

@@ -88,11 +88,11 @@ double distance(const Surface& surface, const Vector3d& point) {
   return std::sqrt(least);
 }
 
-std::optional<double> mirrored_cost_ratio(const Scene& scene, const Estimate& solution,
+std::optional<double> mirrored_cost_ratio(const RegistrationProblem& scene, const Estimate& solution,
                                           const std::vector<SearchStage>& stages,
                                           const SearchOptions& options, double same_mm) {
   const Model mirror = mirrored(scene.model());
-  Scene other(scene, mirror);
+  RegistrationProblem other(scene, mirror);
   std::vector<SearchStage> fewer = stages;
   for (SearchStage& stage : fewer) stage.keep = std::min(stage.keep, 16);
   fewer.back().keep = 1;

@@ -246,7 +246,7 @@ double farthest_mm(double spacing_mm) {
 
 Level level_anywhere(const Model& model) { return {false, std::clamp(model.radius_mm / 8, 1.0, 6.0)}; }
 
-std::vector<RigidTransform> poses_anywhere(const Scene& scene, std::size_t count,
+std::vector<RigidTransform> poses_anywhere(const RegistrationProblem& scene, std::size_t count,
                                            const std::function<void()>& interrupt) {
   const Model& model = scene.model();
   const Level level = level_anywhere(model);

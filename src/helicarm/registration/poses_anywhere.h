@@ -18,7 +18,7 @@ Level level_anywhere(const Model& model);
 /// 15 degrees apart) at every position that all views show, at which gradients of its DRRs have the
 /// directions of the images' ones. Distinct; at most `count`. Two views or more; after `scene.prepare` of
 /// `level_anywhere`. `interrupt` is called often, from any thread.
-std::vector<geometry::RigidTransform> poses_anywhere(const Scene& scene, std::size_t count,
+std::vector<geometry::RigidTransform> poses_anywhere(const RegistrationProblem& scene, std::size_t count,
                                                      const std::function<void()>& interrupt = {});
 
 }  // namespace helicarm::registration

@@ -33,7 +33,7 @@ constexpr double voxel_edge_sigma = 0.2;
 constexpr double alone_prior_mm = 10;  // keeps a single view from running along its rays
 
 /// Levels from coarse to fine for this model and these views.
-std::vector<SearchStage> stages_for(const Scene& scene, const Vector3d& at) {
+std::vector<SearchStage> stages_for(const RegistrationProblem& scene, const Vector3d& at) {
   const Model& model = scene.model();
   const double pixel = scene.pixel_mm(at);
   if (model.surface) {
@@ -54,7 +54,7 @@ std::vector<SearchStage> stages_for(const Scene& scene, const Vector3d& at) {
 }
 
 /// From poses found anywhere; coarser levels than theirs lead away.
-std::vector<SearchStage> stages_from_anywhere(const Scene& scene, const Vector3d& at) {
+std::vector<SearchStage> stages_from_anywhere(const RegistrationProblem& scene, const Vector3d& at) {
   std::vector<SearchStage> stages = stages_for(scene, at);
   while (stages.size() > 1 && stages.front().level.spacing_mm > level_anywhere(scene.model()).spacing_mm)
     stages.erase(stages.begin());
@@ -101,8 +101,8 @@ RigidCovariance prior_information(const Observation& observation, const ErrorMod
 }
 
 /// Each view alone, from the joint solution, and how they differ.
-void compare_views(const Scene& scene, const ErrorModel& errors, const Level& level, const Estimate& joint,
-                   Registration& result) {
+void compare_views(const RegistrationProblem& scene, const ErrorModel& errors, const Level& level,
+                   const Estimate& joint, Registration& result) {
   const std::size_t n = scene.views().size();
   if (n < 2) return;
   std::vector<OwnSolution> own;
@@ -128,7 +128,8 @@ void compare_views(const Scene& scene, const ErrorModel& errors, const Level& le
   for (std::size_t i = 0; i < n; ++i) result.views[i].held_out_mm = result.disagreement->held_out_mm[i];
 }
 
-void describe(const Scene& scene, const Level& level, const Estimate& best, Registration& result) {
+void describe(const RegistrationProblem& scene, const Level& level, const Estimate& best,
+              Registration& result) {
   for (std::size_t i = 0; i < scene.views().size(); ++i) {
     const ViewObservation& seen = best.observation.views[i];
     result.views.push_back({scene.views()[i].name, seen.score,
@@ -160,7 +161,7 @@ struct Search {
   SearchResult found;
 };
 
-Search searched_anywhere(Scene& scene, const SearchOptions& options) {
+Search searched_anywhere(RegistrationProblem& scene, const SearchOptions& options) {
   constexpr std::size_t starts = 64;
   const Vector3d middle = middle_of(scene.views());
   scene.prepare(level_anywhere(scene.model()), middle);
@@ -173,7 +174,8 @@ Search searched_anywhere(Scene& scene, const SearchOptions& options) {
   return made;
 }
 
-Search searched_about(Scene& scene, const std::vector<RigidTransform>& starts, const SearchOptions& options) {
+Search searched_about(RegistrationProblem& scene, const std::vector<RigidTransform>& starts,
+                      const SearchOptions& options) {
   Search made{stages_for(scene, starts.front() * scene.model().centre), {}};
   made.found = search(scene, made.stages, starts, options, same_mm);
   return made;
@@ -237,7 +239,7 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
     if (options.on_step) options.on_step(name);
   };
   step("prepare");
-  Scene scene(model, views, options.threads);
+  RegistrationProblem scene(model, views, options.threads);
   step(anywhere ? "search anywhere" : "search");
   const auto [stages, found] =
       anywhere ? searched_anywhere(scene, options.search) : searched_about(scene, starts, options.search);

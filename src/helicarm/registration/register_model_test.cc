@@ -198,7 +198,7 @@ TEST(Covariance, MatchesTheScatterOfNoise) {
     const std::vector<RegistrationView> views = {
         image_of(volume, true_pose(), view_from(0), "AP", 2 * trial, 0.01),
         image_of(volume, true_pose(), view_from(80), "LAT", 2 * trial + 1, 0.01)};
-    Scene scene(model, views, 1);
+    RegistrationProblem scene(model, views, 1);
     scene.prepare(level, true_pose() * model.centre);
     const Estimate estimate = refine(scene, level, true_pose(), {});
     const Vector3d centre = estimate.pose * model.centre;

@@ -67,7 +67,7 @@ struct Descent {
 };
 
 /// The given starts, then the best poses about them.
-std::vector<Descent> first_poses(const Scene& scene, const SearchStage& stage,
+std::vector<Descent> first_poses(const RegistrationProblem& scene, const SearchStage& stage,
                                  const std::vector<RigidTransform>& starts, const SearchOptions& options) {
   std::vector<Descent> first;
   const auto add = [&](const RigidTransform& pose) { first.push_back({pose, {first.size()}}); };
@@ -84,8 +84,9 @@ std::vector<Descent> first_poses(const Scene& scene, const SearchStage& stage,
   return first;
 }
 
-std::vector<Estimate> refined(const Scene& scene, const Level& level, const std::vector<Descent>& from,
-                              double converged, const SearchOptions& options) {
+std::vector<Estimate> refined(const RegistrationProblem& scene, const Level& level,
+                              const std::vector<Descent>& from, double converged,
+                              const SearchOptions& options) {
   std::vector<Estimate> estimates(from.size());
   const bool few = from.size() < 2 * std::size_t{std::max(1U, scene.threads())};
   parallel_for(from.size(), few ? 1 : scene.threads(), [&](std::size_t i) {
@@ -114,7 +115,7 @@ void keep_distinct(const Model& model, const RigidTransform& solution,
 
 }  // namespace
 
-SearchResult search(Scene& scene, const std::vector<SearchStage>& stages,
+SearchResult search(RegistrationProblem& scene, const std::vector<SearchStage>& stages,
                     const std::vector<RigidTransform>& starts, const SearchOptions& options, double same_mm) {
   const Model& model = scene.model();
   for (const SearchStage& stage : stages) scene.prepare(stage.level, starts.front() * model.centre);

@@ -46,7 +46,7 @@ struct SearchResult {
 /// Poses about the starts in a low-discrepancy sequence (each start first), the best of which are refined
 /// stage by stage. Solutions closer than `same_mm` (rms over the model) are one. The result does not depend
 /// on the number of threads.
-SearchResult search(Scene& scene, const std::vector<SearchStage>& stages,
+SearchResult search(RegistrationProblem& scene, const std::vector<SearchStage>& stages,
                     const std::vector<geometry::RigidTransform>& starts, const SearchOptions& options,
                     double same_mm);
 

@@ -22,7 +22,7 @@ class Search : public testing::Test {
     return moved_about(true_pose(), true_pose() * model_.centre, step);
   }
   SearchResult found(const std::vector<RigidTransform>& starts, int keep, double most_ratio = 1e9) const {
-    Scene scene(model_, views_, 1);
+    RegistrationProblem scene(model_, views_, 1);
     SearchOptions options;
     options.candidates = 0;  // the starts alone
     return search(scene, {{{false, 4}}, {{false, 1}, keep, most_ratio}}, starts, options, same_mm);

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/text.h"
 #include "helicarm/registration/surface.h"
 #include "helicarm/volume/declared.h"
 #include "helicarm/volume/voxels.h"
@@ -58,7 +59,7 @@ class Tags {
       if (close == open || close == std::string_view::npos)
         throw BadInput(Reason::bad_value,
                        fmt::format("{}: tag \"{}\": an attribute is not quoted", origin_, tag.name));
-      tag.attributes.emplace(volume::trim(inner.substr(at, equals - at)),
+      tag.attributes.emplace(trimmed(inner.substr(at, equals - at)),
                              inner.substr(open + 1, close - open - 1));
       at = close + 1;
     }

@@ -115,7 +115,7 @@ operation::OperationPlan with_ct_plan(operation::OperationPlan plan,
     const RigidTransform off{turned(options.off_deg, {1, -1, 1}), Vector3d(1, -1, 1) * options.off_mm};
     model.world_from_model = *simulated.calibrator_from_knee * off * model_from_knee().inverse();
     plan.models.push_back(std::move(model));
-    pipeline::ModelTunnelPlan tunnel{bone, bone, bone, options.diameter_mm};
+    pipeline::ModelLine tunnel{bone, bone, bone, options.diameter_mm};
     tunnel.enter_at = enter;
     plan.tunnels.push_back(
         {bone, bone, fmt::format("{}_start", bone), fmt::format("{}_end", bone), enter, tunnel});

@@ -107,7 +107,7 @@ TEST_F(FaultyOperation, ImagesInTheOtherOrderAreSortedByTheirAngles) {
   EXPECT_EQ(operation_->views_to_come(), std::vector<std::string>{"AP"});
   expose("AP");
   ASSERT_TRUE(operation_->measure());
-  for (const operation::PlannedTunnel& tunnel : plan_.tunnels)
+  for (const operation::OperationTunnel& tunnel : plan_.tunnels)
     EXPECT_TRUE(operation::tunnel_in_bone(operation_->result(), tunnel)) << tunnel.name;
 }
 
@@ -121,7 +121,7 @@ TEST_F(FaultyOperation, UndetectableExchangeOfViewsLeavesTunnelsUnmeasured) {
     ASSERT_TRUE(taken) << taken.error().message;
   }
   ASSERT_TRUE(operation_->measure());
-  for (const operation::PlannedTunnel& tunnel : plan_.tunnels)
+  for (const operation::OperationTunnel& tunnel : plan_.tunnels)
     EXPECT_EQ(operation::tunnel_in_bone(operation_->result(), tunnel).error().reason, Reason::not_seen);
   const auto warnings = std::ranges::count_if(reported_, [](const std::string& what) {
     return what.find("no acquisition time") != std::string::npos;

@@ -115,12 +115,12 @@ operation::HandDrill calibrated_drill(const virtual_devices::HeldDrill& drill) {
 }
 
 /// The ball at a tunnel's end.
-std::string ball_at(const operation::PlannedTunnel& tunnel, bool start) {
+std::string ball_at(const operation::OperationTunnel& tunnel, bool start) {
   if (!tunnel.of_model) return start ? tunnel.start : tunnel.end;
   return std::string(tunnel.bone == "femur" ? "F" : "T") + (start ? "S" : "E");
 }
 
-void add_ends(Rehearsal& done, const operation::PlannedTunnel& tunnel,
+void add_ends(Rehearsal& done, const operation::OperationTunnel& tunnel,
               const operation::TunnelOutcome& outcome, VirtualDevices& virtual_or) {
   using guidance::Verification, guidance::LineError;
   const auto in_xrays = [&](const std::optional<LineError> Verification::*end) {
@@ -245,7 +245,7 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
       if (options.move_bones) stir(stage.virtual_or->simulated_scene());
       std::this_thread::sleep_for(before_exposure);  // until the gate accepts the bones again
 
-      for (const operation::PlannedTunnel& tunnel : operation.plan().tunnels) {
+      for (const operation::OperationTunnel& tunnel : operation.plan().tunnels) {
         const robot::RobotState rest = value_or_throw(robot.wait_connected(patience));
         std::optional<robot::RobotOrder> begun;  // the tool is on its way by this order, or there
         std::optional<operation::TunnelOutcome> outcome;
@@ -280,7 +280,7 @@ Expected<Rehearsal> rehearse_freehand(std::uint64_t seed, const std::filesystem:
     if (options.move_bones) stir(stage.virtual_or->simulated_scene());
     Rehearsal done{seed, {}};
     conduct(operation, [&] {
-      for (const operation::PlannedTunnel& tunnel : operation.plan().tunnels) {
+      for (const operation::OperationTunnel& tunnel : operation.plan().tunnels) {
         drill.move(tunnel.bone, drill.on_tunnel(tunnel.bone, -40, 4, 5), raise_s);
         std::this_thread::sleep_for(std::chrono::duration<double>(raise_s) + before_exposure);
         value_or_throw(operation.guide(tunnel.name));

@@ -239,7 +239,7 @@ TEST_F(StalePlan, RobotStopsWhenTheRecordIsRemovedDuringItsMotion) {
 }
 
 TEST_F(StalePlan, TwoTunnelsAreCarriedOutOnOneCalibration) {
-  for (const operation::PlannedTunnel& tunnel : plan_.tunnels) {
+  for (const operation::OperationTunnel& tunnel : plan_.tunnels) {
     bool done = false;
     for (int attempt = 0; attempt < most_attempts && !done; ++attempt) {
       const robot::RobotState rest = robot().wait_connected(5s).value();

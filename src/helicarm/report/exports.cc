@@ -29,47 +29,46 @@ constexpr std::string_view points_header =
 struct ExportedPoint {
   std::string name;
   std::string_view source;  ///< pick, target or plan
-  const guidance::PointInFrames* place;
+  const guidance::PointInFrames* located;
 };
 
 /// Picks and targets, then the points of registered models' plans.
 std::vector<ExportedPoint> exported_points(const pipeline::Result& result) {
   std::vector<ExportedPoint> points;
   for (const pipeline::PointResult& point : result.points)
-    if (point.place)
-      points.push_back({point.name, word(point.source), &*point.place});
+    if (point.place) points.push_back({point.name, word(point.source), &*point.place});
   for (const pipeline::ModelPoint& point : result.model_points)
     points.push_back({point.name, "plan", &point.place});
   return points;
 }
 
-std::string csv_row(const ExportedPoint& point, std::string_view frame, const Eigen::Vector3d& place,
+std::string csv_row(const ExportedPoint& point, std::string_view frame, const Eigen::Vector3d& position,
                     const Eigen::Matrix3d& covariance) {
   const Eigen::Vector3d sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  return fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(point.name), point.source, frame, place.x(),
-                     place.y(), place.z(), sigma.x(), sigma.y(), sigma.z(),
+  return fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(point.name), point.source, frame,
+                     position.x(), position.y(), position.z(), sigma.x(), sigma.y(), sigma.z(),
                      localization::length_at_95(covariance));
 }
 
 std::string points_csv(const pipeline::Result& result) {
   std::string rows;
   for (const ExportedPoint& point : exported_points(result)) {
-    const guidance::PointInFrames& at = *point.place;
+    const guidance::PointInFrames& at = *point.located;
     rows += csv_row(point, "calibrator", at.in_calibrator, at.covariance_in_calibrator);
-    for (const auto& [bone, place] : at.in_bones)
-      rows += csv_row(point, csv_field(bone), place.point(), place.covariance);
+    for (const auto& [bone, position] : at.in_bones)
+      rows += csv_row(point, csv_field(bone), position.point(), position.covariance);
     if (at.in_tool) rows += csv_row(point, "tool", at.in_tool->point(), at.in_tool->covariance);
   }
   if (rows.empty()) return rows;
   return std::string(points_header) + rows;
 }
 
-Json control_point(const std::string& name, const guidance::PointInFrames& place) {
-  const Eigen::Vector3d& at = place.in_calibrator;
+Json control_point(const std::string& name, const guidance::PointInFrames& located) {
+  const Eigen::Vector3d& at = located.in_calibrator;
   return {{"id", name},
           {"label", name},
           {"description", fmt::format("within {:.3f} mm (95 %), calibrator frame",
-                                      localization::length_at_95(place.covariance_in_calibrator))},
+                                      localization::length_at_95(located.covariance_in_calibrator))},
           {"position", {at.x(), at.y(), at.z()}},
           {"positionStatus", "defined"}};
 }
@@ -89,7 +88,7 @@ Json markup(const char* type, const std::string& name, Json points) {
 std::string slicer_markups(const pipeline::Result& result) {
   Json points = Json::array(), markups = Json::array();
   for (const ExportedPoint& point : exported_points(result))
-    points.push_back(control_point(point.name, *point.place));
+    points.push_back(control_point(point.name, *point.located));
   if (points.empty()) return {};
   markups.push_back(markup("Fiducial", "helicarm points, calibrator frame", std::move(points)));
   const auto add_line = [&](const std::string& name, const Json& start, const Json& end) {

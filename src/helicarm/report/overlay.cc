@@ -44,9 +44,10 @@ class Canvas {
   }
   void text(const Eigen::Vector2d& at, const std::string& words, const cv::Scalar& colour) {
     const Eigen::Vector2d corner = at + scale_ * Eigen::Vector2d(17, -9);
-    const cv::Point place(static_cast<int>(corner.x()), static_cast<int>(corner.y()));
+    const cv::Point corner_px(static_cast<int>(corner.x()), static_cast<int>(corner.y()));
     for (const auto& [ink, thickness] : {std::pair{cv::Scalar(0, 0, 0), 3}, {colour, 1}})
-      cv::putText(image_, words, place, cv::FONT_HERSHEY_SIMPLEX, 0.5 * scale_, ink, thickness, cv::LINE_AA);
+      cv::putText(image_, words, corner_px, cv::FONT_HERSHEY_SIMPLEX, 0.5 * scale_, ink, thickness,
+                  cv::LINE_AA);
   }
   std::string png() const { return image::encode_png(image_); }
 

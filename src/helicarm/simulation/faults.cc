@@ -35,11 +35,11 @@ Scene stray_metal(const SimulationOptions& options, const phantom::Calibrator& c
   Scene scene;
   if (options.has(Fault::decoys))
     for (int i = 0; i < 2; ++i) {
-      const Vector3d place(random.uniform(-45, 45), random.uniform(-45, 45), random.uniform(5, 70));
+      const Vector3d position(random.uniform(-45, 45), random.uniform(-45, 45), random.uniform(5, 70));
       const Vector3d offset = options.calibrator
                                   ? phantom::middle_of(calibrator) - phantom::middle_of(phantom::udcsc())
                                   : Vector3d(0, 0, 0);
-      scene.push_back(steel("decoy", {sphere(place + offset, 2)}));
+      scene.push_back(steel("decoy", {sphere(position + offset, 2)}));
     }
   if (options.has(Fault::wires))
     for (const TrueView& true_view : true_views) {

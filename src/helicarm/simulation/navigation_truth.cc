@@ -14,11 +14,11 @@ namespace {
 using Eigen::Vector3d;
 
 /// Random pose around a position in the tracker's frame, with an orientation visible to the tracker.
-geometry::RigidTransform somewhere(const TrackedBody& body, const Vector3d& place, double spread_mm,
+geometry::RigidTransform somewhere(const TrackedBody& body, const Vector3d& position, double spread_mm,
                                    RandomStream& random) {
   for (;;) {
     const geometry::RigidTransform pose{random_rotation(random),
-                                        place + random_motion(random, 0, spread_mm).translation};
+                                        position + random_motion(random, 0, spread_mm).translation};
     if (pose_covariance(virtual_tracker(), body, pose)) return pose;
   }
 }
@@ -47,16 +47,16 @@ void read_poses(NavigationTruth& truth, const std::map<std::string, TrackedBody>
 
 /// A drilled line: normal deviation from the tunnel of 0.5 mm per axis, 40 mm before its start and at half
 /// its length.
-ToolLine missed(const std::string& name, const TunnelPoint& start, const TunnelPoint& end,
-                RandomStream& random) {
+TrueToolLine missed(const std::string& name, const TunnelPoint& start, const TunnelPoint& end,
+                    RandomStream& random) {
   const Vector3d axis = (end.in_calibrator - start.in_calibrator).normalized();
-  ToolLine line{name,
-                start.name,
-                end.name,
-                start.in_calibrator - 40 * axis,
-                0.5 * (start.in_calibrator + end.in_calibrator),
-                0,
-                0};
+  TrueToolLine line{name,
+                    start.name,
+                    end.name,
+                    start.in_calibrator - 40 * axis,
+                    0.5 * (start.in_calibrator + end.in_calibrator),
+                    0,
+                    0};
   line.p1_in_calibrator += random_motion(random, 0, 0.5).translation;
   line.p2_in_calibrator += random_motion(random, 0, 0.5).translation;
   line.start_error_mm = distance_to_line(start.in_calibrator, line.p1_in_calibrator, line.p2_in_calibrator);

@@ -24,7 +24,7 @@ struct TunnelPoint {
 };
 
 /// A tool line drilled or to be drilled, and its true distance from the tunnel's ends.
-struct ToolLine {
+struct TrueToolLine {
   std::string name;
   std::string start;
   std::string end;
@@ -52,7 +52,7 @@ struct NavigationTruth {
       read;                                    ///< one reading is used for every view and for the present
   std::map<std::string, Matrix6d> covariance;  ///< of `read`, in the convention of pose_covariance
   std::vector<TunnelPoint> points;
-  std::vector<ToolLine> lines;
+  std::vector<TrueToolLine> lines;
 };
 
 NavigationTruth set_up_navigation(std::uint64_t seed, const geometry::RigidTransform& calibrator_from_knee);

@@ -309,8 +309,8 @@ Expected<SimulatedRun> simulate_run(const SimulationOptions& options, const Rota
         return std::move(stand.views);
       },
       true);
-  return std::move(images).map([&](SimulatedCase made) {
-    return SimulatedRun{rotation, std::move(made), std::move(deviations)};
+  return std::move(images).map([&](SimulatedCase simulated) {
+    return SimulatedRun{rotation, std::move(simulated), std::move(deviations)};
   });
 }
 

@@ -257,7 +257,7 @@ TEST(SimulateCase, TunnelPointsAgreeInEveryFrame) {
     EXPECT_GT(error.translation.norm(), 0);
     EXPECT_LT(error.translation.norm(), 0.12 * 5);
   }
-  for (const ToolLine& line : truth.lines) EXPECT_LT(line.start_error_mm, 3);
+  for (const TrueToolLine& line : truth.lines) EXPECT_LT(line.start_error_mm, 3);
   for (const SimulatedView& view : simulated.views)
     for (std::size_t i = 0; i < view.clicks.size(); ++i)
       EXPECT_LT((view.clicks[i].raw - view.tunnel_points[i].raw).norm(), 3.1);

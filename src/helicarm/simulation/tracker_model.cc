@@ -15,9 +15,9 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-bool in_volume(const TrackerModel& model, const Vector3d& place) {
-  return place.z() >= model.nearest_mm && place.z() <= model.farthest_mm &&
-         place.head<2>().norm() <= std::tan(model.half_field_deg * radian) * place.z();
+bool in_volume(const TrackerModel& model, const Vector3d& position) {
+  return position.z() >= model.nearest_mm && position.z() <= model.farthest_mm &&
+         position.head<2>().norm() <= std::tan(model.half_field_deg * radian) * position.z();
 }
 
 bool is_turned_to_the_camera(const TrackerModel& model, const MarkerFacet& facet,
@@ -25,8 +25,8 @@ bool is_turned_to_the_camera(const TrackerModel& model, const MarkerFacet& facet
   const Vector3d normal = tracker_from_body.rotation * facet.normal_in_body;
   const double least = std::cos(model.facing_deg * radian);
   for (const Vector3d& marker : facet.markers_in_body) {
-    const Vector3d place = tracker_from_body * marker;
-    if (!in_volume(model, place) || -place.normalized().dot(normal) < least) return false;
+    const Vector3d position = tracker_from_body * marker;
+    if (!in_volume(model, position) || -position.normalized().dot(normal) < least) return false;
   }
   return true;
 }
@@ -125,18 +125,18 @@ std::optional<Matrix6d> pose_covariance(const TrackerModel& model, const Tracked
 std::optional<geometry::RigidTransform> mean_pose(std::span<const TrackerSample> samples) {
   std::optional<geometry::RigidTransform> first;
   Vector3d turn = Vector3d::Zero();
-  Vector3d place = Vector3d::Zero();
+  Vector3d position = Vector3d::Zero();
   int count = 0;
   for (const TrackerSample& sample : samples) {
     if (!sample.valid()) continue;
     if (!first) first = sample.tracker_from_body;
     turn += geometry::vector_from_rotation(sample.tracker_from_body->rotation * first->rotation.transpose());
-    place += sample.tracker_from_body->translation;
+    position += sample.tracker_from_body->translation;
     ++count;
   }
   if (!first) return {};
   return geometry::RigidTransform{geometry::rotation_from_vector(turn / count) * first->rotation,
-                                  place / count};
+                                  position / count};
 }
 
 }  // namespace helicarm::simulation

@@ -32,11 +32,12 @@ Visibility visibility(const std::string& name, const Vector3d& centre, double ra
   for (int ring = 0; ring <= 2; ++ring)
     for (int spoke = 0; spoke < (ring ? 16 : 1); ++spoke) {
       const double angle = spoke * EIGEN_PI / 8;
-      const Vector3d place =
+      const Vector3d position =
           centre + 0.5 * ring * radius * (std::cos(angle) * right + std::sin(angle) * down);
-      if (!in_image(true_view, true_view.detector.distortion.raw_from_ideal(true_view.view.project(place))))
+      if (!in_image(true_view,
+                    true_view.detector.distortion.raw_from_ideal(true_view.view.project(position))))
         return Visibility::outside;
-      const Vector3d direction = (place - source).normalized();
+      const Vector3d direction = (position - source).normalized();
       for (const Body& body : scene) {
         if (body.name == name || !(body.metal || body.name == "shutter") || !crosses(body, source, direction))
           continue;

@@ -86,7 +86,7 @@ Json view_json(const SimulatedView& view, const char* world) {
 }
 
 /// Distances (ideal pixels) of the tunnel's true ends from the tool line's image.
-Json line_errors_px(const ToolLine& line, const NavigationTruth& truth, const TrueView& true_view) {
+Json line_errors_px(const TrueToolLine& line, const NavigationTruth& truth, const TrueView& true_view) {
   const geometry::View view = true_view.stored_view();
   const auto flat = [&](const Eigen::Vector3d& point) {
     const Eigen::Vector2d pixel = view.project(point);
@@ -119,7 +119,7 @@ Json navigation_json(const SimulatedCase& simulated) {
                               {"in_calibrator", vector_json(point.in_calibrator)},
                               {"in_bone", vector_json(point.in_bone)},
                               {"in_tool", vector_json(point.in_tool)}});
-  for (const ToolLine& line : truth.lines) {
+  for (const TrueToolLine& line : truth.lines) {
     Json entry = {{"name", line.name},
                   {"start", line.start},
                   {"end", line.end},

@@ -34,8 +34,8 @@ std::vector<TruePoint> grid_crosses(const WireGrid& grid, const Scene& scene, co
   const int half = grid.wires / 2;
   for (int j = -half; j <= half; ++j)
     for (int i = -half; i <= half; ++i) {
-      const Vector3d place = grid.pitch_mm * Vector3d(i, j, 0);
-      crosses.push_back(true_point(wire_name, place, grid.thickness_mm, scene, true_view));
+      const Vector3d position = grid.pitch_mm * Vector3d(i, j, 0);
+      crosses.push_back(true_point(wire_name, position, grid.thickness_mm, scene, true_view));
       crosses.back().name = fmt::format("{},{}", i, j);
     }
   return crosses;
@@ -52,9 +52,9 @@ std::vector<TrueView> take_grid_stand(const SimulationOptions& options, double p
   const Vector3d through_middle =
       arm.view.intrinsics.matrix().inverse() * Vector3d(middle.x(), middle.y(), 1);
   const auto camera_from_grid = [&](double distance_mm) {
-    const Vector3d place = (arm.f_mm - distance_mm) * through_middle;
+    const Vector3d position = (arm.f_mm - distance_mm) * through_middle;
     return geometry::RigidTransform{Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix(),
-                                    place + Vector3d(right, down, 0)};
+                                    position + Vector3d(right, down, 0)};
   };
   std::vector<TrueView> true_views;
   const auto take = [&](std::string name, double distance_mm) {

@@ -50,7 +50,7 @@ void add_navigation(Json& json, const SimulatedCase& simulated) {
                                {"snap", "ball"},
                                {"diameter_mm", tunnel_ball_mm},
                                {"moves_with", truth.points[i].bone}});
-  for (const ToolLine& line : truth.lines) {
+  for (const TrueToolLine& line : truth.lines) {
     json["tunnels"].push_back({{"name", line.name}, {"start", line.start}, {"end", line.end}});
     json["tool_lines"].push_back({{"name", line.name},
                                   {"tunnel", line.name},

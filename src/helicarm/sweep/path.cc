@@ -226,27 +226,27 @@ PathObservation observation_of(const FramePoints& frame, const PlacedCamera& at,
                                const Orbit& orbit, const Detector& detector) {
   const PlacedCamera reference = orbit.at(angle_deg);
   const geometry::View view = view_of(at, detector);
-  PathObservation made;
-  made.angle_deg = angle_deg;
+  PathObservation observation;
+  observation.angle_deg = angle_deg;
   const Eigen::MatrixXd by = pixels_by_deviation(frame, at, reference, detector);
   const Eigen::VectorXd off = whitened(frame, 1, [&](std::size_t i) -> Eigen::Matrix2Xd {
     return frame.pixels[i] - view.project(frame.points[i]);
   });
-  made.information = by.transpose() * by;
+  observation.information = by.transpose() * by;
   const CameraVector gradient = by.transpose() * off;
-  made.value = deviation_of(at, reference) + solved(made.information, gradient);
+  observation.value = deviation_of(at, reference) + solved(observation.information, gradient);
   // A rigid motion (w, t) of the phantom about the centre moves the camera, as the phantom sees it, back.
   const Eigen::Matrix3d& r = reference.rotation;
-  made.motion << r * geometry::cross_matrix(at.source - orbit.centre), -r,
+  observation.motion << r * geometry::cross_matrix(at.source - orbit.centre), -r,
       r * geometry::cross_matrix(at.detector - orbit.centre), -r, at.rotation, Eigen::Matrix3d::Zero();
-  made.turn.setZero();
+  observation.turn.setZero();
   if (orbit.axis) {
     const Vector3d& axis = *orbit.axis;
-    made.turn.head<3>().noalias() = r * axis.cross(at.source - orbit.centre);
-    made.turn.segment<3>(3).noalias() = r * axis.cross(at.detector - orbit.centre);
-    made.turn.tail<3>().noalias() = -at.rotation * axis;
+    observation.turn.head<3>().noalias() = r * axis.cross(at.source - orbit.centre);
+    observation.turn.segment<3>(3).noalias() = r * axis.cross(at.detector - orbit.centre);
+    observation.turn.tail<3>().noalias() = -at.rotation * axis;
   }
-  return made;
+  return observation;
 }
 
 std::vector<double> free_shares(const FramePoints& frame, const PlacedCamera& at,

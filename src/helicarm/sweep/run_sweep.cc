@@ -23,26 +23,27 @@ namespace {
 
 constexpr std::size_t least_smooth = 16;  // frames of a smooth path
 
-const xray::ImageFile* file_of(const Frame& frame, const SweepCase& given) {
-  const auto file = given.files.find(frame.view.image);
-  return file == given.files.end() ? nullptr : file->second.get();
+const xray::ImageFile* file_of(const Frame& frame, const SweepCase& the_case) {
+  const auto file = the_case.files.find(frame.view.image);
+  return file == the_case.files.end() ? nullptr : file->second.get();
 }
 
 /// Each frame's estimate; unreadable input is thrown.
-std::vector<FrameEstimate> estimates_of(const SweepCase& given, const SweepOptions& options,
+std::vector<FrameEstimate> estimates_of(const SweepCase& the_case, const SweepOptions& options,
                                         const std::function<void(double)>& progress) {
-  const std::size_t count = given.frames.size();
-  std::vector<Expected<FrameEstimate>> made(count, FrameEstimate{});
+  const std::size_t count = the_case.frames.size();
+  std::vector<Expected<FrameEstimate>> estimated(count, FrameEstimate{});
   pipeline::RunOptions run;
   std::mutex guard;
   std::size_t done = 0;
   parallel_for(count, options.threads, [&](std::size_t i) {
-    made[i] = estimate_frame(given.frames[i], file_of(given.frames[i], given), given.base, run);
+    estimated[i] =
+        estimate_frame(the_case.frames[i], file_of(the_case.frames[i], the_case), the_case.base, run);
     const std::lock_guard lock(guard);
     if (progress) progress(double(++done) / double(count));
   });
   std::vector<FrameEstimate> estimates;
-  for (auto& estimate : made) estimates.push_back(value_or_throw(std::move(estimate)));
+  for (auto& estimate : estimated) estimates.push_back(value_or_throw(std::move(estimate)));
   return estimates;
 }
 
@@ -52,7 +53,8 @@ void refuse(FrameEstimate& estimate, Failure failure, const std::string& view) {
 }
 
 /// The detector of all frames. Throws bad_value where they state different ones.
-Detector detector_of(const SweepCase& given, const std::vector<FrameEstimate>& estimates, bool& pixel_known) {
+Detector detector_of(const SweepCase& the_case, const std::vector<FrameEstimate>& estimates,
+                     bool& pixel_known) {
   constexpr double tolerance = 0.01;
   const FrameEstimate* first = nullptr;
   const std::string* name = nullptr;
@@ -63,11 +65,11 @@ Detector detector_of(const SweepCase& given, const std::vector<FrameEstimate>& e
     if (at.alone) focals.push_back(at.alone->view.intrinsics.fy);
     if (!first) {
       first = &at;
-      name = &given.frames[i].view.name;
+      name = &the_case.frames[i].view.name;
     }
     const auto differ = [&](const char* what) {
       throw BadInput(Reason::bad_value, fmt::format("{} and {} state different {}: one run has one detector",
-                                                    *name, given.frames[i].view.name, what));
+                                                    *name, the_case.frames[i].view.name, what));
     };
     if (at.image_size != first->image_size) differ("image sizes");
     if (at.pixel_mm.has_value() != first->pixel_mm.has_value() && !at.failure && !first->failure)
@@ -89,7 +91,7 @@ Detector detector_of(const SweepCase& given, const std::vector<FrameEstimate>& e
 }
 
 /// Square pixels, or the stated aspect, and the handedness of most frames; the others are refused.
-void take_handedness(const SweepCase& given, std::vector<FrameEstimate>& estimates, Detector& detector) {
+void take_handedness(const SweepCase& the_case, std::vector<FrameEstimate>& estimates, Detector& detector) {
   int mirrored = 0, plain = 0;
   for (const FrameEstimate& at : estimates)
     if (at.alone) {
@@ -106,7 +108,7 @@ void take_handedness(const SweepCase& given, std::vector<FrameEstimate>& estimat
                           is_mirrored ? "not mirrored" : "mirrored", is_mirrored ? "mirrored" : "not"),
               {},
               {}},
-             given.frames[i].view.name);
+             the_case.frames[i].view.name);
 }
 
 /// Ratio of the residuals to the fiducials' standard deviations, by all frames together.
@@ -126,13 +128,13 @@ double noise_factor(const std::vector<FrameEstimate>& estimates) {
 }
 
 /// Calibrates a frame again with the run's noise, and refuses it if its residuals exceed that.
-void calibrate_with(double factor, const SweepCase& given, FrameEstimate& at, const std::string& view) {
+void calibrate_with(double factor, const SweepCase& the_case, FrameEstimate& at, const std::string& view) {
   constexpr double largest_ratio = 4;  // of a frame's residuals to the run's noise
   if (at.failure) return;
   for (fiducials::Fiducial& ball : at.fiducials.fiducials) ball.sigma_px *= factor;
   at.fiducials.map_covariance_px2 *= factor * factor;
   at.fiducials.start = at.alone->view;
-  auto again = calibrate_alone(at, given.base);
+  auto again = calibrate_alone(at, the_case.base);
   if (again) {
     const double ratio = std::sqrt(at.alone->chi2 / std::max(1, at.alone->dof));
     if (ratio > largest_ratio)
@@ -199,7 +201,7 @@ std::optional<fiducials::ExpectedView> expected_at(std::ptrdiff_t frame,
 /// Labels again the frames that their image alone leaves ambiguous and whose camera the accepted frames
 /// beside them tell; returns how many. A phantom seen along its axis, or half out of the field, looks alike
 /// from two directions: a run does not jump.
-int label_by_neighbours(double factor, const SweepCase& given, std::vector<FrameEstimate>& estimates,
+int label_by_neighbours(double factor, const SweepCase& the_case, std::vector<FrameEstimate>& estimates,
                         unsigned threads) {
   const std::vector<FrameEstimate> alone = estimates;
   std::atomic<int> labelled = 0;
@@ -207,10 +209,10 @@ int label_by_neighbours(double factor, const SweepCase& given, std::vector<Frame
     if (!alone[index].failure || alone[index].failure->reason != Reason::ambiguous_labels) return;
     const auto expected = expected_at(std::ptrdiff_t(index), alone);
     if (!expected) return;
-    const Frame& frame = given.frames[index];
-    auto again = estimate_frame(frame, file_of(frame, given), given.base, {}, expected);
+    const Frame& frame = the_case.frames[index];
+    auto again = estimate_frame(frame, file_of(frame, the_case), the_case.base, {}, expected);
     if (!again || again->failure) return;
-    calibrate_with(factor, given, *again, frame.view.name);
+    calibrate_with(factor, the_case, *again, frame.view.name);
     if (again->failure) return;
     estimates[index] = *std::move(again);
     ++labelled;
@@ -221,14 +223,14 @@ int label_by_neighbours(double factor, const SweepCase& given, std::vector<Frame
 /// One run tells of its own noise and calibrator many times over: more of its frames would crowd out other
 /// days.
 std::vector<calibration::HistoryEntry> acquisitions_of(const std::vector<FrameEstimate>& estimates,
-                                                       const SweepCase& given,
+                                                       const SweepCase& the_case,
                                                        const std::vector<SweepFrame>& frames) {
   constexpr std::size_t most = 40;
   std::vector<std::size_t> told;
   for (std::size_t i = 0; i < estimates.size(); ++i)
     if (!frames[i].failure && estimates[i].variance_scale == 1) told.push_back(i);
   std::vector<calibration::HistoryEntry> entries;
-  const calibration::CommonPrior common = pipeline::common_prior(given.base.calibrator);
+  const calibration::CommonPrior common = pipeline::common_prior(the_case.base.calibrator);
   const std::size_t count = std::min(most, told.size());
   for (std::size_t k = 0; k < count; ++k) {
     const FrameEstimate& at = estimates[told[k * told.size() / count]];
@@ -241,9 +243,9 @@ std::vector<calibration::HistoryEntry> acquisitions_of(const std::vector<FrameEs
   return entries;
 }
 
-bool is_one_run(const SweepCase& given) {
-  return std::ranges::all_of(given.frames,
-                             [&](const Frame& frame) { return frame.run == given.frames.front().run; });
+bool is_one_run(const SweepCase& the_case) {
+  return std::ranges::all_of(the_case.frames,
+                             [&](const Frame& frame) { return frame.run == the_case.frames.front().run; });
 }
 
 Failure nothing_accepted(const std::vector<FrameEstimate>& estimates) {
@@ -261,51 +263,51 @@ Failure nothing_accepted(const std::vector<FrameEstimate>& estimates) {
 }
 
 SweepFrame reported(const Frame& frame, const FrameEstimate& estimate) {
-  SweepFrame made;
-  made.number = frame.number;
-  made.view = frame.view.name;
-  made.failure = estimate.failure;
-  made.primary_angle_deg = estimate.primary_angle_deg;
-  made.secondary_angle_deg = estimate.secondary_angle_deg;
-  made.fiducials_used = int(std::ranges::count(estimate.fiducials.fiducials, fiducials::FiducialStatus::used,
-                                               &fiducials::Fiducial::status));
-  made.alone = estimate.alone;
+  SweepFrame sweep_frame;
+  sweep_frame.number = frame.number;
+  sweep_frame.view = frame.view.name;
+  sweep_frame.failure = estimate.failure;
+  sweep_frame.primary_angle_deg = estimate.primary_angle_deg;
+  sweep_frame.secondary_angle_deg = estimate.secondary_angle_deg;
+  sweep_frame.fiducials_used = int(std::ranges::count(
+      estimate.fiducials.fiducials, fiducials::FiducialStatus::used, &fiducials::Fiducial::status));
+  sweep_frame.alone = estimate.alone;
   if (!estimate.failure) {
-    made.best = estimate.alone;
-    made.decision = estimate.variance_scale > 1 ? Decision::warn : Decision::accept;
+    sweep_frame.best = estimate.alone;
+    sweep_frame.decision = estimate.variance_scale > 1 ? Decision::warn : Decision::accept;
   }
-  return made;
+  return sweep_frame;
 }
 
-Sweep swept(const SweepCase& given, const SweepOptions& options,
+Sweep swept(const SweepCase& the_case, const SweepOptions& options,
             const std::function<void(double)>& progress) {
   Sweep sweep;
-  sweep.warnings = given.base.warnings;
-  std::vector<FrameEstimate> estimates = estimates_of(given, options, progress);
-  sweep.detector = detector_of(given, estimates, sweep.pixel_known);
-  take_handedness(given, estimates, sweep.detector);
+  sweep.warnings = the_case.base.warnings;
+  std::vector<FrameEstimate> estimates = estimates_of(the_case, options, progress);
+  sweep.detector = detector_of(the_case, estimates, sweep.pixel_known);
+  take_handedness(the_case, estimates, sweep.detector);
   sweep.noise_factor = noise_factor(estimates);
   parallel_for(estimates.size(), options.threads, [&](std::size_t i) {
-    calibrate_with(sweep.noise_factor, given, estimates[i], given.frames[i].view.name);
+    calibrate_with(sweep.noise_factor, the_case, estimates[i], the_case.frames[i].view.name);
   });
   // Those in the middle of several follow from those beside them, labelled before.
-  while (is_one_run(given) &&
-         label_by_neighbours(sweep.noise_factor, given, estimates, options.threads) > 0) {
+  while (is_one_run(the_case) &&
+         label_by_neighbours(sweep.noise_factor, the_case, estimates, options.threads) > 0) {
   }
   const auto accepted =
       std::size_t(std::ranges::count_if(estimates, [](const auto& at) { return !at.failure; }));
   for (std::size_t i = 0; i < estimates.size(); ++i)
-    sweep.frames.push_back(reported(given.frames[i], estimates[i]));
+    sweep.frames.push_back(reported(the_case.frames[i], estimates[i]));
   if (accepted == 0) {
     sweep.failure = nothing_accepted(estimates);
     return sweep;
   }
-  const PathKind kind = options.path.value_or(accepted >= least_smooth && is_one_run(given) ? PathKind::smooth
-                                                                                            : PathKind::free);
+  const PathKind kind = options.path.value_or(
+      accepted >= least_smooth && is_one_run(the_case) ? PathKind::smooth : PathKind::free);
   report_images(sweep, estimates);
-  warn_of_unused_balls(sweep, estimates, given.base.calibrator);
-  sweep.failure = estimate_path(sweep, given.base, estimates, kind);
-  if (!sweep.failure) sweep.acquisitions = acquisitions_of(estimates, given, sweep.frames);
+  warn_of_unused_balls(sweep, estimates, the_case.base.calibrator);
+  sweep.failure = estimate_path(sweep, the_case.base, estimates, kind);
+  if (!sweep.failure) sweep.acquisitions = acquisitions_of(estimates, the_case, sweep.frames);
   compare_angles(sweep);
   compare_distance(sweep, estimates);
   warn_of_refused(sweep);
@@ -323,15 +325,15 @@ Expected<PathKind> path_kind(const std::string& word) {
   return static_cast<PathKind>(found - path_words.begin());
 }
 
-Expected<Sweep> run_sweep(const SweepCase& given, const SweepOptions& options,
+Expected<Sweep> run_sweep(const SweepCase& the_case, const SweepOptions& options,
                           const std::function<void(double share)>& progress) {
   return guarded([&] {
     const auto begun = std::chrono::steady_clock::now();
-    if (!is_one_run(given) &&
-        std::ranges::any_of(given.frames, [](const Frame& frame) { return frame.run != frame.view.name; }))
+    if (!is_one_run(the_case) &&
+        std::ranges::any_of(the_case.frames, [](const Frame& frame) { return frame.run != frame.view.name; }))
       throw BadInput(Reason::bad_value,
                      "views: \"frames\" makes a view a run of its own: make a case of each run");
-    Sweep sweep = swept(given, options, progress);
+    Sweep sweep = swept(the_case, options, progress);
     sweep.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     return sweep;
   });

@@ -33,8 +33,8 @@ SharedMap::SharedMap(const rectification::DistortionMap& map, double noise_facto
   for (int row = 0; row < side; ++row)
     for (int column = 0; column < side; ++column) {
       const Eigen::Vector2d share((column + 0.5) / side, (row + 0.5) / side);
-      const Eigen::Vector2d place = map.hull_low + share.cwiseProduct(map.hull_high - map.hull_low);
-      if (rectification::raw_in_image(map, place)) grid_.push_back(place);
+      const Eigen::Vector2d position = map.hull_low + share.cwiseProduct(map.hull_high - map.hull_low);
+      if (rectification::raw_in_image(map, position)) grid_.push_back(position);
     }
   if (grid_.empty()) return;
   constexpr double least_share = 1e-3;

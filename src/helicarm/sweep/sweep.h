@@ -69,7 +69,7 @@ struct Sweep {
 
 /// Calibrates every image of a run alone and all of them on one path. Unreadable input (exit code 2) fails; a
 /// refusal of the run or of a frame is in the result. `progress`: share of the images that are done.
-Expected<Sweep> run_sweep(const SweepCase& given, const SweepOptions& options = {},
+Expected<Sweep> run_sweep(const SweepCase& the_case, const SweepOptions& options = {},
                           const std::function<void(double share)>& progress = {});
 
 /// sweep.json (docs/formats.md).

@@ -28,8 +28,8 @@ class SweepCaseFile : public testing::Test {
   }
   std::vector<std::string> names(const std::string& frames) {
     std::vector<std::string> names;
-    const SweepCase given = *read(frames);
-    for (const Frame& frame : given.frames) names.push_back(frame.view.name);
+    const SweepCase the_case = *read(frames);
+    for (const Frame& frame : the_case.frames) names.push_back(frame.view.name);
     return names;
   }
 
@@ -44,12 +44,12 @@ TEST_F(SweepCaseFile, AllNumberedFilesAreFrames) {
 TEST_F(SweepCaseFile, AGapInTheNumbersIsWarnedOf) {
   EXPECT_TRUE(read("all")->base.warnings.empty());
   std::filesystem::remove(folder_.path() / "run_003.png");
-  const auto given = read("all");
-  ASSERT_TRUE(given);
-  EXPECT_EQ(given->frames.size(), 3U);
-  ASSERT_EQ(given->base.warnings.size(), 1U);
-  EXPECT_EQ(given->base.warnings[0].reason, Reason::frames_missing);
-  EXPECT_THAT(given->base.warnings[0].message,
+  const auto the_case = read("all");
+  ASSERT_TRUE(the_case);
+  EXPECT_EQ(the_case->frames.size(), 3U);
+  ASSERT_EQ(the_case->base.warnings.size(), 1U);
+  EXPECT_EQ(the_case->base.warnings[0].reason, Reason::frames_missing);
+  EXPECT_THAT(the_case->base.warnings[0].message,
               testing::HasSubstr("1 of 4 numbers of the run have no image: 3"));
 }
 
@@ -59,11 +59,11 @@ TEST_F(SweepCaseFile, ARangeMayHaveAStep) {
 
 TEST_F(SweepCaseFile, AllItsImagesAreViewsOfAPhantomsCase) {
   ASSERT_TRUE(read("1-4:3"));
-  const auto given = read_phantom_case(folder_.path());
-  ASSERT_TRUE(given) << given.error().message;
-  ASSERT_EQ(given->views.size(), 2U);
-  EXPECT_EQ(given->views[1].name, "RUN/4");
-  EXPECT_EQ(given->views[1].image.filename(), "run_004.png");
+  const auto the_case = read_phantom_case(folder_.path());
+  ASSERT_TRUE(the_case) << the_case.error().message;
+  ASSERT_EQ(the_case->views.size(), 2U);
+  EXPECT_EQ(the_case->views[1].name, "RUN/4");
+  EXPECT_EQ(the_case->views[1].image.filename(), "run_004.png");
 }
 
 TEST_F(SweepCaseFile, MissingFilesAreNamed) {

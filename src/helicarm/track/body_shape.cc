@@ -165,7 +165,7 @@ void find_loose(const SequenceData& work, const BodyPlan& plan, std::vector<char
         {Reason::marker_loose,
          fmt::format("\"{}\" moved in the body \"{}\" by {:.2f} mm at frame {}: the body's pose "
                      "does not use it",
-                     work.given.markers[plan.markers[*worst]], plan.name, farthest.mm,
+                     work.the_case.markers[plan.markers[*worst]], plan.name, farthest.mm,
                      frames[farthest.frame]),
          {},
          {{"shift_mm", farthest.mm}, {"frame", double(frames[farthest.frame])}}});

@@ -109,27 +109,27 @@ void correct_delays(SequenceData& work, Sequence& sequence) {
 
 void warn_of_delays(const SequenceData& work, Sequence& sequence) {
   constexpr double in_step = 0.02;
-  const TrackCase& given = work.given;
+  const TrackCase& the_case = work.the_case;
   for (std::size_t k = 1; k < work.views; ++k) {
     const ViewDelay& delay = sequence.delays[k];
     if (!delay.is_known || std::abs(delay.frames) < in_step || std::abs(delay.frames) < 4 * delay.sigma)
       continue;
     Warning warning{
         Reason::cameras_not_in_step,
-        fmt::format("{} exposes {:.4f} frames {} {}, standard deviation {:.4f}", given.views[k].images.name,
-                    std::abs(delay.frames), delay.frames > 0 ? "after" : "before", given.views[0].images.name,
-                    delay.sigma),
-        given.views[k].images.name,
+        fmt::format("{} exposes {:.4f} frames {} {}, standard deviation {:.4f}",
+                    the_case.views[k].images.name, std::abs(delay.frames),
+                    delay.frames > 0 ? "after" : "before", the_case.views[0].images.name, delay.sigma),
+        the_case.views[k].images.name,
         {{"delay_frames", delay.frames}, {"sigma_frames", delay.sigma}}};
-    if (given.frame_rate_hz) {
-      warning.message += fmt::format(" ({:.3f} ms)", 1000 * delay.frames / *given.frame_rate_hz);
-      warning.figures["delay_ms"] = 1000 * delay.frames / *given.frame_rate_hz;
+    if (the_case.frame_rate_hz) {
+      warning.message += fmt::format(" ({:.3f} ms)", 1000 * delay.frames / *the_case.frame_rate_hz);
+      warning.figures["delay_ms"] = 1000 * delay.frames / *the_case.frame_rate_hz;
     }
     warning.message += ": its images are carried to the first camera's moment";
     if (const double whole = std::round(delay.frames); whole != 0)
       warning.message += fmt::format(
           "; unless the cameras differ so much, set its \"frame_offset\" to {:g} and follow again",
-          given.views[k].frame_offset - whole);
+          the_case.views[k].frame_offset - whole);
     sequence.warnings.push_back(std::move(warning));
   }
 }

@@ -19,7 +19,7 @@ constexpr double cut_mm = 5;        // of one marker
 double misfit_of(const SequenceData& work, const std::vector<Shape>& shapes, std::size_t f) {
   double sum = 0;
   for (std::size_t b = 0; b < shapes.size(); ++b) {
-    const BodyPlan& plan = work.given.bodies[b];
+    const BodyPlan& plan = work.the_case.bodies[b];
     const auto pose = pose_from(work, plan, shapes[b].in_body, f, std::vector<char>(plan.markers.size(), 1));
     for (std::size_t i = 0; i < plan.markers.size(); ++i) {
       const auto& point = work.points[f][plan.markers[i]];
@@ -69,7 +69,7 @@ std::optional<Exchange> exchange_in(SequenceData& work, const std::vector<Shape>
 
 void repair_exchanges(SequenceData& work, Sequence& sequence) {
   std::vector<Shape> shapes;
-  for (const BodyPlan& plan : work.given.bodies)
+  for (const BodyPlan& plan : work.the_case.bodies)
     shapes.push_back(shape_of(work, plan, std::vector<char>(plan.markers.size(), 1)));
   for (std::size_t f = 0; f < work.frames; ++f)
     while (const auto found = exchange_in(work, shapes, f)) {
@@ -84,9 +84,9 @@ void repair_exchanges(SequenceData& work, Sequence& sequence) {
           {Reason::markers_swapped,
            fmt::format("frame {}: the images of \"{}\" and \"{}\" were exchanged{}, against the geometry of "
                        "their bodies: they are exchanged back",
-                       sequence.frames[f], work.given.markers[found->first],
-                       work.given.markers[found->second], is_everywhere ? " in all views" : ""),
-           is_everywhere ? std::string() : work.given.views[found->view].images.name,
+                       sequence.frames[f], work.the_case.markers[found->first],
+                       work.the_case.markers[found->second], is_everywhere ? " in all views" : ""),
+           is_everywhere ? std::string() : work.the_case.views[found->view].images.name,
            {{"frame", double(sequence.frames[f])}}});
     }
 }

@@ -43,16 +43,16 @@ struct Match {
 
 class FirstFrames {
  public:
-  FirstFrames(const TrackCase& given, const FrameRange& frames)
-      : given_(given),
-        images_(value_or_throw(
-            SequenceImages::open(std::vector<SequenceView>(given.views.begin(), given.views.end()), frames))),
+  FirstFrames(const TrackCase& the_case, const FrameRange& frames)
+      : given_(the_case),
+        images_(value_or_throw(SequenceImages::open(
+            std::vector<SequenceView>(the_case.views.begin(), the_case.views.end()), frames))),
         frames_(frames),
         first_(value_or_throw(images_.at(frames.first))) {
     std::vector<Sight> middles;
     for (std::size_t k = 0; k < 2; ++k) {
       const auto& pixels = first_[k].pixels;
-      middles.push_back({&given.views[k].camera,
+      middles.push_back({&the_case.views[k].camera,
                          rectified(k, {(pixels.width() - 1) / 2.0, (pixels.height() - 1) / 2.0}), 1.0});
     }
     const auto met = sighted_point(middles);
@@ -253,22 +253,23 @@ Found found_markers(const FirstFrames& frames, std::size_t a, const std::vector<
   return found;
 }
 
-void warn(TrackCase& given, Reason reason, std::size_t view, const Eigen::Vector2d& at, std::string message) {
-  given.warnings.push_back(
-      {reason, std::move(message), given.views[view].images.name, {{"u_px", at.x()}, {"v_px", at.y()}}});
+void warn(TrackCase& the_case, Reason reason, std::size_t view, const Eigen::Vector2d& at,
+          std::string message) {
+  the_case.warnings.push_back(
+      {reason, std::move(message), the_case.views[view].images.name, {{"u_px", at.x()}, {"v_px", at.y()}}});
 }
 
-void find_all(TrackCase& given, const FirstFrames& frames, int frame) {
+void find_all(TrackCase& the_case, const FirstFrames& frames, int frame) {
   const auto first = frames.all_discs(0), second = frames.all_discs(1);
   Found found = found_markers(frames, 0, first, 1, second);
-  const std::string &a = given.views[0].images.name, &b = given.views[1].images.name;
+  const std::string &a = the_case.views[0].images.name, &b = the_case.views[1].images.name;
   if (found.certain.empty())
     throw BadInput(
         {Reason::not_seen,
          fmt::format(
              "picks: none, and in frame {} no disc of {:g} mm ({:.1f} px) in {} and one in {} are "
              "certainly one marker's ({} and {} discs): is \"diameter_mm\" right? Else pick the markers",
-             frame, given.diameter_mm, 2 * frames.middle_radius_px(0), a, b, first.size(), second.size()),
+             frame, the_case.diameter_mm, 2 * frames.middle_radius_px(0), a, b, first.size(), second.size()),
          {},
          {{"discs_first", double(first.size())}, {"discs_second", double(second.size())}}});
   std::ranges::sort(found.certain, [&](const Match& one, const Match& other) {
@@ -276,18 +277,18 @@ void find_all(TrackCase& given, const FirstFrames& frames, int frame) {
     return std::pair(p.x(), p.y()) < std::pair(q.x(), q.y());
   });
   for (const Match& match : found.certain) {
-    const std::size_t marker = given.markers.size();
-    given.markers.push_back(fmt::format("M{}", marker + 1));
-    given.picks.push_back({marker, 0, first[match.first].image.uv_raw});
-    given.picks.push_back({marker, 1, second[match.second].image.uv_raw});
+    const std::size_t marker = the_case.markers.size();
+    the_case.markers.push_back(fmt::format("M{}", marker + 1));
+    the_case.picks.push_back({marker, 0, first[match.first].image.uv_raw});
+    the_case.picks.push_back({marker, 1, second[match.second].image.uv_raw});
     const auto met = frames.meeting(0, first[match.first], 1, second[match.second]);
-    for (std::size_t k = 2; met && k < given.views.size(); ++k)
+    for (std::size_t k = 2; met && k < the_case.views.size(); ++k)
       if (const auto disc = frames.picked({marker, k, frames.raw(k, met->place)}))
-        given.picks.push_back({marker, k, disc->image.uv_raw});
+        the_case.picks.push_back({marker, k, disc->image.uv_raw});
   }
   for (const std::size_t i : found.ambiguous) {
     const Eigen::Vector2d& at = first[i].image.uv_raw;
-    warn(given, Reason::ambiguous_labels, 0, at,
+    warn(the_case, Reason::ambiguous_labels, 0, at,
          fmt::format(
              "frame {}: the disc at {:.1f}, {:.1f} has no certain partner in {}: it is left out; pick it in "
              "both views if it is a marker",
@@ -295,23 +296,23 @@ void find_all(TrackCase& given, const FirstFrames& frames, int frame) {
   }
 }
 
-std::size_t picks_of(const TrackCase& given, std::size_t marker) {
-  return std::size_t(std::ranges::count(given.picks, marker, &MarkerPick::marker));
+std::size_t picks_of(const TrackCase& the_case, std::size_t marker) {
+  return std::size_t(std::ranges::count(the_case.picks, marker, &MarkerPick::marker));
 }
 
 /// The other view's disc of each marker that is picked in one.
-void find_partners(TrackCase& given, const FirstFrames& frames, int frame) {
-  const std::vector<MarkerPick> picks = given.picks;
-  for (std::size_t a = 0; a < given.views.size(); ++a) {
+void find_partners(TrackCase& the_case, const FirstFrames& frames, int frame) {
+  const std::vector<MarkerPick> picks = the_case.picks;
+  for (std::size_t a = 0; a < the_case.views.size(); ++a) {
     std::vector<FirstDisc> first;
     std::vector<const MarkerPick*> of;
     for (const MarkerPick& pick : picks)
-      if (pick.view == a && picks_of(given, pick.marker) == 1)
+      if (pick.view == a && picks_of(the_case, pick.marker) == 1)
         if (const auto disc = frames.picked(pick)) {
           first.push_back(*disc);
           of.push_back(&pick);
         }
-    for (std::size_t b = 0; b < given.views.size() && !first.empty(); ++b) {
+    for (std::size_t b = 0; b < the_case.views.size() && !first.empty(); ++b) {
       if (b == a) continue;
       auto second = frames.all_discs(b);
       std::erase_if(second, [&](const FirstDisc& disc) {
@@ -320,31 +321,32 @@ void find_partners(TrackCase& given, const FirstFrames& frames, int frame) {
         });
       });
       for (const Match& match : found_markers(frames, a, first, b, second).certain)
-        if (picks_of(given, of[match.first]->marker) == 1)
-          given.picks.push_back({of[match.first]->marker, b, second[match.second].image.uv_raw});
+        if (picks_of(the_case, of[match.first]->marker) == 1)
+          the_case.picks.push_back({of[match.first]->marker, b, second[match.second].image.uv_raw});
     }
   }
   for (const MarkerPick& pick : picks)
-    if (picks_of(given, pick.marker) == 1)
-      warn(given, Reason::target_not_found, pick.view, pick.uv_raw,
+    if (picks_of(the_case, pick.marker) == 1)
+      warn(the_case, Reason::target_not_found, pick.view, pick.uv_raw,
            fmt::format(
                "frame {}: \"{}\" is picked in {} only, and no disc of the other views is certainly its "
                "own: it is not followed; pick it in a second view",
-               frame, given.markers[pick.marker], given.views[pick.view].images.name));
+               frame, the_case.markers[pick.marker], the_case.views[pick.view].images.name));
 }
 
 }  // namespace
 
-void complete_picks(TrackCase& given, const FrameRange& frames) {
-  const bool is_open = given.picks.empty() || std::ranges::any_of(given.picks, [&](const MarkerPick& pick) {
-                         return picks_of(given, pick.marker) == 1;
-                       });
-  if (!is_open || given.views.size() < 2) return;
-  const FirstFrames first(given, frames);
-  if (given.picks.empty())
-    find_all(given, first, frames.first);
+void complete_picks(TrackCase& the_case, const FrameRange& frames) {
+  const bool is_open =
+      the_case.picks.empty() || std::ranges::any_of(the_case.picks, [&](const MarkerPick& pick) {
+        return picks_of(the_case, pick.marker) == 1;
+      });
+  if (!is_open || the_case.views.size() < 2) return;
+  const FirstFrames first(the_case, frames);
+  if (the_case.picks.empty())
+    find_all(the_case, first, frames.first);
   else
-    find_partners(given, first, frames.first);
+    find_partners(the_case, first, frames.first);
 }
 
 }  // namespace helicarm::track

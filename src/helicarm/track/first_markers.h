@@ -11,7 +11,7 @@ namespace helicarm::track {
 /// up to 12, within the fits' errors, and no other match of a disc explains the images almost as well; what
 /// is ambiguous is left out with a warning (ambiguous_labels, target_not_found). Throws BadInput: not_seen
 /// where nothing is matched and no marker is picked, and as `SequenceImages`.
-void complete_picks(TrackCase& given, const case_registration::FrameRange& frames);
+void complete_picks(TrackCase& the_case, const case_registration::FrameRange& frames);
 
 /// Two discs that may be one marker's.
 struct DiscPair {

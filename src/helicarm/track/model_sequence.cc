@@ -25,9 +25,9 @@ using case_registration::CaseFollower;
 using case_registration::RegisteredFrame;
 using registration::Registration;
 
-std::vector<SequenceView> views_of(const pipeline::Case& given) {
+std::vector<SequenceView> views_of(const pipeline::Case& the_case) {
   std::vector<SequenceView> views;
-  for (const pipeline::CaseView& images : given.views) {
+  for (const pipeline::CaseView& images : the_case.views) {
     SequenceView& view = views.emplace_back(SequenceView{images, images.frame_offset.value_or(0), {}});
     if (images.camera) view.image_size = value_or_throw(exchange::import_matrix(*images.camera)).image_size;
   }
@@ -35,20 +35,20 @@ std::vector<SequenceView> views_of(const pipeline::Case& given) {
 }
 
 /// A text that two sequences share only if they are the same.
-std::string identity_of(const pipeline::Case& given, const case_registration::FrameRange& range,
+std::string identity_of(const pipeline::Case& the_case, const case_registration::FrameRange& range,
                         const case_registration::RegisterOptions& options, const CaseFollower& follower) {
   std::string text =
       fmt::format("{} {} {} {} {} {} {}", range.first, range.last, range.step, options.search.shift_mm,
                   options.search.turn_deg, options.run.motion_sigma_mm, options.run.max_error_mm.value_or(0));
-  for (const SequenceView& view : views_of(given))
+  for (const SequenceView& view : views_of(the_case))
     text +=
         fmt::format("\n{} {} {}", view.images.name, view.images.image.filename().string(), view.frame_offset);
   for (const geometry::View& camera : follower.cameras()) {
     const geometry::Projection projection = camera.projection();
     for (const double value : projection.reshaped()) text += fmt::format(" {}", value);
   }
-  for (const pipeline::CaseModel& model : given.models)
-    text += "\n" + model.name + pipeline::to_json(model, given.folder).dump();
+  for (const pipeline::CaseModel& model : the_case.models)
+    text += "\n" + model.name + pipeline::to_json(model, the_case.folder).dump();
   for (const Eigen::Vector3d& centre : follower.centres())
     text += fmt::format("\n{} {} {}", centre.x(), centre.y(), centre.z());
   return xray::digest(text);
@@ -165,7 +165,8 @@ void estimate_motion(ModelSequence& sequence, const std::vector<Eigen::Vector3d>
   sequence.relative = relative_motions(sequence.bodies);
 }
 
-Expected<ModelSequence> follow_models(const pipeline::Case& given, const case_registration::FrameRange& range,
+Expected<ModelSequence> follow_models(const pipeline::Case& the_case,
+                                      const case_registration::FrameRange& range,
                                       const case_registration::RegisterOptions& options,
                                       const FollowOptions& follow,
                                       const std::function<void(double share)>& on_frame,
@@ -175,19 +176,19 @@ Expected<ModelSequence> follow_models(const pipeline::Case& given, const case_re
       throw BadInput(Reason::usage, "resume: the folder of the interrupted run is not given");
     ModelSequence sequence;
     sequence.frames = range.numbers();
-    for (const pipeline::CaseModel& model : given.models) sequence.names.push_back(model.name);
-    const SequenceImages images = value_or_throw(SequenceImages::open(views_of(given), range));
+    for (const pipeline::CaseModel& model : the_case.models) sequence.names.push_back(model.name);
+    const SequenceImages images = value_or_throw(SequenceImages::open(views_of(the_case), range));
     CaseFollower follower = value_or_throw(
-        CaseFollower::begin(value_or_throw(pipeline::at_frame(given, range.first)), options, progress));
+        CaseFollower::begin(value_or_throw(pipeline::at_frame(the_case, range.first)), options, progress));
     sequence.warnings = images.warnings();
     sequence.warnings.insert(sequence.warnings.end(), follower.warnings().begin(), follower.warnings().end());
     const auto begun = std::chrono::steady_clock::now();
     const std::vector<Eigen::Vector3d> centres = follower.centres();
-    const std::string identity = identity_of(given, range, options, follower);
+    const std::string identity = identity_of(the_case, range, options, follower);
     std::vector<RegisteredFrame> kept;
     std::vector<ImageKeys> keys;
     std::vector<std::string> view_names;
-    for (const pipeline::CaseView& view : given.views) view_names.push_back(view.name);
+    for (const pipeline::CaseView& view : the_case.views) view_names.push_back(view.name);
     std::optional<ModelTables> tables;
     if (follow.out) {
       if (follow.resume) kept = kept_frames(*follow.out, identity, sequence.names, sequence.frames);

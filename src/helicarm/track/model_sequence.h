@@ -43,7 +43,8 @@ struct FollowOptions {
 /// changed, and the result is that of a run without an interruption; bad_value where they are of another
 /// case. `on_frame`: after each frame, with the share done. Fails as `SequenceImages` and `CaseFollower`;
 /// refusals are in the result.
-Expected<ModelSequence> follow_models(const pipeline::Case& given, const case_registration::FrameRange& range,
+Expected<ModelSequence> follow_models(const pipeline::Case& the_case,
+                                      const case_registration::FrameRange& range,
                                       const case_registration::RegisterOptions& options,
                                       const FollowOptions& follow,
                                       const std::function<void(double share)>& on_frame,

@@ -39,7 +39,7 @@ std::string markers_header() {
 }
 
 std::string marker_row(int frame, const std::string& name, const TrackedMarker& marker,
-                       const TrackCase& given) {
+                       const TrackCase& the_case) {
   std::string row = fmt::format("{},{}", frame, csv_field(name));
   if (marker.place) {
     const Eigen::Vector3d& at = marker.place->place;
@@ -51,7 +51,8 @@ std::string marker_row(int frame, const std::string& name, const TrackedMarker& 
   }
   row += marker.ray_gap_mm ? fmt::format(",{:.6g},", *marker.ray_gap_mm) : ",,";
   std::string views;
-  for (const std::size_t k : marker.views) views += (views.empty() ? "" : " ") + given.views[k].images.name;
+  for (const std::size_t k : marker.views)
+    views += (views.empty() ? "" : " ") + the_case.views[k].images.name;
   return row + csv_field(views) + "," + std::string(status_words[std::size_t(marker.status)]) + "\n";
 }
 
@@ -102,12 +103,12 @@ std::string relative_table(const std::vector<int>& frames, const std::vector<std
   return csv;
 }
 
-std::string sights_rows(const FrameSights& sights, const TrackCase& given) {
+std::string sights_rows(const FrameSights& sights, const TrackCase& the_case) {
   std::string rows;
   for (std::size_t m = 0; m < sights.of.size(); ++m)
-    for (std::size_t k = 0; k < given.views.size(); ++k) {
-      rows += fmt::format("{},{},{}", sights.frame, csv_field(given.markers[m]),
-                          csv_field(given.views[k].images.name));
+    for (std::size_t k = 0; k < the_case.views.size(); ++k) {
+      rows += fmt::format("{},{},{}", sights.frame, csv_field(the_case.markers[m]),
+                          csv_field(the_case.views[k].images.name));
       if (const auto& image = sights.of[m][k])
         rows += fmt::format(",{},{},{},{},{},{}", image->uv_raw.x(), image->uv_raw.y(), image->sigma_px,
                             image->radius_px, image->contrast, image->background);
@@ -118,20 +119,20 @@ std::string sights_rows(const FrameSights& sights, const TrackCase& given) {
   return rows;
 }
 
-std::vector<FrameSights> sights_from(const std::string& text, const TrackCase& given,
+std::vector<FrameSights> sights_from(const std::string& text, const TrackCase& the_case,
                                      const std::vector<int>& frames) {
   std::vector<FrameSights> read;
   if (!text.starts_with(sights_header())) return read;
   std::size_t at = sights_header().size();
   for (const int frame : frames) {
     FrameSights sights{frame, {}, 0};
-    for (std::size_t m = 0; m < given.markers.size(); ++m) {
-      auto& of = sights.of.emplace_back(given.views.size());
-      for (std::size_t k = 0; k < given.views.size(); ++k) {
+    for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
+      auto& of = sights.of.emplace_back(the_case.views.size());
+      for (std::size_t k = 0; k < the_case.views.size(); ++k) {
         const std::size_t end = text.find('\n', at);
         if (end == text.npos) return read;
-        const std::string begin = fmt::format("{},{},{},", frame, csv_field(given.markers[m]),
-                                              csv_field(given.views[k].images.name));
+        const std::string begin = fmt::format("{},{},{},", frame, csv_field(the_case.markers[m]),
+                                              csv_field(the_case.views[k].images.name));
         const std::string_view line(text.data() + at, end - at);
         if (!line.starts_with(begin)) return read;
         const auto fields = fields_of(line.substr(begin.size()));

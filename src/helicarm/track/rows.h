@@ -10,7 +10,7 @@ namespace helicarm::track {
 /// Headers and rows of the tables, with line ends.
 std::string markers_header();
 std::string marker_row(int frame, const std::string& name, const TrackedMarker& marker,
-                       const TrackCase& given);
+                       const TrackCase& the_case);
 std::string bodies_header(bool relative = false);
 std::string body_row(int frame, const std::string& names, const TrackedBody& body);
 
@@ -25,9 +25,9 @@ std::string relative_table(const std::vector<int>& frames, const std::vector<std
 
 /// sights.csv: where each marker is seen in each view of a frame, to the last bit.
 std::string sights_header();
-std::string sights_rows(const FrameSights& sights, const TrackCase& given);
+std::string sights_rows(const FrameSights& sights, const TrackCase& the_case);
 /// The frames in the text that are complete, in order, up to the first that is not of `frames`.
-std::vector<FrameSights> sights_from(const std::string& text, const TrackCase& given,
+std::vector<FrameSights> sights_from(const std::string& text, const TrackCase& the_case,
                                      const std::vector<int>& frames);
 
 }  // namespace helicarm::track

@@ -24,27 +24,28 @@ constexpr double sight_floor_px = 0.02;
 
 /// By the cameras' own covariance, common to all frames.
 Eigen::Matrix3d by_cameras(const SequenceData& work, const Eigen::Vector3d& place) {
-  if (work.given.camera_covariance.size() == 0) return Eigen::Matrix3d::Zero();
+  if (work.the_case.camera_covariance.size() == 0) return Eigen::Matrix3d::Zero();
   calibration::Calibration calibration;
   std::vector<localization::PointObservation> seen;
   for (std::size_t k = 0; k < work.views; ++k) {
     calibration::CalibratedView view;
-    view.name = work.given.views[k].images.name;
+    view.name = work.the_case.views[k].images.name;
     view.view = work.cameras[k];
-    view.covariance = work.given.camera_covariance.block<11, 11>(11 * Eigen::Index(k), 11 * Eigen::Index(k));
+    view.covariance =
+        work.the_case.camera_covariance.block<11, 11>(11 * Eigen::Index(k), 11 * Eigen::Index(k));
     calibration.views.push_back(view);
     if (work.cameras[k].depth(place) > 1)
       seen.push_back({k, work.cameras[k].project(place), 0.01 * Eigen::Matrix2d::Identity()});
   }
-  calibration.joint_covariance = work.given.camera_covariance;
+  calibration.joint_covariance = work.the_case.camera_covariance;
   const auto located = localization::locate("", localization::PointSource::pick, seen, calibration);
   if (!located || located->by_calibration.size() == 0) return Eigen::Matrix3d::Zero();
-  return located->by_calibration * work.given.camera_covariance * located->by_calibration.transpose();
+  return located->by_calibration * work.the_case.camera_covariance * located->by_calibration.transpose();
 }
 
 std::vector<MarkerDistance> distances_of(const SequenceData& work) {
   std::vector<MarkerDistance> distances;
-  for (const BodyPlan& body : work.given.bodies)
+  for (const BodyPlan& body : work.the_case.bodies)
     for (std::size_t i = 0; i < body.markers.size(); ++i)
       for (std::size_t k = i + 1; k < body.markers.size(); ++k) {
         double sum = 0, squares = 0;
@@ -66,9 +67,9 @@ std::vector<MarkerDistance> distances_of(const SequenceData& work) {
 }
 
 /// The images' sights, rectified.
-SequenceData data_of(const TrackCase& given, const std::vector<FrameSights>& sights, Sequence& sequence) {
-  SequenceData work{given, sights.size(), given.markers.size(), given.views.size(), {}, {}, {}, {}};
-  for (const TrackView& view : given.views) work.cameras.push_back(view.camera);
+SequenceData data_of(const TrackCase& the_case, const std::vector<FrameSights>& sights, Sequence& sequence) {
+  SequenceData work{the_case, sights.size(), the_case.markers.size(), the_case.views.size(), {}, {}, {}, {}};
+  for (const TrackView& view : the_case.views) work.cameras.push_back(view.camera);
   for (const FrameSights& frame : sights) {
     sequence.frames.push_back(frame.frame);
     sequence.repaired += frame.repaired;
@@ -80,7 +81,7 @@ SequenceData data_of(const TrackCase& given, const std::vector<FrameSights>& sig
         const auto& image = frame.of[m][k];
         images.push_back(image);
         if (!image) continue;
-        const auto& map = given.views[k].map;
+        const auto& map = the_case.views[k].map;
         const Eigen::Vector2d uv =
             map ? map->rectified_from_raw(image->uv_raw).value_or(image->uv_raw) : image->uv_raw;
         of[m][k] = Sight{&work.cameras[k], uv, std::hypot(image->sigma_px, sight_floor_px)};
@@ -113,9 +114,9 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
                   Sequence& sequence) {
   constexpr double lost_mm = 5;
   const auto holder = std::ranges::find_if(
-      work.given.bodies, [&](const BodyPlan& body) { return std::ranges::count(body.markers, m) > 0; });
+      work.the_case.bodies, [&](const BodyPlan& body) { return std::ranges::count(body.markers, m) > 0; });
   const auto by_body = [&](std::size_t f, bool by_others) {
-    const auto b = std::size_t(holder - work.given.bodies.begin());
+    const auto b = std::size_t(holder - work.the_case.bodies.begin());
     const auto i = std::size_t(std::ranges::find(holder->markers, m) - holder->markers.begin());
     return place_by_body(work, *holder, bodies[b], sequence.bodies[b], i, f, by_others);
   };
@@ -128,9 +129,9 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
     auto seen = work.seen(f, m);
     const auto& point = work.points[f][m];
     std::optional<FramePlace> by_others;
-    if (point && holder != work.given.bodies.end()) by_others = by_body(f, true);
+    if (point && holder != work.the_case.bodies.end()) by_others = by_body(f, true);
     const auto by_motion =
-        point && !by_others && holder != work.given.bodies.end() ? by_body(f, false) : std::nullopt;
+        point && !by_others && holder != work.the_case.bodies.end() ? by_body(f, false) : std::nullopt;
     const auto& check = by_others ? by_others : by_motion;
     const bool is_wrong = check && contradicts(*point, *check);
     if (is_wrong) seen.clear();
@@ -144,7 +145,7 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
       if (by_others) marker.place = with_sights(*by_others, seen);
     } else {
       std::optional<FramePlace> guess;
-      if (holder != work.given.bodies.end()) guess = by_body(f, false);
+      if (holder != work.the_case.bodies.end()) guess = by_body(f, false);
       if (!guess) {
         if (!is_smoothed) alone = smoothed_alone(work, m), is_smoothed = true;
         if (alone) guess = (*alone)[f];
@@ -171,13 +172,13 @@ void warn_of_lost_markers(const SequenceData& work, Sequence& sequence) {
     for (std::size_t f = 0; f < work.frames; ++f)
       if (sequence.markers[f][m].status == MarkerStatus::lost) lost.push_back(sequence.frames[f]);
     std::set<std::size_t> picked;
-    for (const MarkerPick& pick : work.given.picks)
+    for (const MarkerPick& pick : work.the_case.picks)
       if (pick.marker == m) picked.insert(pick.view);
     const bool never_placed = picked.size() == 1 && lost.size() == work.frames;
     if (!lost.empty())
       sequence.warnings.push_back(
           {Reason::marker_lost,
-           fmt::format("\"{}\" is lost in {} of {} frames, first in frame {}: {}", work.given.markers[m],
+           fmt::format("\"{}\" is lost in {} of {} frames, first in frame {}: {}", work.the_case.markers[m],
                        lost.size(), work.frames, lost.front(),
                        never_placed ? "it is picked in one view only, which places nothing"
                                     : "hidden in both views for too long, or outside the images"),
@@ -200,7 +201,7 @@ void warn_of_bodies_that_are_not_rigid(const SequenceData& work, Sequence& seque
              "the markers of the body \"{}\" move by {:.2f} mm against each other: one moves in its bone, or "
              "is another body's, by exchanged names (\"distances\" in track.json); the body's poses are not "
              "better than this",
-             work.given.bodies[b].name, body.deviation_mm),
+             work.the_case.bodies[b].name, body.deviation_mm),
          {},
          {{"deviation_mm", body.deviation_mm}}});
   }
@@ -229,10 +230,10 @@ std::optional<Failure> nothing_followed(const SequenceData& work, const Sequence
 
 }  // namespace
 
-Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights>& sights) {
+Sequence estimate_sequence(const TrackCase& the_case, const std::vector<FrameSights>& sights) {
   Sequence sequence;
-  sequence.warnings = given.warnings;
-  SequenceData work = data_of(given, sights, sequence);
+  sequence.warnings = the_case.warnings;
+  SequenceData work = data_of(the_case, sights, sequence);
   repair_exchanges(work, sequence);
   correct_delays(work, sequence);
   warn_of_delays(work, sequence);
@@ -240,10 +241,10 @@ Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights
   locate_all(work);
   sequence.correlation = correlation_of(work);
   sequence.distances = distances_of(work);
-  std::vector<Estimated> bodies(given.bodies.size());
-  sequence.bodies.resize(given.bodies.size());
+  std::vector<Estimated> bodies(the_case.bodies.size());
+  sequence.bodies.resize(the_case.bodies.size());
   for (std::size_t b = 0; b < bodies.size(); ++b)
-    estimate_body(work, given.bodies[b], bodies[b], sequence.bodies[b], sequence);
+    estimate_body(work, the_case.bodies[b], bodies[b], sequence.bodies[b], sequence);
   sequence.markers.assign(work.frames, std::vector<TrackedMarker>(work.markers));
   for (std::size_t m = 0; m < work.markers; ++m) place_marker(work, bodies, m, sequence);
   for (std::size_t f = 0; f < work.frames; ++f)

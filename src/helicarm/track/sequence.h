@@ -59,6 +59,6 @@ struct Sequence {
 };
 
 /// From the sights of all frames to markers, bodies and smooth motion.
-Sequence estimate_sequence(const TrackCase& given, const std::vector<FrameSights>& sights);
+Sequence estimate_sequence(const TrackCase& the_case, const std::vector<FrameSights>& sights);
 
 }  // namespace helicarm::track

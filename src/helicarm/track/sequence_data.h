@@ -13,7 +13,7 @@ using OptionalPlace = std::optional<Eigen::Vector3d>;
 
 /// The sequence's data while it is estimated.
 struct SequenceData {
-  const TrackCase& given;
+  const TrackCase& the_case;
   std::size_t frames, markers, views;
   std::vector<double> times;
   std::vector<geometry::View> cameras;

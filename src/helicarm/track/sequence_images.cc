@@ -87,10 +87,10 @@ Expected<SequenceImages> SequenceImages::open(std::span<const SequenceView> view
 }
 
 xray::XrayImage SequenceImages::as_read(std::size_t view, int frame) const {
-  const SequenceView& asked = views_[view];
-  return files_[view] ? value_or_throw(files_[view]->read(asked.images.name, frame + asked.frame_offset))
+  const SequenceView& source = views_[view];
+  return files_[view] ? value_or_throw(files_[view]->read(source.images.name, frame + source.frame_offset))
                       : value_or_throw(pipeline::image_of(
-                            value_or_throw(pipeline::at_number(asked.images, frame + asked.frame_offset))));
+                            value_or_throw(pipeline::at_number(source.images, frame + source.frame_offset))));
 }
 
 void SequenceImages::decide_polarity(const case_registration::FrameRange& frames) {
@@ -117,11 +117,11 @@ void SequenceImages::decide_polarity(const case_registration::FrameRange& frames
 }
 
 Expected<xray::XrayImage> SequenceImages::image(std::size_t view, int frame) const {
-  const SequenceView& asked = views_[view];
+  const SequenceView& source = views_[view];
   return guarded([&] {
     xray::XrayImage read = as_read(view, frame);
     xray::take_polarity(read, inverted_[view]);
-    check_size(asked.images.name, frame + asked.frame_offset, {read.pixels.width(), read.pixels.height()},
+    check_size(source.images.name, frame + source.frame_offset, {read.pixels.width(), read.pixels.height()},
                sizes_[view]);
     return read;
   });

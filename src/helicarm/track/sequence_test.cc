@@ -21,21 +21,21 @@ const std::vector<std::vector<Eigen::Vector3d>> bodies{
     {{9, 12, 25}, {-12, 3, 31}, {4, -11, 22}, {-3, 14, 36}}};
 
 TrackCase two_bodies() {
-  TrackCase given;
+  TrackCase the_case;
   for (const geometry::View& camera : two_cameras()) {
-    TrackView& view = given.views.emplace_back();
-    view.images.name = given.views.size() == 1 ? "A" : "B";
+    TrackView& view = the_case.views.emplace_back();
+    view.images.name = the_case.views.size() == 1 ? "A" : "B";
     view.camera = camera;
   }
   for (const auto& body : bodies) {
-    BodyPlan& plan = given.bodies.emplace_back();
-    plan.name = given.bodies.size() == 1 ? "jaw" : "skull";
+    BodyPlan& plan = the_case.bodies.emplace_back();
+    plan.name = the_case.bodies.size() == 1 ? "jaw" : "skull";
     for (std::size_t i = 0; i < body.size(); ++i) {
-      plan.markers.push_back(given.markers.size());
-      given.markers.push_back(plan.name[0] + std::to_string(i + 1));
+      plan.markers.push_back(the_case.markers.size());
+      the_case.markers.push_back(plan.name[0] + std::to_string(i + 1));
     }
   }
-  return given;
+  return the_case;
 }
 
 geometry::RigidTransform pose_at(std::size_t body, int frame) {
@@ -51,16 +51,16 @@ Eigen::Vector3d place_of(std::size_t marker, int frame, const Shift& shift) {
   return pose_at(body, frame) * (bodies[body][marker % 4] + shift(marker, frame));
 }
 
-std::vector<FrameSights> drawn(const TrackCase& given, const Shift& shift) {
+std::vector<FrameSights> drawn(const TrackCase& the_case, const Shift& shift) {
   std::mt19937 random(4);
   std::normal_distribution<double> normal;
   std::vector<FrameSights> made;
   for (int f = 1; f <= frames; ++f) {
     FrameSights& sights = made.emplace_back();
     sights.frame = f;
-    for (std::size_t m = 0; m < given.markers.size(); ++m) {
+    for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
       auto& of = sights.of.emplace_back();
-      for (const TrackView& view : given.views)
+      for (const TrackView& view : the_case.views)
         of.push_back(MarkerImage{view.camera.project(place_of(m, f, shift)) +
                                      noise_px * Eigen::Vector2d(normal(random), normal(random)),
                                  noise_px, 2, 60, 120});
@@ -85,11 +85,11 @@ const Warning* warning_of(const Sequence& sequence, Reason reason) {
 }
 
 TEST(Sequence, PlacesAndPosesAreWithinTheirBands) {
-  const TrackCase given = two_bodies();
-  const Sequence sequence = estimate_sequence(given, drawn(given, none));
+  const TrackCase the_case = two_bodies();
+  const Sequence sequence = estimate_sequence(the_case, drawn(the_case, none));
   int inside = 0, all = 0;
   for (std::size_t f = 1; f < sequence.frames.size(); ++f) {
-    for (std::size_t m = 0; m < given.markers.size(); ++m) {
+    for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
       const FramePlace& place = *sequence.markers[f][m].place;
       const Eigen::Vector3d off = place.place - place_of(m, int(f) + 1, none);
       for (int k = 0; k < 3; ++k, ++all)
@@ -107,11 +107,11 @@ TEST(Sequence, PlacesAndPosesAreWithinTheirBands) {
 }
 
 TEST(Sequence, SwapOfTwoMarkersIsRepaired) {
-  const TrackCase given = two_bodies();
+  const TrackCase the_case = two_bodies();
   for (const std::size_t other : {std::size_t(2), std::size_t(6)}) {  // of the same body, of the other
-    auto sights = drawn(given, none);
+    auto sights = drawn(the_case, none);
     std::swap(sights[19].of[1], sights[19].of[other]);
-    const Sequence sequence = estimate_sequence(given, sights);
+    const Sequence sequence = estimate_sequence(the_case, sights);
     EXPECT_EQ(sequence.repaired, 1);
     EXPECT_LT(farthest(sequence, none), 0.3);
     const Warning* warning = warning_of(sequence, Reason::markers_swapped);
@@ -121,10 +121,10 @@ TEST(Sequence, SwapOfTwoMarkersIsRepaired) {
 }
 
 TEST(Sequence, SwapInOneViewIsRepaired) {
-  const TrackCase given = two_bodies();
-  auto sights = drawn(given, none);
+  const TrackCase the_case = two_bodies();
+  auto sights = drawn(the_case, none);
   std::swap(sights[11].of[4][1], sights[11].of[7][1]);
-  const Sequence sequence = estimate_sequence(given, sights);
+  const Sequence sequence = estimate_sequence(the_case, sights);
   EXPECT_EQ(sequence.repaired, 1);
   EXPECT_LT(farthest(sequence, none), 0.3);
   const Warning* warning = warning_of(sequence, Reason::markers_swapped);
@@ -133,23 +133,23 @@ TEST(Sequence, SwapInOneViewIsRepaired) {
 }
 
 TEST(Sequence, DiscThatIsNotTheMarkersIsNotItsPlace) {
-  const TrackCase given = two_bodies();
-  auto sights = drawn(given, none);
+  const TrackCase the_case = two_bodies();
+  auto sights = drawn(the_case, none);
   for (std::size_t k = 0; k < 2; ++k)
     sights[24].of[3][k]->uv_raw =
-        given.views[k].camera.project(place_of(3, 25, none) + Eigen::Vector3d(4, -3, 2));
-  const Sequence sequence = estimate_sequence(given, sights);
+        the_case.views[k].camera.project(place_of(3, 25, none) + Eigen::Vector3d(4, -3, 2));
+  const Sequence sequence = estimate_sequence(the_case, sights);
   EXPECT_EQ(sequence.markers[24][3].status, MarkerStatus::predicted);
   EXPECT_LT(farthest(sequence, none), 0.5);
   EXPECT_EQ(sequence.bodies[0].frames[24].decision, PoseDecision::warn);
 }
 
 TEST(Sequence, LooseMarkerIsNamed) {
-  const TrackCase given = two_bodies();
+  const TrackCase the_case = two_bodies();
   const Shift loose = [](std::size_t marker, int frame) {
     return marker == 5 && frame >= 22 ? Eigen::Vector3d(0.6, -0.5, 0.2) : Eigen::Vector3d(0, 0, 0);
   };
-  const Sequence sequence = estimate_sequence(given, drawn(given, loose));
+  const Sequence sequence = estimate_sequence(the_case, drawn(the_case, loose));
   const Warning* warning = warning_of(sequence, Reason::marker_loose);
   ASSERT_TRUE(warning);
   EXPECT_NE(warning->message.find("\"s2\" moved in the body \"skull\""), std::string::npos);
@@ -159,30 +159,30 @@ TEST(Sequence, LooseMarkerIsNamed) {
 }
 
 TEST(Sequence, NamesExchangedBetweenBodiesAreSuspected) {
-  TrackCase given = two_bodies();
-  std::swap(given.bodies[0].markers[2], given.bodies[1].markers[1]);
-  const Sequence sequence = estimate_sequence(given, drawn(given, none));
+  TrackCase the_case = two_bodies();
+  std::swap(the_case.bodies[0].markers[2], the_case.bodies[1].markers[1]);
+  const Sequence sequence = estimate_sequence(the_case, drawn(the_case, none));
   EXPECT_TRUE(warning_of(sequence, Reason::marker_loose));
 }
 
 TEST(Sequence, MarkersThatMoveAgainstEachOtherAllTheTimeAreNoBody) {
-  const TrackCase given = two_bodies();
+  const TrackCase the_case = two_bodies();
   const Shift wobble = [](std::size_t marker, int frame) {
     return Eigen::Vector3d(marker == 5 ? 1.5 * std::sin(0.9 * frame) : 0, 0, 0);
   };
-  const Sequence sequence = estimate_sequence(given, drawn(given, wobble));
+  const Sequence sequence = estimate_sequence(the_case, drawn(the_case, wobble));
   const Warning* warning = warning_of(sequence, Reason::marker_loose);
   ASSERT_TRUE(warning);
   EXPECT_NE(warning->message.find("\"skull\" move by"), std::string::npos) << warning->message;
-  EXPECT_FALSE(warning_of(estimate_sequence(given, drawn(given, none)), Reason::marker_loose));
+  EXPECT_FALSE(warning_of(estimate_sequence(the_case, drawn(the_case, none)), Reason::marker_loose));
 }
 
 TEST(Sequence, SmoothMotionEndsWithItsPoses) {
-  const TrackCase given = two_bodies();
-  auto sights = drawn(given, none);
+  const TrackCase the_case = two_bodies();
+  auto sights = drawn(the_case, none);
   for (std::size_t f = 30; f < sights.size(); ++f)
     for (std::size_t m = 4; m < 8; ++m) sights[f].of[m].assign(2, std::nullopt);
-  const Sequence sequence = estimate_sequence(given, sights);
+  const Sequence sequence = estimate_sequence(the_case, sights);
   const BodySequence& skull = sequence.bodies[1];
   EXPECT_TRUE(skull.smoothed[29].pose);
   for (std::size_t f = 30; f < sights.size(); ++f) {
@@ -194,12 +194,12 @@ TEST(Sequence, SmoothMotionEndsWithItsPoses) {
 }
 
 TEST(Sequence, WhereNoBodyHasAPoseNothingWasFollowed) {
-  const TrackCase given = two_bodies();
-  auto sights = drawn(given, none);
+  const TrackCase the_case = two_bodies();
+  auto sights = drawn(the_case, none);
   for (FrameSights& frame : sights)
-    for (std::size_t m = 0; m < given.markers.size(); ++m)
+    for (std::size_t m = 0; m < the_case.markers.size(); ++m)
       if (m % 4 >= 2) frame.of[m].assign(2, std::nullopt);
-  const Sequence sequence = estimate_sequence(given, sights);
+  const Sequence sequence = estimate_sequence(the_case, sights);
   ASSERT_TRUE(sequence.failure);
   EXPECT_EQ(sequence.failure->reason, Reason::marker_lost);
 }

@@ -218,25 +218,25 @@ bool is_enough(std::span<const std::optional<Measured>> measured) {
 std::optional<SmoothMotion> smooth_poses(std::span<const double> times,
                                          std::span<const std::optional<FramePose>> measured,
                                          const Eigen::Vector3d& centre_in_body, NoiseScale scale) {
-  std::vector<std::optional<Measured>> given;
+  std::vector<std::optional<Measured>> states;
   for (const auto& frame : measured) {
-    auto& made = given.emplace_back();
+    auto& made = states.emplace_back();
     if (!frame) continue;
     State at;
     at.rotation = frame->pose.rotation;
     at.centre = frame->pose * centre_in_body;
     made = Measured{at, frame->covariance};
   }
-  if (!is_enough(given)) return std::nullopt;
+  if (!is_enough(states)) return std::nullopt;
   SmoothMotion motion;
-  motion.prior = likeliest(times, given, true, scale);
-  const Filtered filtered = filter(times, given, motion.prior, true, true);
+  motion.prior = likeliest(times, states, true, scale);
+  const Filtered filtered = filter(times, states, motion.prior, true, true);
   const double factor = filtered.variance_factor(scale);
   for (const Smoothed& frame : smoothed(filtered))
     motion.frames.push_back(
         {{frame.state.rotation, frame.state.centre - frame.state.rotation * centre_in_body},
          factor * frame.covariance});
-  if (factor < 1) add_shared(motion.frames, given, 1 - factor);
+  if (factor < 1) add_shared(motion.frames, states, 1 - factor);
   motion.prior.turn *= factor;
   motion.prior.shift *= factor;
   motion.noise_factor = std::sqrt(factor);
@@ -245,18 +245,18 @@ std::optional<SmoothMotion> smooth_poses(std::span<const double> times,
 
 std::optional<std::vector<FramePlace>> smooth_places(std::span<const double> times,
                                                      std::span<const std::optional<FramePlace>> measured) {
-  std::vector<std::optional<Measured>> given;
+  std::vector<std::optional<Measured>> states;
   for (const auto& frame : measured) {
-    auto& made = given.emplace_back();
+    auto& made = states.emplace_back();
     if (!frame) continue;
     made = Measured{{}, Matrix6::Identity()};
     made->at.centre = frame->place;
     made->covariance.bottomRightCorner<3, 3>() = frame->covariance;
   }
-  if (!is_enough(given)) return std::nullopt;
-  const MotionPrior prior = likeliest(times, given, false, NoiseScale::stated);
+  if (!is_enough(states)) return std::nullopt;
+  const MotionPrior prior = likeliest(times, states, false, NoiseScale::stated);
   std::vector<FramePlace> places;
-  for (const Smoothed& frame : smoothed(filter(times, given, prior, false, true)))
+  for (const Smoothed& frame : smoothed(filter(times, states, prior, false, true)))
     places.push_back({frame.state.centre, frame.covariance.bottomRightCorner<3, 3>()});
   return places;
 }

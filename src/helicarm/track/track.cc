@@ -22,18 +22,18 @@ namespace fs = std::filesystem;
 constexpr std::uintmax_t most_bytes = std::uintmax_t(1) << 30;
 
 /// A text that two cases share only if their sequences are the same.
-std::string identity_of(const TrackCase& given, const case_registration::FrameRange& frames) {
-  std::string text = fmt::format("{} {} {} {}", frames.first, frames.last, frames.step, given.diameter_mm);
-  for (const TrackView& view : given.views) {
+std::string identity_of(const TrackCase& the_case, const case_registration::FrameRange& frames) {
+  std::string text = fmt::format("{} {} {} {}", frames.first, frames.last, frames.step, the_case.diameter_mm);
+  for (const TrackView& view : the_case.views) {
     text +=
         fmt::format("\n{} {} {}", view.images.name, view.images.image.filename().string(), view.frame_offset);
     const geometry::Projection projection = view.camera.projection();
     for (const double value : projection.reshaped()) text += fmt::format(" {}", value);
   }
-  for (const std::string& marker : given.markers) text += "\n" + marker;
-  for (const MarkerPick& pick : given.picks)
+  for (const std::string& marker : the_case.markers) text += "\n" + marker;
+  for (const MarkerPick& pick : the_case.picks)
     text += fmt::format("\n{} {} {} {}", pick.marker, pick.view, pick.uv_raw.x(), pick.uv_raw.y());
-  for (const BodyPlan& body : given.bodies) {
+  for (const BodyPlan& body : the_case.bodies) {
     text += "\n" + body.name;
     for (const std::size_t marker : body.markers) text += fmt::format(" {}", marker);
     for (const Eigen::Vector3d& place : body.geometry)
@@ -42,9 +42,9 @@ std::string identity_of(const TrackCase& given, const case_registration::FrameRa
   return xray::digest(text);
 }
 
-std::vector<std::string> names_of_views(const TrackCase& given) {
+std::vector<std::string> names_of_views(const TrackCase& the_case) {
   std::vector<std::string> names;
-  for (const TrackView& view : given.views) names.push_back(view.images.name);
+  for (const TrackView& view : the_case.views) names.push_back(view.images.name);
   return names;
 }
 
@@ -58,26 +58,28 @@ struct GrowingTables {
         markers(folder / "markers.csv", markers_header()),
         bodies(folder / "bodies.csv", bodies_header()) {}
 
-  void add(const FrameSights& seen, const ImageKeys& keys, const Tracker& tracker, const TrackCase& given) {
+  void add(const FrameSights& seen, const ImageKeys& keys, const Tracker& tracker,
+           const TrackCase& the_case) {
     std::string marker_rows, body_rows;
     const Tracker::Snapshot now = tracker.snapshot(seen);
-    for (std::size_t m = 0; m < given.markers.size(); ++m)
-      marker_rows += marker_row(seen.frame, given.markers[m], now.markers[m], given);
-    for (std::size_t b = 0; b < given.bodies.size(); ++b)
-      body_rows += body_row(seen.frame, csv_field(given.bodies[b].name), now.bodies[b]);
+    for (std::size_t m = 0; m < the_case.markers.size(); ++m)
+      marker_rows += marker_row(seen.frame, the_case.markers[m], now.markers[m], the_case);
+    for (std::size_t b = 0; b < the_case.bodies.size(); ++b)
+      body_rows += body_row(seen.frame, csv_field(the_case.bodies[b].name), now.bodies[b]);
     markers.add(marker_rows);
     bodies.add(body_rows);
-    images.add(image_keys_rows(seen.frame, names_of_views(given), keys));
-    sights.add(sights_rows(seen, given));
+    images.add(image_keys_rows(seen.frame, names_of_views(the_case), keys));
+    sights.add(sights_rows(seen, the_case));
   }
 };
 
-Expected<SequenceImages> open_images(const TrackCase& given, const case_registration::FrameRange& frames) {
-  return SequenceImages::open(std::vector<SequenceView>(given.views.begin(), given.views.end()), frames);
+Expected<SequenceImages> open_images(const TrackCase& the_case, const case_registration::FrameRange& frames) {
+  return SequenceImages::open(std::vector<SequenceView>(the_case.views.begin(), the_case.views.end()),
+                              frames);
 }
 
 /// The frames that an interrupted run left in the folder.
-std::vector<FrameSights> kept_frames(const fs::path& folder, const TrackCase& given,
+std::vector<FrameSights> kept_frames(const fs::path& folder, const TrackCase& the_case,
                                      const std::string& identity, const std::vector<int>& numbers) {
   std::error_code ignored;
   if (!fs::exists(folder / "sights.csv", ignored)) return {};
@@ -88,42 +90,42 @@ std::vector<FrameSights> kept_frames(const fs::path& folder, const TrackCase& gi
         fmt::format("--resume: {} holds rows of another sequence, case or range of frames: run without "
                     "--resume, or with another --out",
                     folder.string()));
-  return sights_from(value_or_throw(read_file(folder / "sights.csv", most_bytes)), given, numbers);
+  return sights_from(value_or_throw(read_file(folder / "sights.csv", most_bytes)), the_case, numbers);
 }
 
 /// Of the images that these frames were seen in; empty where an earlier version wrote them.
-std::vector<ImageKeys> kept_keys(const fs::path& folder, const TrackCase& given,
+std::vector<ImageKeys> kept_keys(const fs::path& folder, const TrackCase& the_case,
                                  const std::vector<int>& numbers) {
   const auto text = read_file(folder / "images.csv", most_bytes);
-  return text ? image_keys_from(*text, names_of_views(given), numbers) : std::vector<ImageKeys>{};
+  return text ? image_keys_from(*text, names_of_views(the_case), numbers) : std::vector<ImageKeys>{};
 }
 
 }  // namespace
 
-Expected<Sequence> run_track(const TrackCase& given, const case_registration::FrameRange& frames,
+Expected<Sequence> run_track(const TrackCase& the_case, const case_registration::FrameRange& frames,
                              const TrackOptions& options, const OnFrame& on_frame) {
   return guarded([&] {
     const auto begun = std::chrono::steady_clock::now();
     const std::vector<int> numbers = frames.numbers();
-    const SequenceImages images = value_or_throw(open_images(given, frames));
-    const std::string identity = identity_of(given, frames);
+    const SequenceImages images = value_or_throw(open_images(the_case, frames));
+    const std::string identity = identity_of(the_case, frames);
     std::vector<FrameSights> kept;
-    if (options.out && options.resume) kept = kept_frames(*options.out, given, identity, numbers);
+    if (options.out && options.resume) kept = kept_frames(*options.out, the_case, identity, numbers);
     const auto first = value_or_throw(images.at(numbers.front()));
     std::vector<ImageKeys> keys;
-    if (!kept.empty()) keys = kept_keys(*options.out, given, numbers);
+    if (!kept.empty()) keys = kept_keys(*options.out, the_case, numbers);
     // An image that changed since then makes its frame, and those after it, another sequence.
     const auto keep_unchanged = [&](std::size_t i, const ImageKeys& now) {
       if (i >= kept.size()) return;
       const std::string changed =
-          changed_image(numbers[i], names_of_views(given), i < keys.size() ? keys[i] : ImageKeys{}, now);
+          changed_image(numbers[i], names_of_views(the_case), i < keys.size() ? keys[i] : ImageKeys{}, now);
       if (changed.empty()) return;
       kept.resize(i);
       if (options.on_note) options.on_note(changed);
     };
     ImageKeys now_keys = keys_of(first);
     keep_unchanged(0, now_keys);
-    Tracker tracker = value_or_throw(Tracker::begin(given, numbers.front(), first));
+    Tracker tracker = value_or_throw(Tracker::begin(the_case, numbers.front(), first));
     std::optional<GrowingTables> tables;
     if (options.out) {
       std::error_code ignored;
@@ -133,7 +135,7 @@ Expected<Sequence> run_track(const TrackCase& given, const case_registration::Fr
     }
     std::vector<FrameSights> sights{tracker.first()};
     const auto done = [&] {
-      if (tables) tables->add(sights.back(), now_keys, tracker, given);
+      if (tables) tables->add(sights.back(), now_keys, tracker, the_case);
       if (on_frame) on_frame(int(sights.size()));
     };
     done();
@@ -153,7 +155,7 @@ Expected<Sequence> run_track(const TrackCase& given, const case_registration::Fr
       tracker.absorb(sights.back());
       done();
     }
-    Sequence sequence = estimate_sequence(given, sights);
+    Sequence sequence = estimate_sequence(the_case, sights);
     sequence.warnings.insert(sequence.warnings.end(), images.warnings().begin(), images.warnings().end());
     sequence.warnings.insert(sequence.warnings.end(), tracker.warnings().begin(), tracker.warnings().end());
     sequence.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();

@@ -25,31 +25,31 @@ using OnFrame = std::function<void(int done)>;
 /// `resume` the frames in sights.csv are not looked at again, up to one whose image has changed, and the
 /// result is that of a run without an interruption; bad_value where they are of another case. Fails as
 /// `SequenceImages` and `Tracker::begin`.
-Expected<Sequence> run_track(const TrackCase& given, const case_registration::FrameRange& frames,
+Expected<Sequence> run_track(const TrackCase& the_case, const case_registration::FrameRange& frames,
                              const TrackOptions& options = {}, const OnFrame& on_frame = {});
 
 /// track.json (docs/formats.md); `refusal`: of a sequence that has no result.
-Json to_json(const Sequence& sequence, const TrackCase& given);
+Json to_json(const Sequence& sequence, const TrackCase& the_case);
 Json refused_json(const Failure& refusal);
 
-std::string markers_csv(const Sequence& sequence, const TrackCase& given);
-std::string bodies_csv(const Sequence& sequence, const TrackCase& given);
-std::string smoothed_csv(const Sequence& sequence, const TrackCase& given);
-std::string relative_csv(const Sequence& sequence, const TrackCase& given);
+std::string markers_csv(const Sequence& sequence, const TrackCase& the_case);
+std::string bodies_csv(const Sequence& sequence, const TrackCase& the_case);
+std::string smoothed_csv(const Sequence& sequence, const TrackCase& the_case);
+std::string relative_csv(const Sequence& sequence, const TrackCase& the_case);
 
 /// XMALab's 2-D points: a row per frame, MARKER_CAM_X and MARKER_CAM_Y of each marker and view, raw
 /// (distorted) pixels from 0 with y downwards, NaN where not seen; its defaults on import.
-std::string points2d_csv(const Sequence& sequence, const TrackCase& given);
+std::string points2d_csv(const Sequence& sequence, const TrackCase& the_case);
 /// XMALab's 3-D points: MARKER_X, MARKER_Y, MARKER_Z, mm.
-std::string points3d_csv(const Sequence& sequence, const TrackCase& given);
+std::string points3d_csv(const Sequence& sequence, const TrackCase& the_case);
 /// Autoscoper's tracking of a body: a row per frame, the 16 numbers of its smoothed pose by rows, mm.
 std::string tra_of(const BodySequence& body);
 
 /// report.html as one page.
-std::string track_report(const Sequence& sequence, const TrackCase& given);
+std::string track_report(const Sequence& sequence, const TrackCase& the_case);
 
 /// Writes everything into the folder.
-Expected<void> write_track(const Sequence& sequence, const TrackCase& given,
+Expected<void> write_track(const Sequence& sequence, const TrackCase& the_case,
                            const std::filesystem::path& folder);
 
 /// Removes what `write_track` and `run_track` wrote into the folder earlier.

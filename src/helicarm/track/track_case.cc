@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t most_markers = 200;
 
 /// Cameras of files, or of saved calibrations.
-void read_cameras(TrackCase& read, const pipeline::Case& given, const std::string& origin) {
+void read_cameras(TrackCase& read, const pipeline::Case& the_case, const std::string& origin) {
   constexpr Eigen::Index each = calibration::view_parameters;
   std::map<fs::path, calibration::SavedCalibration> calibrations;
   for (std::size_t i = 0; i < read.views.size(); ++i) {
@@ -36,7 +36,7 @@ void read_cameras(TrackCase& read, const pipeline::Case& given, const std::strin
       read.warnings.insert(read.warnings.end(), camera.warnings.begin(), camera.warnings.end());
       continue;
     }
-    const fs::path& file = view.images.calibration ? *view.images.calibration : *given.calibration;
+    const fs::path& file = view.images.calibration ? *view.images.calibration : *the_case.calibration;
     if (!calibrations.contains(file))
       calibrations[file] = value_or_throw(calibration::saved_calibration_from_json(
           value_or_throw(read_json(file)), file.filename().string()));

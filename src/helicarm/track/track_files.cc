@@ -45,10 +45,10 @@ Json json_of(const Warning& warning) {
   return json;
 }
 
-Json json_of(const BodySequence& body, const BodyPlan& plan, const TrackCase& given) {
+Json json_of(const BodySequence& body, const BodyPlan& plan, const TrackCase& the_case) {
   Json json = {{"name", plan.name}, {"markers", Json::array()}};
   for (const PlacedMarker& marker : body.markers)
-    json["markers"].push_back({{"name", given.markers[marker.marker]},
+    json["markers"].push_back({{"name", the_case.markers[marker.marker]},
                                {"in_body_mm", json_list(marker.in_body.place)},
                                {"covariance_mm2", json_rows(marker.in_body.covariance)},
                                {"deviation_mm", marker.loose_mm},
@@ -68,9 +68,9 @@ Json json_of(const BodySequence& body, const BodyPlan& plan, const TrackCase& gi
   return json;
 }
 
-std::vector<std::string> names_of(const TrackCase& given) {
+std::vector<std::string> names_of(const TrackCase& the_case) {
   std::vector<std::string> bodies;
-  for (const BodyPlan& body : given.bodies) bodies.push_back(body.name);
+  for (const BodyPlan& body : the_case.bodies) bodies.push_back(body.name);
   return bodies;
 }
 
@@ -88,7 +88,7 @@ Json refused_json(const Failure& refusal) {
           {"version", HELICARM_VERSION}};
 }
 
-Json to_json(const Sequence& sequence, const TrackCase& given) {
+Json to_json(const Sequence& sequence, const TrackCase& the_case) {
   Json json = {{"format", "helicarm-track/1"},
                {"status", sequence.failure ? "refused" : "ok"},
                {"failure", sequence.failure ? pipeline::to_json(*sequence.failure) : Json()},
@@ -106,62 +106,64 @@ Json to_json(const Sequence& sequence, const TrackCase& given) {
                {"distances", Json::array()},
                {"decisions", Json::object()}};
   for (const Warning& warning : sequence.warnings) json["warnings"].push_back(json_of(warning));
-  for (std::size_t k = 0; k < given.views.size(); ++k) {
+  for (std::size_t k = 0; k < the_case.views.size(); ++k) {
     const ViewDelay& delay = sequence.delays[k];
     std::optional<double> milliseconds;
-    if (delay.is_known && given.frame_rate_hz) milliseconds = 1000 * delay.frames / *given.frame_rate_hz;
-    json["views"].push_back({{"name", given.views[k].images.name},
-                             {"frame_offset", given.views[k].frame_offset},
+    if (delay.is_known && the_case.frame_rate_hz)
+      milliseconds = 1000 * delay.frames / *the_case.frame_rate_hz;
+    json["views"].push_back({{"name", the_case.views[k].images.name},
+                             {"frame_offset", the_case.views[k].frame_offset},
                              {"delay_frames", delay.is_known ? Json(delay.frames) : Json(nullptr)},
                              {"delay_sigma_frames", delay.is_known ? Json(delay.sigma) : Json(nullptr)},
                              {"delay_ms", optional_json(milliseconds)}});
   }
-  for (std::size_t m = 0; m < given.markers.size(); ++m) {
+  for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
     std::array<int, 4> counts{};
     for (const auto& frame : sequence.markers) ++counts[std::size_t(frame[m].status)];
-    Json marker = {{"name", given.markers[m]}};
+    Json marker = {{"name", the_case.markers[m]}};
     for (std::size_t i = 0; i < counts.size(); ++i) marker[std::string(status_words[i])] = counts[i];
     marker["sigma_factor"] = sequence.sigma_factor[m];
     json["markers"].push_back(std::move(marker));
   }
-  for (std::size_t b = 0; b < given.bodies.size(); ++b) {
-    json["bodies"].push_back(json_of(sequence.bodies[b], given.bodies[b], given));
-    json["decisions"][given.bodies[b].name] = decisions_json(sequence.bodies[b].frames);
+  for (std::size_t b = 0; b < the_case.bodies.size(); ++b) {
+    json["bodies"].push_back(json_of(sequence.bodies[b], the_case.bodies[b], the_case));
+    json["decisions"][the_case.bodies[b].name] = decisions_json(sequence.bodies[b].frames);
   }
   for (const MarkerDistance& distance : sequence.distances)
-    json["distances"].push_back({{"markers", {given.markers[distance.first], given.markers[distance.second]}},
-                                 {"mean_mm", distance.mean_mm},
-                                 {"sd_mm", distance.deviation_mm},
-                                 {"frames", distance.frames}});
+    json["distances"].push_back(
+        {{"markers", {the_case.markers[distance.first], the_case.markers[distance.second]}},
+         {"mean_mm", distance.mean_mm},
+         {"sd_mm", distance.deviation_mm},
+         {"frames", distance.frames}});
   json["seconds"] = sequence.seconds;
   json["version"] = HELICARM_VERSION;
   return json;
 }
 
-std::string markers_csv(const Sequence& sequence, const TrackCase& given) {
+std::string markers_csv(const Sequence& sequence, const TrackCase& the_case) {
   std::string csv = markers_header();
   for (std::size_t f = 0; f < sequence.frames.size(); ++f)
-    for (std::size_t m = 0; m < given.markers.size(); ++m)
-      csv += marker_row(sequence.frames[f], given.markers[m], sequence.markers[f][m], given);
+    for (std::size_t m = 0; m < the_case.markers.size(); ++m)
+      csv += marker_row(sequence.frames[f], the_case.markers[m], sequence.markers[f][m], the_case);
   return csv;
 }
 
-std::string bodies_csv(const Sequence& sequence, const TrackCase& given) {
-  return bodies_table(sequence.frames, names_of(given), sequence.bodies, &BodySequence::frames);
+std::string bodies_csv(const Sequence& sequence, const TrackCase& the_case) {
+  return bodies_table(sequence.frames, names_of(the_case), sequence.bodies, &BodySequence::frames);
 }
 
-std::string smoothed_csv(const Sequence& sequence, const TrackCase& given) {
-  return bodies_table(sequence.frames, names_of(given), sequence.bodies, &BodySequence::smoothed);
+std::string smoothed_csv(const Sequence& sequence, const TrackCase& the_case) {
+  return bodies_table(sequence.frames, names_of(the_case), sequence.bodies, &BodySequence::smoothed);
 }
 
-std::string relative_csv(const Sequence& sequence, const TrackCase& given) {
-  return relative_table(sequence.frames, names_of(given), sequence.relative);
+std::string relative_csv(const Sequence& sequence, const TrackCase& the_case) {
+  return relative_table(sequence.frames, names_of(the_case), sequence.relative);
 }
 
-std::string points2d_csv(const Sequence& sequence, const TrackCase& given) {
+std::string points2d_csv(const Sequence& sequence, const TrackCase& the_case) {
   std::string csv;
-  for (const std::string& marker : given.markers)
-    for (std::size_t k = 0; k < given.views.size(); ++k)
+  for (const std::string& marker : the_case.markers)
+    for (std::size_t k = 0; k < the_case.views.size(); ++k)
       for (const char axis : {'X', 'Y'})
         csv += fmt::format("{}{}", csv.empty() ? "" : ",",
                            csv_field(fmt::format("{}_cam{}_{}", marker, k + 1, axis)));
@@ -178,9 +180,9 @@ std::string points2d_csv(const Sequence& sequence, const TrackCase& given) {
   return csv;
 }
 
-std::string points3d_csv(const Sequence& sequence, const TrackCase& given) {
+std::string points3d_csv(const Sequence& sequence, const TrackCase& the_case) {
   std::string csv;
-  for (const std::string& marker : given.markers)
+  for (const std::string& marker : the_case.markers)
     for (const char axis : {'X', 'Y', 'Z'})
       csv += fmt::format("{}{}", csv.empty() ? "" : ",", csv_field(fmt::format("{}_{}", marker, axis)));
   csv += "\n";
@@ -220,22 +222,22 @@ void forget_track(const std::filesystem::path& folder) {
   forget_files(folder, files);
 }
 
-Expected<void> write_track(const Sequence& sequence, const TrackCase& given,
+Expected<void> write_track(const Sequence& sequence, const TrackCase& the_case,
                            const std::filesystem::path& folder) {
   return guarded([&] {
     const auto write = [&](const std::string& name, const std::string& text) {
       value_or_throw(write_file(folder / name, text));
     };
-    write("markers.csv", markers_csv(sequence, given));
-    write("bodies.csv", bodies_csv(sequence, given));
-    write("smoothed.csv", smoothed_csv(sequence, given));
-    write("relative.csv", relative_csv(sequence, given));
-    write("points2d.csv", points2d_csv(sequence, given));
-    write("points3d.csv", points3d_csv(sequence, given));
-    for (std::size_t b = 0; b < given.bodies.size(); ++b)
-      write(given.bodies[b].name + ".tra", tra_of(sequence.bodies[b]));
-    write("report.html", track_report(sequence, given));
-    write("track.json", to_text(to_json(sequence, given)) + "\n");
+    write("markers.csv", markers_csv(sequence, the_case));
+    write("bodies.csv", bodies_csv(sequence, the_case));
+    write("smoothed.csv", smoothed_csv(sequence, the_case));
+    write("relative.csv", relative_csv(sequence, the_case));
+    write("points2d.csv", points2d_csv(sequence, the_case));
+    write("points3d.csv", points3d_csv(sequence, the_case));
+    for (std::size_t b = 0; b < the_case.bodies.size(); ++b)
+      write(the_case.bodies[b].name + ".tra", tra_of(sequence.bodies[b]));
+    write("report.html", track_report(sequence, the_case));
+    write("track.json", to_text(to_json(sequence, the_case)) + "\n");
   });
 }
 

@@ -16,11 +16,11 @@ namespace {
 
 constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
-std::string body_charts(const Sequence& sequence, const TrackCase& given) {
+std::string body_charts(const Sequence& sequence, const TrackCase& the_case) {
   std::vector<std::string> names;
   std::vector<report::Chart> residuals;
-  for (std::size_t b = 0; b < given.bodies.size(); ++b) {
-    names.push_back(given.bodies[b].name);
+  for (std::size_t b = 0; b < the_case.bodies.size(); ++b) {
+    names.push_back(the_case.bodies[b].name);
     report::Chart rms{"Markers from their places in the body", "frame", "rms, mm"};
     report::ChartSeries residual{""};
     for (std::size_t f = 0; f < sequence.frames.size(); ++f)
@@ -33,12 +33,12 @@ std::string body_charts(const Sequence& sequence, const TrackCase& given) {
   return motion_charts(sequence.frames, names, sequence.bodies, sequence.relative, residuals);
 }
 
-std::string gap_chart(const Sequence& sequence, const TrackCase& given) {
+std::string gap_chart(const Sequence& sequence, const TrackCase& the_case) {
   report::Chart chart{"Ray gaps", "frame", "mm"};
   chart.y_from_zero = true;
   constexpr std::size_t most_named = 12;
-  for (std::size_t m = 0; m < given.markers.size(); ++m) {
-    report::ChartSeries dots{given.markers.size() <= most_named ? given.markers[m] : ""};
+  for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
+    report::ChartSeries dots{the_case.markers.size() <= most_named ? the_case.markers[m] : ""};
     dots.scattered = true;
     for (std::size_t f = 0; f < sequence.frames.size(); ++f)
       if (const auto& gap = sequence.markers[f][m].ray_gap_mm)
@@ -49,7 +49,7 @@ std::string gap_chart(const Sequence& sequence, const TrackCase& given) {
   return "<figure class=\"plain\">" + report::chart_svg({&chart, 1}) + "</figure>\n";
 }
 
-std::string marker_table(const Sequence& sequence, const TrackCase& given) {
+std::string marker_table(const Sequence& sequence, const TrackCase& the_case) {
   struct Row {
     std::string name;
     std::array<int, 4> counts{};
@@ -57,8 +57,8 @@ std::string marker_table(const Sequence& sequence, const TrackCase& given) {
     int placed = 0;
   };
   std::vector<Row> rows;
-  for (std::size_t m = 0; m < given.markers.size(); ++m) {
-    Row row{given.markers[m]};
+  for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
+    Row row{the_case.markers[m]};
     for (const auto& frame : sequence.markers) {
       ++row.counts[std::size_t(frame[m].status)];
       if (frame[m].status == MarkerStatus::tracked)
@@ -87,13 +87,13 @@ std::string marker_table(const Sequence& sequence, const TrackCase& given) {
       rows));
 }
 
-std::string distance_table(const Sequence& sequence, const TrackCase& given) {
+std::string distance_table(const Sequence& sequence, const TrackCase& the_case) {
   if (sequence.distances.empty()) return "";
   return html_of(report::table_of<MarkerDistance>(
       "Distances between markers of a body",
       {{{"Markers", "Names"},
         [&](const MarkerDistance& d) {
-          return report::Cell{given.markers[d.first] + " – " + given.markers[d.second]};
+          return report::Cell{the_case.markers[d.first] + " – " + the_case.markers[d.second]};
         }},
        {{"Mean, mm", "Over the frames in which both are tracked", true},
         [](const MarkerDistance& d) { return report::Cell{report::fixed(d.mean_mm, 3)}; }},
@@ -106,7 +106,7 @@ std::string distance_table(const Sequence& sequence, const TrackCase& given) {
 
 }  // namespace
 
-std::string track_report(const Sequence& sequence, const TrackCase& given) {
+std::string track_report(const Sequence& sequence, const TrackCase& the_case) {
   std::array<int, 4> counts{};
   for (const auto& frame : sequence.markers)
     for (const TrackedMarker& marker : frame) ++counts[std::size_t(marker.status)];
@@ -117,15 +117,15 @@ std::string track_report(const Sequence& sequence, const TrackCase& given) {
                   "frames with all markers tracked") +
       report_card(fmt::format("{:.1f} %", 100.0 * counts[0] / std::max(1, all)), "of the places tracked") +
       report_card(std::to_string(sequence.repaired), "exchanges repaired");
-  for (std::size_t k = 1; k < given.views.size(); ++k)
+  for (std::size_t k = 1; k < the_case.views.size(); ++k)
     if (sequence.delays[k].is_known)
       cards += report_card(fmt::format("{:.4f} frames", sequence.delays[k].frames),
-                           "delay of " + report::escaped(given.views[k].images.name));
+                           "delay of " + report::escaped(the_case.views[k].images.name));
   return report::page_html("helicarm track", "Markers and bodies through a sequence",
                            cards + "</div>\n" + warnings_list(sequence.warnings) +
-                               body_charts(sequence, given) + "<h2>Markers</h2>\n" +
-                               gap_chart(sequence, given) + marker_table(sequence, given) +
-                               distance_table(sequence, given),
+                               body_charts(sequence, the_case) + "<h2>Markers</h2>\n" +
+                               gap_chart(sequence, the_case) + marker_table(sequence, the_case) +
+                               distance_table(sequence, the_case),
                            ". Millimetres, degrees and pixels.");
 }
 

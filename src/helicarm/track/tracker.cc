@@ -45,25 +45,25 @@ Tracker::Snapshot Tracker::snapshot(const FrameSights& sights) const {
   return now;
 }
 
-Expected<Tracker> Tracker::begin(const TrackCase& given, int frame,
+Expected<Tracker> Tracker::begin(const TrackCase& the_case, int frame,
                                  const std::vector<xray::XrayImage>& images) {
   return guarded([&] {
-    Tracker tracker(given);
-    for (const TrackView& view : given.views) tracker.cameras_.push_back(view.camera);
-    tracker.markers_.resize(given.markers.size());
+    Tracker tracker(the_case);
+    for (const TrackView& view : the_case.views) tracker.cameras_.push_back(view.camera);
+    tracker.markers_.resize(the_case.markers.size());
     for (MarkerState& marker : tracker.markers_) {
-      marker.contrast.assign(given.views.size(), 0);
-      marker.age.assign(given.views.size(), 0);
-      marker.ratio.assign(given.views.size(), 1);
+      marker.contrast.assign(the_case.views.size(), 0);
+      marker.age.assign(the_case.views.size(), 0);
+      marker.ratio.assign(the_case.views.size(), 1);
     }
-    tracker.contrasts_.resize(given.views.size());
-    tracker.delays_.assign(given.views.size(), {1 / (delay_spread * delay_spread), 0});
-    tracker.body_of_.resize(given.markers.size());
-    for (std::size_t b = 0; b < given.bodies.size(); ++b) {
-      for (const std::size_t marker : given.bodies[b].markers) tracker.body_of_[marker] = b;
+    tracker.contrasts_.resize(the_case.views.size());
+    tracker.delays_.assign(the_case.views.size(), {1 / (delay_spread * delay_spread), 0});
+    tracker.body_of_.resize(the_case.markers.size());
+    for (std::size_t b = 0; b < the_case.bodies.size(); ++b) {
+      for (const std::size_t marker : the_case.bodies[b].markers) tracker.body_of_[marker] = b;
       BodyState& body = tracker.bodies_.emplace_back();
-      body.in_body.assign(given.bodies[b].markers.size(), Eigen::Vector3d::Zero());
-      body.seen.assign(given.bodies[b].markers.size(), 0);
+      body.in_body.assign(the_case.bodies[b].markers.size(), Eigen::Vector3d::Zero());
+      body.seen.assign(the_case.bodies[b].markers.size(), 0);
     }
     tracker.find_first(frame, images);
     tracker.check_rays();

@@ -27,7 +27,7 @@ class Tracker {
   /// Finds the markers of the first frame by their picks. Refuses (markers_swapped, residual_too_large) picks
   /// whose rays miss each other, and (markers_swapped, bodies_exchanged) markers that contradict the geometry
   /// given; not_seen where no marker is found in two views.
-  static Expected<Tracker> begin(const TrackCase& given, int frame,
+  static Expected<Tracker> begin(const TrackCase& the_case, int frame,
                                  const std::vector<xray::XrayImage>& images);
 
   const FrameSights& first() const { return first_; }
@@ -72,7 +72,7 @@ class Tracker {
     double sigma() const;
   };
 
-  explicit Tracker(const TrackCase& given) : given_(&given) {}
+  explicit Tracker(const TrackCase& the_case) : given_(&the_case) {}
   Eigen::Vector2d rectified(std::size_t view, const Eigen::Vector2d& raw) const;
   Eigen::Vector2d raw(std::size_t view, const Eigen::Vector2d& uv) const;
   double radius_px(std::size_t view, const Eigen::Vector3d& place) const;

@@ -75,7 +75,7 @@ std::string small_letters(std::string_view text) {
 }
 
 std::optional<double> unit_in_mm(std::string_view unit) {
-  std::string word = small_letters(trim(unit));
+  std::string word = small_letters(trimmed(unit));
   // "metre" and "meter", "microns" and "micron".
   if (const auto metre = word.find("metre"); metre != std::string::npos) word.replace(metre, 5, "meter");
   if (word.size() > 2 && word.ends_with('s')) word.pop_back();
@@ -96,7 +96,7 @@ double declared_unit(std::string_view unit, const std::string& field) {
 }
 
 std::optional<Eigen::Vector3d> signs_to_lps(std::string_view space) {
-  const std::string word = small_letters(trim(space));
+  const std::string word = small_letters(trimmed(space));
   if (one_of(word, {"lps", "left-posterior-superior"})) return Eigen::Vector3d(1, 1, 1);
   if (one_of(word, {"ras", "right-anterior-superior"})) return Eigen::Vector3d(-1, -1, 1);
   if (one_of(word, {"las", "left-anterior-superior"})) return Eigen::Vector3d(1, -1, 1);

@@ -70,8 +70,8 @@ DicomElements group_of(const DicomElements& frame, const DicomElements& shared, 
 }
 
 SegmentFrame frame_of(const DicomElements& frame, const DicomElements& shared) {
-  SegmentFrame made;
-  made.segment = word_in(group_of(frame, shared, segment_identification), referenced_segment, 1);
+  SegmentFrame segment_frame;
+  segment_frame.segment = word_in(group_of(frame, shared, segment_identification), referenced_segment, 1);
   const auto corner = numbers_in(group_of(frame, shared, plane_position), xray::tags::image_position, 3,
                                  -farthest_coordinate_mm, farthest_coordinate_mm);
   const DicomElements orientation = group_of(frame, shared, plane_orientation);
@@ -82,16 +82,16 @@ SegmentFrame frame_of(const DicomElements& frame, const DicomElements& shared) {
     const auto value = measures.numbers(tag, 1, 1e-3, 100);
     return value ? std::optional((*value)[0]) : std::nullopt;
   };
-  made.spacing = length(slice_spacing);
-  made.thickness = length(slice_thickness);
+  segment_frame.spacing = length(slice_spacing);
+  segment_frame.thickness = length(slice_thickness);
   const auto directions = Eigen::Map<const Eigen::Matrix<double, 3, 2>>(turn.data());
   if (!(directions.transpose() * directions).isIdentity(1e-3))
     orientation.refuse(Reason::bad_value, xray::tags::image_orientation,
                        "is not a pair of perpendicular unit vectors");
-  made.corner = Vector3d::Map(corner.data());
-  made.axes.col(0) = directions.col(0) * spacing[1];
-  made.axes.col(1) = directions.col(1) * spacing[0];
-  return made;
+  segment_frame.corner = Vector3d::Map(corner.data());
+  segment_frame.axes.col(0) = directions.col(0) * spacing[1];
+  segment_frame.axes.col(1) = directions.col(1) * spacing[0];
+  return segment_frame;
 }
 
 /// Refuses what is no BINARY segmentation of uncompressed bits.

@@ -74,10 +74,10 @@ HELICARM_INLINE Ints first_less_second(const Ints& pairs) {
 /// Index of the voxel entered along p (or q), and the part of the slab before the next voxel begins.
 HELICARM_INLINE void enter(Ints& index, Floats& share, const Floats& start, const Floats& per_step,
                            float end) {
-  Floats place = start < 0 ? Floats{} : start;
-  place = place > end ? end - Floats{} : place;
-  index = __builtin_convertvector(place, Ints);
-  share = per_step - (place - real(index)) * per_step;
+  Floats position = start < 0 ? Floats{} : start;
+  position = position > end ? end - Floats{} : position;
+  index = __builtin_convertvector(position, Ints);
+  share = per_step - (position - real(index)) * per_step;
   share = share > 1 ? 1 - Floats{} : share;
 }
 
@@ -90,8 +90,8 @@ void march(const MarchBlock& block, const MarchRays& rays, int first, int last, 
   const Ints rising = alike > 0;
   // Rays from one source keep their order, so the middle slab decides which end has the smallest index.
   const auto middle = static_cast<float>(std::midpoint(first, last));
-  const Floats place = (q + middle * dq) * static_cast<float>(block.row) + p + middle * dp;
-  const Ints least = Ints{} + (place[0] <= place[march_simd - 1] ? 0 : march_simd - 1);
+  const Floats position = (q + middle * dq) * static_cast<float>(block.row) + p + middle * dp;
+  const Ints least = Ints{} + (position[0] <= position[march_simd - 1] ? 0 : march_simd - 1);
 #pragma GCC unroll 2
   for (int k = first; k < last; ++k) {
     const auto slab = static_cast<float>(k);

@@ -30,7 +30,7 @@ constexpr std::array<std::string_view, 18> interpreted = {
 
 /// Teem reads a field's name in letters of either case, and some names without a blank.
 std::string nrrd_field(std::string_view text) {
-  std::string name = small_letters(trim(text));
+  std::string name = small_letters(trimmed(text));
   for (const auto& [joined, usual] : {std::pair{"datafile", "data file"},
                                       {"byteskip", "byte skip"},
                                       {"lineskip", "line skip"},
@@ -57,7 +57,7 @@ NrrdHeader::NrrdHeader(std::string_view& rest, std::string origin) : origin_(std
     if (std::ranges::find(interpreted, name) == interpreted.end())
       throw BadInput(Reason::unknown_key,
                      fmt::format("{}: the field {} is unknown", origin_, xray::quote(name)));
-    if (!values_.emplace(name, trim(line.substr(colon + 1))).second)
+    if (!values_.emplace(name, trimmed(line.substr(colon + 1))).second)
       throw BadInput(Reason::bad_value, fmt::format("{}: {} is given twice", origin_, xray::quote(name)));
   }
   detached_end_ = true;

@@ -25,8 +25,8 @@ class MetaHeader {
       if (equals == std::string_view::npos)
         throw BadInput(Reason::bad_value,
                        fmt::format("{}: the line {} has no \"=\"", origin_, xray::quote(line)));
-      const std::string key(trim(line.substr(0, equals)));
-      if (!values_.emplace(key, trim(line.substr(equals + 1))).second)
+      const std::string key(trimmed(line.substr(0, equals)));
+      if (!values_.emplace(key, trimmed(line.substr(equals + 1))).second)
         throw BadInput(Reason::bad_value, fmt::format("{}: {} is given twice", origin_, xray::quote(key)));
     }
   }
@@ -128,14 +128,14 @@ Eigen::Affine3d place_of(const MetaHeader& header, std::vector<Warning>& warning
   const auto spacing = header.numbers({header.has("ElementSpacing") ? "ElementSpacing" : "ElementSize"}, 3);
   const auto offset = header.numbers({"Offset", "Position", "Origin"}, 3);
   const auto matrix = header.numbers({"TransformMatrix", "Rotation", "Orientation"}, 9);
-  Eigen::Affine3d place = Eigen::Affine3d::Identity();
+  Eigen::Affine3d patient_from_index = Eigen::Affine3d::Identity();
   const std::string letters = header.text("AnatomicalOrientation", "???");
   const bool lettered = !letters.starts_with('?');
   const auto directions = directions_from_letters(letters);
   if (!matrix.empty())  // fewer numbers describe fewer axes
-    place.linear() = Eigen::Map<const Eigen::Matrix3d>(matrix.data());
+    patient_from_index.linear() = Eigen::Map<const Eigen::Matrix3d>(matrix.data());
   else if (directions)
-    place.linear() = *directions;
+    patient_from_index.linear() = *directions;
   else if (lettered)
     throw BadInput(Reason::bad_value,
                    fmt::format("{} is {}, must be three of R L A P I S",
@@ -144,15 +144,15 @@ Eigen::Affine3d place_of(const MetaHeader& header, std::vector<Warning>& warning
   constexpr double least_cosine = 0.5;
   if (!matrix.empty() && lettered &&
       (!directions ||
-       (directions->transpose() * place.linear().colwise().normalized()).diagonal().minCoeff() <
+       (directions->transpose() * patient_from_index.linear().colwise().normalized()).diagonal().minCoeff() <
            least_cosine))
     warnings.push_back({Reason::irregular_file,
                         fmt::format("{} is {}, but the matrix of the axes is that of {}: the matrix is used",
                                     header.field("AnatomicalOrientation"), xray::quote(letters),
-                                    letters_of(place.linear()))});
-  if (!spacing.empty()) place.linear() *= Vector3d::Map(spacing.data()).asDiagonal();
-  if (!offset.empty()) place.translation() = Vector3d::Map(offset.data());
-  return Eigen::Scaling(millimetres(header)) * place;
+                                    letters_of(patient_from_index.linear()))});
+  if (!spacing.empty()) patient_from_index.linear() *= Vector3d::Map(spacing.data()).asDiagonal();
+  if (!offset.empty()) patient_from_index.translation() = Vector3d::Map(offset.data());
+  return Eigen::Scaling(millimetres(header)) * patient_from_index;
 }
 
 std::string_view skip_header(std::string_view bytes, const MetaHeader& header, std::size_t needed) {

@@ -75,21 +75,22 @@ Vector3d spacing_of(const NiftiHeader& header) {
 }
 
 Eigen::Affine3d sform_of(const NiftiHeader& header) {
-  Eigen::Affine3d place = Eigen::Affine3d::Identity();
+  Eigen::Affine3d patient_from_index = Eigen::Affine3d::Identity();
   const NiftiField* rows[] = {&nifti::srow_x, &nifti::srow_y, &nifti::srow_z};
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 4; ++column)
-      place.matrix()(row, column) = header.finite(*rows[row], std::size_t(column));
-  return place;
+      patient_from_index.matrix()(row, column) = header.finite(*rows[row], std::size_t(column));
+  return patient_from_index;
 }
 
 Eigen::Affine3d qform_of(const NiftiHeader& header) {
-  Eigen::Affine3d place = Eigen::Affine3d::Identity();
+  Eigen::Affine3d patient_from_index = Eigen::Affine3d::Identity();
   const double side = header.finite(nifti::pixdim) < 0 ? -1 : 1;
-  place.linear() = rotation_of(header) * spacing_of(header).cwiseProduct(Vector3d(1, 1, side)).asDiagonal();
-  place.translation() = Vector3d(header.finite(nifti::qoffset_x), header.finite(nifti::qoffset_y),
-                                 header.finite(nifti::qoffset_z));
-  return place;
+  patient_from_index.linear() =
+      rotation_of(header) * spacing_of(header).cwiseProduct(Vector3d(1, 1, side)).asDiagonal();
+  patient_from_index.translation() = Vector3d(
+      header.finite(nifti::qoffset_x), header.finite(nifti::qoffset_y), header.finite(nifti::qoffset_z));
+  return patient_from_index;
 }
 
 std::string listed(const Vector3d& v) { return fmt::format("{:.6g} {:.6g} {:.6g}", v.x(), v.y(), v.z()); }
@@ -138,7 +139,7 @@ void check_forms(const NiftiHeader& header, const Vector3d& size, std::vector<Wa
 
 /// The file's world frame is R, A, S.
 Eigen::Affine3d place_of(const NiftiHeader& header, const Vector3d& size, std::vector<Warning>& warnings) {
-  Eigen::Affine3d place = Eigen::Affine3d::Identity();
+  Eigen::Affine3d patient_from_index = Eigen::Affine3d::Identity();
   const bool has_sform = header.whole(nifti::sform_code) > 0, has_qform = header.whole(nifti::qform_code) > 0;
   if (!has_sform && (spacing_of(header).array() < 0).any())
     throw BadInput(Reason::bad_value,
@@ -146,18 +147,18 @@ Eigen::Affine3d place_of(const NiftiHeader& header, const Vector3d& size, std::v
                                "it again with its orientation in the sform",
                                header.origin(), listed(spacing_of(header))));
   if (has_sform) {
-    place = sform_of(header);
-    value_or_throw(check_grid(Eigen::Scaling(millimetres(header)) * place, header.origin()));
-    check_spacing(header, place, warnings);
+    patient_from_index = sform_of(header);
+    value_or_throw(check_grid(Eigen::Scaling(millimetres(header)) * patient_from_index, header.origin()));
+    check_spacing(header, patient_from_index, warnings);
     if (has_qform && (spacing_of(header).array() > 0).all()) check_forms(header, size, warnings);
   } else if (has_qform) {
-    place = qform_of(header);
+    patient_from_index = qform_of(header);
   } else {
-    place.linear() = spacing_of(header).asDiagonal();
+    patient_from_index.linear() = spacing_of(header).asDiagonal();
     warnings.push_back({Reason::spacing_missing,
                         header.origin() + ": neither sform nor qform: the patient's orientation is unknown"});
   }
-  return Vector3d(-1, -1, 1).asDiagonal() * (Eigen::Scaling(millimetres(header)) * place);
+  return Vector3d(-1, -1, 1).asDiagonal() * (Eigen::Scaling(millimetres(header)) * patient_from_index);
 }
 
 /// scl_slope and scl_inter; 0 or no number for a slope: none, as nibabel has it.

@@ -123,25 +123,25 @@ void check_axes(const NrrdHeader& header) {
 }
 
 Eigen::Affine3d place_of(const NrrdHeader& header) {
-  Eigen::Affine3d place = Eigen::Affine3d::Identity();
+  Eigen::Affine3d space_from_index = Eigen::Affine3d::Identity();
   const auto directions = header.numbers("space directions", 9);
   const auto spacings = header.numbers("spacings", 3);
   const auto origin = header.numbers("space origin", 3);
   if (!directions.empty())
-    place.linear() = Eigen::Map<const Eigen::Matrix3d>(directions.data());
+    space_from_index.linear() = Eigen::Map<const Eigen::Matrix3d>(directions.data());
   else if (!spacings.empty())
-    place.linear() = Vector3d::Map(spacings.data()).asDiagonal();
+    space_from_index.linear() = Vector3d::Map(spacings.data()).asDiagonal();
   if (!directions.empty() && !spacings.empty())
     for (Eigen::Index axis = 0; axis < 3; ++axis)
-      if (differ(place.linear().col(axis).norm(), spacings[static_cast<std::size_t>(axis)], 0.01))
+      if (differ(space_from_index.linear().col(axis).norm(), spacings[static_cast<std::size_t>(axis)], 0.01))
         throw BadInput(
             Reason::bad_value,
             fmt::format("{} of axis {} is {:.6g}, but its space direction has length {:.6g}: "
                         "remove the wrong one",
                         header.field("spacings"), axis + 1, spacings[static_cast<std::size_t>(axis)],
-                        place.linear().col(axis).norm()));
-  if (!origin.empty()) place.translation() = Vector3d::Map(origin.data());
-  return lps_from(header).asDiagonal() * (Eigen::Scaling(millimetres(header)) * place);
+                        space_from_index.linear().col(axis).norm()));
+  if (!origin.empty()) space_from_index.translation() = Vector3d::Map(origin.data());
+  return lps_from(header).asDiagonal() * (Eigen::Scaling(millimetres(header)) * space_from_index);
 }
 
 std::vector<float> text_voxels(std::string_view bytes, std::size_t count, const std::string& origin) {

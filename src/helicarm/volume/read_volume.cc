@@ -14,7 +14,7 @@ namespace helicarm::volume {
 namespace {
 
 bool is_metaimage(std::string_view bytes) {
-  const std::string_view first = trim(take_line(bytes)).substr(0, 40);
+  const std::string_view first = trimmed(take_line(bytes)).substr(0, 40);
   return first.starts_with("ObjectType") || first.starts_with("NDims") || first.starts_with("Comment");
 }
 

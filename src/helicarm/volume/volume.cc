@@ -50,11 +50,11 @@ Expected<void> check_grid(const Eigen::Affine3d& patient_from_voxel, const std::
 }
 
 std::string volume_key(const Volume& volume) {
-  const Eigen::Matrix4d place = volume.patient_from_voxel.matrix();
+  const Eigen::Matrix4d matrix = volume.patient_from_voxel.matrix();
   const auto bytes = [](const auto* data, std::size_t size) {
     return xray::digest({reinterpret_cast<const char*>(data), size});
   };
-  return xray::digest(bytes(volume.size.data(), sizeof(int) * 3) + bytes(place.data(), sizeof place) +
+  return xray::digest(bytes(volume.size.data(), sizeof(int) * 3) + bytes(matrix.data(), sizeof matrix) +
                       bytes(volume.voxels.data(), volume.voxels.size() * sizeof(float)));
 }
 

@@ -253,13 +253,6 @@ std::string read_data_file(const std::filesystem::path& header, const std::strin
       value_or_throw(path_inside(header.parent_path().empty() ? "." : header.parent_path(), name)));
 }
 
-std::string_view trim(std::string_view text) {
-  constexpr std::string_view blanks = " \t\r";
-  const std::size_t first = text.find_first_not_of(blanks);
-  return first == std::string_view::npos ? std::string_view{}
-                                         : text.substr(first, text.find_last_not_of(blanks) - first + 1);
-}
-
 std::string_view take_line(std::string_view& rest) {
   const std::size_t end = rest.find('\n');
   const std::string_view line = rest.substr(0, end);

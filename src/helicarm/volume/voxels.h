@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "helicarm/core/text.h"
 #include "helicarm/volume/volume.h"
 
 namespace helicarm::volume {
@@ -49,9 +50,6 @@ std::vector<double> read_numbers(std::string_view text, std::size_t count, const
 /// Content of a volume file, or of the data file `name` beside `header` that the header names.
 std::string read_volume_file(const std::filesystem::path& path);
 std::string read_data_file(const std::filesystem::path& header, const std::string& name);
-
-/// Without blanks (and a carriage return) at either end.
-std::string_view trim(std::string_view text);
 
 /// Removes the first line from `rest` and returns it without its line end.
 std::string_view take_line(std::string_view& rest);

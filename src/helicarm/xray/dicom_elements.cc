@@ -12,7 +12,8 @@
 namespace helicarm::xray {
 namespace {
 
-std::string_view trimmed(std::string_view text) {
+/// A value without the padding of DICOM: spaces, and zero bytes at its end.
+std::string_view without_padding(std::string_view text) {
   const auto first = text.find_first_not_of(' ');
   if (first == std::string_view::npos) return {};
   const auto last = text.find_last_not_of(std::string_view(" \0", 2));
@@ -20,7 +21,7 @@ std::string_view trimmed(std::string_view text) {
 }
 
 std::optional<double> decimal(std::string_view text) {
-  text = trimmed(text);
+  text = without_padding(text);
   if (text.starts_with('+')) text.remove_prefix(1);
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -48,7 +49,7 @@ const DicomElement* DicomElements::find(DicomTag tag) const {
 
 std::string_view DicomElements::text(DicomTag tag) const {
   const DicomElement* element = find(tag);
-  return element ? trimmed(element->value) : std::string_view{};
+  return element ? without_padding(element->value) : std::string_view{};
 }
 
 std::optional<std::vector<double>> DicomElements::numbers(DicomTag tag, std::size_t count, double low,
@@ -77,9 +78,9 @@ std::size_t DicomElements::count(DicomTag tag) const {
 std::optional<std::uint16_t> DicomElements::word(DicomTag tag, std::string_view vr) const {
   const DicomElement* element = find(tag);
   if (!element) return std::nullopt;
-  const std::string_view given(element->vr.data(), 2);
-  if (given != "  " && given != "UN" && given != vr)
-    refuse(Reason::bad_value, tag, fmt::format("has the VR {}, must be {}", given, vr));
+  const std::string_view stated_vr(element->vr.data(), 2);
+  if (stated_vr != "  " && stated_vr != "UN" && stated_vr != vr)
+    refuse(Reason::bad_value, tag, fmt::format("has the VR {}, must be {}", stated_vr, vr));
   if (element->value.size() != 2)
     refuse(Reason::bad_value, tag, fmt::format("has {} bytes, must have 2", element->value.size()));
   const auto* bytes = reinterpret_cast<const unsigned char*>(element->value.data());

@@ -308,17 +308,17 @@ Expected<void> write_run(const fs::path& path, const DerivedImage& image, const 
     check(path, image.pixels, image.bits_stored);
     check_frames(path, image, run);
     prepare_dcmtk();
-    auto made = std::make_unique<DcmFileFormat>();
-    DcmDataset& dataset = *made->getDataset();
+    auto dicom = std::make_unique<DcmFileFormat>();
+    DcmDataset& dataset = *dicom->getDataset();
     put_modules(dataset, image, run);
     put_pixels(dataset, image, run);
     must(dataset.chooseRepresentation(syntax, nullptr), "compression");
-    return made;
+    return dicom;
   });
   if (!file) return tl::unexpected<Failure>(file.error());
   return write_file_with(path, [&](const fs::path& aside) -> Expected<void> {
     if (image.patient_study)
-      if (auto made = make_private_file(aside); !made) return made;
+      if (auto created = make_private_file(aside); !created) return created;
     errno = 0;
     const OFCondition status = (*file)->saveFile(aside.c_str(), syntax);
     if (status.good()) return {};

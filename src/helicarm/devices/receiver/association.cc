@@ -35,11 +35,11 @@ AdmissionLimits limits_of(const ReceiverOptions& options) {
 
 }  // namespace
 
-ReceiverShared::ReceiverShared(const ReceiverOptions& given, Inbox& into, ReceiverHooks told)
-    : options(given),
+ReceiverShared::ReceiverShared(const ReceiverOptions& receiver_options, Inbox& into, ReceiverHooks told)
+    : options(receiver_options),
       inbox(into),
       hooks(std::move(told)),
-      admission(limits_of(given)),
+      admission(limits_of(receiver_options)),
       lines(max_lines_per_s) {}
 
 Association::Association(ReceiverShared& shared, std::string origin, Admission::Id id)

@@ -18,7 +18,7 @@ namespace helicarm::receiver {
 
 /// State shared by all associations.
 struct ReceiverShared {
-  ReceiverShared(const ReceiverOptions& given, Inbox& into, ReceiverHooks told);
+  ReceiverShared(const ReceiverOptions& receiver_options, Inbox& into, ReceiverHooks told);
 
   ReceiverOptions options;
   Inbox& inbox;

@@ -77,7 +77,7 @@ std::optional<std::string> class_in_meta_group(std::string_view head) {
 }  // namespace
 
 Expected<std::unique_ptr<Inbox>> Inbox::open(const fs::path& folder) {
-  if (auto made = make_private_folder(folder); !made) return tl::unexpected<Failure>(made.error());
+  if (auto created = make_private_folder(folder); !created) return tl::unexpected<Failure>(created.error());
   const int lock = ::open((folder / lock_name).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock < 0)
     return fail(Reason::cannot_write, fmt::format("{}: {}", folder.string(), system_message(errno)));

@@ -143,12 +143,12 @@ Expected<Joints> nearest_inverse(const RobotModel& model, const geometry::RigidT
       best = joints;
   }
   if (best) return *best;
-  const Eigen::Vector3d& place = base_from_flange.translation;
+  const Eigen::Vector3d& position = base_from_flange.translation;
   return fail(
       Reason::out_of_reach,
       fmt::format("the {} cannot reach the flange position {:.1f}, {:.1f}, {:.1f} mm in this orientation",
-                  model.name, place.x(), place.y(), place.z()),
-      {{"distance_mm", place.norm()}});
+                  model.name, position.x(), position.y(), position.z()),
+      {{"distance_mm", position.norm()}});
 }
 
 }  // namespace helicarm::robot

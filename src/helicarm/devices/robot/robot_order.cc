@@ -19,12 +19,12 @@ constexpr Range any{std::numeric_limits<double>::lowest(), std::numeric_limits<d
 
 /// Bit-exact: reading must not change what the user confirmed.
 geometry::RigidTransform pose_of(JsonReader& reader, const char* key) {
-  const Eigen::Matrix4d given = geometry::matrix_from(reader, key, any);
+  const Eigen::Matrix4d stated = geometry::matrix_from(reader, key, any);
   const geometry::RigidTransform corrected =
-      value_or_throw(geometry::rigid_transform_from(given, reader.where() + ": " + key));
-  if (!((corrected.matrix() - given).cwiseAbs().maxCoeff() < 1e-9))
+      value_or_throw(geometry::rigid_transform_from(stated, reader.where() + ": " + key));
+  if (!((corrected.matrix() - stated).cwiseAbs().maxCoeff() < 1e-9))
     reader.refuse(Reason::bad_value, key, "must be a rotation and a translation to nine digits");
-  return geometry::exact_pose(given);
+  return geometry::exact_pose(stated);
 }
 
 template <class Codec, class Order>

@@ -123,19 +123,20 @@ Expected<std::uint8_t> read_recipe(const RtdeMessage& reply, const std::vector<s
     if (reply.kind != RtdeKind::outputs) expect_kind(reply, RtdeKind::inputs);
     BigEndianReader reader(reply.content);
     const auto recipe = reader.take<std::uint8_t>();
-    const std::vector<std::string> given = split(reader.take(reader.left()));
-    if (given.size() != types.size())
+    const std::vector<std::string> received_types = split(reader.take(reader.left()));
+    if (received_types.size() != types.size())
       throw BadInput(Reason::bad_size,
-                     fmt::format("RTDE: {} types for {} names", given.size(), types.size()));
+                     fmt::format("RTDE: {} types for {} names", received_types.size(), types.size()));
     for (std::size_t i = 0; i < types.size(); ++i) {
-      if (given[i] == "IN_USE")
+      if (received_types[i] == "IN_USE")
         throw BadInput(Reason::robot_locked,
                        names[i] + " is in use by another program: disconnect it from the robot");
-      if (given[i] == "NOT_FOUND")
+      if (received_types[i] == "NOT_FOUND")
         throw BadInput(Reason::unsupported, "the controller does not support " + names[i]);
-      if (given[i] != types[i])
-        throw BadInput(Reason::unsupported, fmt::format("{} has type {}, must be {}", names[i],
-                                                        without_control_characters(given[i]), types[i]));
+      if (received_types[i] != types[i])
+        throw BadInput(Reason::unsupported,
+                       fmt::format("{} has type {}, must be {}", names[i],
+                                   without_control_characters(received_types[i]), types[i]));
     }
     return recipe;
   });

@@ -23,13 +23,13 @@ std::string_view code(LinkState state) {
 }
 
 struct IgtlClient::Impl {
-  Impl(const IgtlClientOptions& given, const asio::ip::tcp::endpoint& to, OnMessage message,
+  Impl(const IgtlClientOptions& client_options, const asio::ip::tcp::endpoint& to, OnMessage message,
        std::function<void()> connect)
-      : options(given),
+      : options(client_options),
         endpoint(to),
         on_message(std::move(message)),
         on_connect(std::move(connect)),
-        pause_s(given.first_pause_s) {}
+        pause_s(client_options.first_pause_s) {}
 
   void connect();
   void connected(asio::ip::tcp::socket socket);

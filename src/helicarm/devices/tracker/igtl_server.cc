@@ -89,7 +89,8 @@ struct IgtlServer::Impl {
     bool asks = false;                                  ///< has sent STT_ or STP_
   };
 
-  Impl(const IgtlServerOptions& given, OnMessage message) : options(given), on_message(std::move(message)) {}
+  Impl(const IgtlServerOptions& server_options, OnMessage message)
+      : options(server_options), on_message(std::move(message)) {}
 
   Expected<void> listen(const asio::ip::tcp::endpoint& endpoint);
   void accept();

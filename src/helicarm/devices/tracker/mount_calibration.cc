@@ -299,10 +299,10 @@ MountObservation pivoted_place(const std::string& label, const PivotCalibration&
   return {label, facet.tip_in_tool, facet.covariance.topLeftCorner<3, 3>()};
 }
 
-Expected<MountCalibration> calibrate_mount(const Places& places, std::span<const MountObservation> given,
+Expected<MountCalibration> calibrate_mount(const Places& places, std::span<const MountObservation> all,
                                            const MountOptions& options) {
   return guarded([&] {
-    const Observations observations(given.begin(), given.end());
+    const Observations observations(all.begin(), all.end());
     check_layout(places, observations, options);
     const Fit fitted = best_fit(places, observations, options);
     MountCalibration mount{fitted.mount.calibrator_from_facet,

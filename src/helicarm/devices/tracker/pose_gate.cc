@@ -19,9 +19,10 @@ tl::expected<geometry::RigidTransform, PoseFault> rigid_pose(const Eigen::Matrix
                                                              double farthest_mm) {
   if (!matrix.allFinite()) return tl::unexpected(PoseFault::not_finite);
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
-  const Eigen::Vector3d place = matrix.topRightCorner<3, 1>();
+  const Eigen::Vector3d position = matrix.topRightCorner<3, 1>();
   if (rotation.isZero(0)) return tl::unexpected(PoseFault::all_zero);
-  if (rotation == Eigen::Matrix3d::Identity() && place.isZero(0)) return tl::unexpected(PoseFault::identity);
+  if (rotation == Eigen::Matrix3d::Identity() && position.isZero(0))
+    return tl::unexpected(PoseFault::identity);
   const Eigen::Matrix3d gram = rotation.transpose() * rotation;
   const double square = gram.trace() / 3;
   if (off_identity(gram / square) > rigid_tolerance ||
@@ -29,8 +30,8 @@ tl::expected<geometry::RigidTransform, PoseFault> rigid_pose(const Eigen::Matrix
     return tl::unexpected(PoseFault::not_rigid);
   if (off_identity(gram) > rigid_tolerance) return tl::unexpected(PoseFault::scaled);
   if (rotation.determinant() < 0) return tl::unexpected(PoseFault::mirrored);
-  if (place.norm() > farthest_mm) return tl::unexpected(PoseFault::out_of_volume);
-  return geometry::RigidTransform{geometry::nearest_rotation(rotation), place};
+  if (position.norm() > farthest_mm) return tl::unexpected(PoseFault::out_of_volume);
+  return geometry::RigidTransform{geometry::nearest_rotation(rotation), position};
 }
 
 void PoseGate::reject(PoseFault fault) { ++rejected_[std::string(code(fault))]; }

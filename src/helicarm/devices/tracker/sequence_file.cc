@@ -17,13 +17,6 @@ namespace {
 
 constexpr std::uintmax_t max_sequence_bytes = std::uintmax_t{512} << 20;  // an hour of five tools at 60 Hz
 
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view blank = " \t\r";
-  const auto first = text.find_first_not_of(blank);
-  return first == text.npos ? std::string_view{}
-                            : text.substr(first, text.find_last_not_of(blank) - first + 1);
-}
-
 [[noreturn]] void refuse_line(std::size_t line, std::string_view problem) {
   throw BadInput(Reason::bad_value, fmt::format("line {}: {}", line, problem));
 }

@@ -15,9 +15,10 @@ using Eigen::Vector3d;
 
 constexpr double warn_sigmas = 3, refuse_sigmas = 10;
 
-std::optional<Failure> check_handedness(const std::vector<LabelledView>& images, const Case& given) {
+std::optional<Failure> check_handedness(const std::vector<LabelledView>& images, const Case& the_case) {
   for (std::size_t i = 0; i < images.size(); ++i)
-    if (!is_mirrored_without_statement(images[i].fiducials.mirrored, *images[i].xray_image, given.views[i]))
+    if (!is_mirrored_without_statement(images[i].fiducials.mirrored, *images[i].xray_image,
+                                       the_case.views[i]))
       return std::nullopt;
   return Failure{
       Reason::ambiguous_handedness,
@@ -127,9 +128,9 @@ ScaleEvidence scale_evidence(const calibration::CalibrationResult& calibration,
 }
 
 Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
-                                           const std::vector<LabelledView>& images, const Case& given) {
+                                           const std::vector<LabelledView>& images, const Case& the_case) {
   if (auto refused = check_labels(calibration, images)) return tl::unexpected<Failure>(*std::move(refused));
-  if (auto refused = check_handedness(images, given)) return tl::unexpected<Failure>(*std::move(refused));
+  if (auto refused = check_handedness(images, the_case)) return tl::unexpected<Failure>(*std::move(refused));
   const auto assumed = std::ranges::find_if(
       images, [](const LabelledView& image) { return image.fiducials.assumed_tolerance_mm > 0; });
   if (assumed != images.end() && calibration.found_tolerance_mm == 0 && calibration.variance_scale != 1)
@@ -138,8 +139,8 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
                                     "different amounts in the views",
                                     assumed->name,
                                     {{"variance_scale", calibration.variance_scale}}});
-  const ScaleEvidence scale = scale_evidence(calibration, images, given.calibrator);
-  const double sigma = std::hypot(scale.sigma, given.calibrator.scale_sigma);
+  const ScaleEvidence scale = scale_evidence(calibration, images, the_case.calibrator);
+  const double sigma = std::hypot(scale.sigma, the_case.calibrator.scale_sigma);
   if (scale.sigma > 0 && std::abs(scale.excess) > warn_sigmas * sigma) {
     Failure disagreement{
         Reason::scale_disagrees,
@@ -162,7 +163,7 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
     calibration.contradicts_calibrator = true;
     calibration.warnings.push_back(std::move(disagreement));
   }
-  for (Warning& warning : displaced_balls(calibration, images, given.calibrator))
+  for (Warning& warning : displaced_balls(calibration, images, the_case.calibrator))
     calibration.warnings.push_back(std::move(warning));
   return calibration;
 }
@@ -202,12 +203,12 @@ Warning mirrored_as_stated() {
       {}};
 }
 
-std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calibration,
+std::vector<Warning> scale_notes(const Case& the_case, const CaseCalibration& calibration,
                                  const std::vector<PointResult>& points) {
-  if (given.calibrator.scale_sigma > 0) return {};
-  const Vector3d middle = phantom::middle_of(given.calibrator);
+  if (the_case.calibrator.scale_sigma > 0) return {};
+  const Vector3d middle = phantom::middle_of(the_case.calibrator);
   Warning note{Reason::scale_unverified, {}, {}, {}};
-  const ScaleEvidence evidence = scale_evidence(calibration, calibration.images, given.calibrator);
+  const ScaleEvidence evidence = scale_evidence(calibration, calibration.images, the_case.calibrator);
   if (evidence.sigma > 0) {
     note.figures["file_over_true"] = 1 + evidence.excess;
     note.figures["sigma"] = evidence.sigma;

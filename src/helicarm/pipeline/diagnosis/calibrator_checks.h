@@ -44,7 +44,7 @@ bool is_mirrored_without_statement(bool is_mirrored, const xray::XrayImage& xray
 /// from the file and the scale by three sigma. Warns if the scale deviates by three sigma, and of displaced
 /// or exchanged fiducials.
 Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
-                                           const std::vector<LabelledView>& images, const Case& given);
+                                           const std::vector<LabelledView>& images, const Case& the_case);
 
 /// Note `ambiguous_handedness` if every image is mirrored: that the calibrator's file is not rests on a tag
 /// or the case alone.
@@ -59,7 +59,7 @@ std::vector<Warning> one_view_notes(const CaseCalibration& calibration);
 
 /// Effect of an error of the calibrator's scale, which the images do not constrain: mm per per cent at each
 /// point, and the source distances for a comparison by tape measure. Empty if the file states scale_sigma.
-std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calibration,
+std::vector<Warning> scale_notes(const Case& the_case, const CaseCalibration& calibration,
                                  const std::vector<PointResult>& points);
 
 }  // namespace helicarm::pipeline

@@ -16,7 +16,7 @@ namespace {
 
 /// One view of a case, measured again with other tags.
 struct Trial {
-  const Case& given;
+  const Case& the_case;
   const RunOptions& options;
   std::string name;
   const xray::XrayImage& image;
@@ -47,12 +47,12 @@ detection::ImageDots dots_of_any_size(const xray::XrayImage& xray_image,
 /// Mean pixel size on the detector that a rectification by the plate implies.
 std::optional<double> pixel_by_plate(const Trial& trial) {
   constexpr int least_dots = 20;
-  const auto rectified = rectify_views({trial.with({}, 1)}, trial.given, trial.options);
+  const auto rectified = rectify_views({trial.with({}, 1)}, trial.the_case, trial.options);
   if (!rectified) return std::nullopt;
   const rectification::Rectification& found = rectified->front().rectification;
   if (found.dots_found < least_dots || !found.map.rectified_pixel_mm) return std::nullopt;
   const auto& distance = trial.image.acquisition.source_detector_mm;
-  const auto& height = trial.given.plate->height_above_receiver_mm;
+  const auto& height = trial.the_case.plate->height_above_receiver_mm;
   const bool in_plate = found.map.rectified_plane != rectification::RectifiedPlane::detector;
   return *found.map.rectified_pixel_mm *
          (in_plate && distance && height ? *distance / (*distance - *height) : 1);
@@ -91,9 +91,9 @@ std::optional<FittedFocal> fitted_focal(const Trial& trial, unsigned threads) {
   std::vector<std::optional<FittedFocal>> found(2 * each_way + 1);
   parallel_for(found.size(), threads, [&](std::size_t i) {
     const double factor = std::pow(ratio, double(i) - each_way);
-    const DetectedView view = trial.given.plate ? trial.with(1, factor) : trial.with(1 / factor, 1);
-    const auto labelled = rectify_views({view}, trial.given, trial.options).and_then([&](auto views) {
-      return label_views(std::move(views), trial.given, trial.options);
+    const DetectedView view = trial.the_case.plate ? trial.with(1, factor) : trial.with(1 / factor, 1);
+    const auto labelled = rectify_views({view}, trial.the_case, trial.options).and_then([&](auto views) {
+      return label_views(std::move(views), trial.the_case, trial.options);
     });
     if (labelled) found[i] = focal_of(labelled->front(), factor);
   });
@@ -128,16 +128,16 @@ void add_distance(Failure& failure, double file_mm, double fitting_mm, std::opti
 }
 
 /// The image with its columns resampled, as wide as `factor` times.
-image::Image<float> widened(const image::Image<float>& given, double factor) {
-  const int width = std::max(1, int(std::lround(given.width() * factor)));
-  image::Image<float> wide(width, given.height());
-  const double share = double(given.width()) / width;
+image::Image<float> widened(const image::Image<float>& image, double factor) {
+  const int width = std::max(1, int(std::lround(image.width() * factor)));
+  image::Image<float> wide(width, image.height());
+  const double share = double(image.width()) / width;
   for (int u = 0; u < width; ++u) {
-    const double at = std::clamp((u + 0.5) * share - 0.5, 0.0, double(given.width() - 1));
-    const int left = std::min(int(at), given.width() - 2);
+    const double at = std::clamp((u + 0.5) * share - 0.5, 0.0, double(image.width() - 1));
+    const int left = std::min(int(at), image.width() - 2);
     const auto weight = float(at - left);
-    for (int v = 0; v < given.height(); ++v)
-      wide(u, v) = (1 - weight) * given(left, v) + weight * given(left + 1, v);
+    for (int v = 0; v < image.height(); ++v)
+      wide(u, v) = (1 - weight) * image(left, v) + weight * image(left + 1, v);
   }
   return wide;
 }
@@ -149,9 +149,9 @@ bool is_labelled(const Trial& trial, double factor) {
   if (factor != 1) resampled.pixels = widened(trial.image.pixels, factor);
   resampled.acquisition.pixel_mm.reset();
   return detect_in_views({{{trial.name}, std::make_shared<const xray::XrayImage>(std::move(resampled))}},
-                         trial.given, trial.options)
-      .and_then([&](auto views) { return rectify_views(std::move(views), trial.given, trial.options); })
-      .and_then([&](auto views) { return label_views(std::move(views), trial.given, trial.options); })
+                         trial.the_case, trial.options)
+      .and_then([&](auto views) { return rectify_views(std::move(views), trial.the_case, trial.options); })
+      .and_then([&](auto views) { return label_views(std::move(views), trial.the_case, trial.options); })
       .has_value();
 }
 
@@ -182,14 +182,14 @@ Failure unequal_pixels(const Failure& failure, const image::Image<float>& pixels
 
 }  // namespace
 
-Failure with_cause(const Refusal& refusal, const Case& given, const RunOptions& options) {
+Failure with_cause(const Refusal& refusal, const Case& the_case, const RunOptions& options) {
   constexpr double least_change = 0.03;  // relative: below it the tags did not cause the refusal
   Failure failure = refusal.failure;
   const auto at = std::ranges::find(refusal.views, failure.view, &ViewResult::name);
   if (at == refusal.views.end() || !at->xray_image) return failure;
   const xray::Acquisition& tags = at->xray_image->acquisition;
-  Case one = given;
-  one.views = {given.views[std::size_t(at - refusal.views.begin())]};
+  Case one = the_case;
+  one.views = {the_case.views[std::size_t(at - refusal.views.begin())]};
   RunOptions alone = options;
   alone.threads = 1;
   const bool of_plate = failure.reason == Reason::plate_mismatch || failure.reason == Reason::plate_not_found;
@@ -197,8 +197,8 @@ Failure with_cause(const Refusal& refusal, const Case& given, const RunOptions& 
                          failure.reason == Reason::ambiguous_labels ||
                          failure.reason == Reason::too_few_fiducials;
   if (!of_plate && !of_labels) return failure;
-  const Trial trial{one, alone, at->name, *at->xray_image, dots_of_any_size(*at->xray_image, given.plate)};
-  if (of_plate && tags.pixel_mm && given.plate) {
+  const Trial trial{one, alone, at->name, *at->xray_image, dots_of_any_size(*at->xray_image, the_case.plate)};
+  if (of_plate && tags.pixel_mm && the_case.plate) {
     const auto pixel = pixel_by_plate(trial);
     if (pixel && std::abs(*pixel / tags.pixel_mm->mean() - 1) > least_change)
       add_pixel(failure, tags.pixel_mm->mean(), *pixel);
@@ -211,7 +211,7 @@ Failure with_cause(const Refusal& refusal, const Case& given, const RunOptions& 
   const double share = focal->focal_px * tags.pixel_mm->mean() / *tags.source_detector_mm;
   if (std::abs(share - 1) < least_change) return failure;
   add_distance(failure, *tags.source_detector_mm, *tags.source_detector_mm * share,
-               given.plate ? std::nullopt : std::optional(tags.pixel_mm->mean()));
+               the_case.plate ? std::nullopt : std::optional(tags.pixel_mm->mean()));
   return failure;
 }
 

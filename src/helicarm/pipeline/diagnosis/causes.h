@@ -10,6 +10,6 @@ namespace helicarm::pipeline {
 /// message states it and the figures are extended by `file_pixel_mm`, `fitting_pixel_mm`,
 /// `file_source_detector_mm`, `fitting_source_detector_mm`. If it would be accepted with its columns
 /// resampled, the failure is `unequal_pixels` with the figure `aspect`. Costs about twenty-five labellings.
-Failure with_cause(const Refusal& refusal, const Case& given, const RunOptions& options);
+Failure with_cause(const Refusal& refusal, const Case& the_case, const RunOptions& options);
 
 }  // namespace helicarm::pipeline

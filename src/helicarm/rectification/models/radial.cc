@@ -19,7 +19,7 @@ Eigen::VectorXd basis_at(const Vector2d& t, const Vector2d& axis) {
 /// seen.
 class RadialModel : public LinearModel {
  public:
-  RadialModel(const Vector2d& axis, LinearTerms given) : LinearModel(std::move(given)), axis_(axis) {}
+  RadialModel(const Vector2d& axis, LinearTerms terms) : LinearModel(std::move(terms)), axis_(axis) {}
 
   std::string name() const override { return "radial"; }
   void write(Json& json) const override {

@@ -19,7 +19,7 @@ struct ArmDriver::Controller {
 
   int periods(double s) const { return static_cast<int>(std::lround(s * model.rate_hz)); }
   RobotState state() const;
-  void take(const RobotOrder& given, OrderNumber its_number);
+  void take(const RobotOrder& robot_order, OrderNumber its_number);
   void step(const Heartbeat& heard);
   bool permits(const Heartbeat& heard) const;
   void advance();
@@ -54,11 +54,11 @@ RobotState ArmDriver::Controller::state() const {
 }
 
 /// An order with the number of the last one has begun before.
-void ArmDriver::Controller::take(const RobotOrder& given, OrderNumber its_number) {
+void ArmDriver::Controller::take(const RobotOrder& robot_order, OrderNumber its_number) {
   if (cut || local || protective || phase == Phase::moving || phase == Phase::braking ||
       its_number == report.order)
     return;
-  order = given;
+  order = robot_order;
   number = its_number;
   phase = Phase::arrived;
   next = 0;
@@ -125,7 +125,7 @@ void ArmDriver::Controller::stop_protectively() {
 }
 
 struct ArmDriver::Channel : OrderChannel {
-  explicit Channel(std::shared_ptr<Controller> given) : controller(std::move(given)) {}
+  explicit Channel(std::shared_ptr<Controller> of) : controller(std::move(of)) {}
   ~Channel() override {
     const std::lock_guard lock(controller->mutex);
     if (controller->number == sent && controller->phase == Controller::Phase::arrived)

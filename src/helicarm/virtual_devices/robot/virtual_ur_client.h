@@ -20,9 +20,9 @@ namespace helicarm::robot {
 struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
   static constexpr std::size_t longest_backlog = 1 << 20;
 
-  VirtualUrClient(asio::ip::tcp::socket given, std::size_t of_port,
+  VirtualUrClient(asio::ip::tcp::socket connected_socket, std::size_t of_port,
                   std::function<void(const std::string& line)> on_cut)
-      : socket(std::move(given)), port(of_port), on_disconnect(std::move(on_cut)) {
+      : socket(std::move(connected_socket)), port(of_port), on_disconnect(std::move(on_cut)) {
     std::error_code gone;
     const auto peer = socket.remote_endpoint(gone);
     name = fmt::format("client {}:{}", peer.address().to_string(), peer.port());
