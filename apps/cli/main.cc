@@ -68,12 +68,24 @@ void describe(CLI::App& app, Console& console) {
       ->capture_default_str();
 }
 
+/// The words behind the program's own options.
+std::span<const std::string> from_command(const CLI::App& app, std::span<const std::string> words) {
+  while (!words.empty() && words.front().starts_with("--")) {
+    const std::size_t equals = words.front().find('=');
+    const CLI::Option* option = app.get_option_no_throw(words.front().substr(0, equals));
+    if (!option) break;
+    const int values = equals == std::string::npos ? option->get_expected_min() : 0;
+    words = words.subspan(std::min(words.size(), std::size_t(1 + values)));
+  }
+  return words;
+}
+
 /// `COMMAND --xml`: the XML of the command, and true. `--slicer COMMAND ...`: `words` become those of the
 /// program's own options.
 bool is_answered_as_module(const CLI::App& app, std::vector<std::string>& words, Console& console) {
   console.tags = !words.empty() && words.front() == "--slicer";
   if (console.tags) words.erase(words.begin());
-  std::span<const std::string> rest(words);
+  std::span<const std::string> rest = from_command(app, words);
   const CLI::App* command = command_named(app, rest);
   if (!command) return false;
   if (rest.size() == 1 && rest.front() == "--xml") {

@@ -55,6 +55,11 @@ class Descriptions(unittest.TestCase):
             self.assertEqual((done.returncode, done.stderr), (0, ""), command)
             self.assertTrue(done.stdout.startswith('<?xml version="1.0" encoding="utf-8"?>\n'), command)
 
+    def test_options_of_the_program_may_stand_before_the_command(self):
+        for words in (["--threads", "1", "drr"], ["--threads=1", "--quiet", "c-arm", "add"]):
+            command = " ".join(word for word in words if not word.startswith("--") and word != "1")
+            self.assertEqual(run(*words, "--xml").stdout, self.xml[command].stdout, words)
+
     def test_executable_has_the_elements_of_the_schema_in_its_order(self):
         expected = ["category", "title", "description", "version", "documentation-url", "license", "contributor"]
         for command, done in self.xml.items():
