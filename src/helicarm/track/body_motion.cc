@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
+#include "helicarm/track/body_residuals.h"
 #include "helicarm/track/body_series.h"
 
 namespace helicarm::track {
@@ -104,8 +105,8 @@ std::vector<OptionalPlace> without_outliers(std::vector<OptionalPlace> deviation
   return deviations;
 }
 
-/// What the markers of a body deviate from their places.
-void learn_deviations(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body) {
+/// Of a marker from its place in its body, per axis: what the poses leave beyond the images' own errors.
+double deviation_of(const SequenceData& work, const BodyPlan& plan, const Estimated& at) {
   constexpr double farthest_mm = 1;  // rms of a frame that has another disc
   double squares = 0, by_images = 0, freedom = 0;
   for (std::size_t f = 0; f < work.frames; ++f) {
@@ -125,40 +126,68 @@ void learn_deviations(const SequenceData& work, const BodyPlan& plan, Estimated&
     freedom += left;
   }
   const double shown = double(work.frames) > 1 ? double(work.frames - 1) / double(work.frames) : 1;
-  if (freedom > 0) body.deviation_mm = std::sqrt(std::max(0.0, (squares / shown - by_images) / freedom));
+  return freedom > 0 ? std::sqrt(std::max(0.0, (squares / shown - by_images) / freedom)) : 0;
+}
+
+/// Mean products of a marker's deviations from its place, and of its images' errors there; body frame.
+struct MarkerDeviations {
+  Eigen::Matrix3d products = Eigen::Matrix3d::Zero(), by_images = Eigen::Matrix3d::Zero();
+  int count = 0;
+};
+
+MarkerDeviations marker_deviations(const SequenceData& work, const BodyPlan& plan, const Estimated& at,
+                                   std::size_t i) {
+  const auto deviations = without_outliers(deviations_of(work, plan, at.shape, at.counts, i));
+  MarkerDeviations made;
+  for (std::size_t f = 0; f < work.frames; ++f) {
+    if (!deviations[f] || !at.shape.poses[f]) continue;
+    const Eigen::Matrix3d turn = at.shape.poses[f]->rotation;
+    made.products += *deviations[f] * deviations[f]->transpose();
+    made.by_images += turn.transpose() * work.points[f][plan.markers[i]]->covariance * turn;
+    ++made.count;
+  }
+  made.products /= std::max(1, made.count);
+  made.by_images /= std::max(1, made.count);
+  return made;
+}
+
+/// What the markers of a body deviate from their places, and how well these are known: by as many independent
+/// frames as correlated errors leave, and by errors that last, which no mean of frames reduces.
+void learn_deviations(const SequenceData& work, const BodyPlan& plan, const Sequence& sequence, Estimated& at,
+                      BodySequence& body) {
+  constexpr double few_mm = 0.7;  // one with fewer frames may still be another disc
+  constexpr double prior_frames = 5;
+  body.deviation_mm = deviation_of(work, plan, at);
+  const double least = std::pow(body.deviation_mm, 2) + 1e-6;
+  const double independent = (1 - sequence.correlation) / (1 + sequence.correlation);
+  at.spread.clear();
+  at.by_place.clear();
   for (std::size_t i = 0; i < plan.markers.size(); ++i) {
-    const auto deviations = without_outliers(deviations_of(work, plan, at.shape, at.counts, i));
-    Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
-    int count = 0;
-    for (std::size_t f = 0; f < work.frames; ++f) {
-      if (!deviations[f] || !at.shape.poses[f]) continue;
-      const Eigen::Matrix3d turn = at.shape.poses[f]->rotation;
-      products += *deviations[f] * deviations[f]->transpose() -
-                  turn.transpose() * work.points[f][plan.markers[i]]->covariance * turn;
-      ++count;
-    }
-    // Never less than the deviation alone; a marker with few frames has that of the body, twice, and one with
-    // fewer still may be another disc.
-    const double least = std::pow(body.deviation_mm, 2) + 1e-6;
-    constexpr double few_mm = 0.7;
+    const MarkerDeviations own = marker_deviations(work, plan, at, i);
+    const double frames = std::max(1.0, independent * own.count);
+    // Never less than the deviation alone; a marker with few frames has that of the body, twice.
     Eigen::Matrix3d spread = (at.counts[i] ? 4 * least : few_mm * few_mm) * Eigen::Matrix3d::Identity();
-    if (at.counts[i] && count > int(few_frames)) {
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(products / count);
+    if (at.counts[i] && own.count > int(few_frames)) {
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(
+          (frames * (own.products - own.by_images) + prior_frames * spread) / (frames + prior_frames));
       spread = parts.eigenvectors() * parts.eigenvalues().cwiseMax(least).asDiagonal() *
                parts.eigenvectors().transpose();
     }
+    spread *= (frames + prior_frames) / (frames + prior_frames - 2);  // Student: of few frames
     at.spread.push_back(spread);
     body.markers[i].loose_mm = std::sqrt(spread.trace() / 3);
-    if (at.shape.in_body[i]) {
-      Eigen::Matrix3d covariance = spread / std::max(1, count);
-      body.markers[i].in_body = {*at.shape.in_body[i], covariance};
-    }
+    // Places that are given are free of the images' errors.
+    const double averaged = sequence.lasting + (1 - sequence.lasting) / frames;
+    at.by_place.push_back(spread / frames);
+    if (plan.geometry.empty()) at.by_place.back() += averaged * own.by_images;
+    if (at.shape.in_body[i]) body.markers[i].in_body = {*at.shape.in_body[i], at.by_place.back()};
   }
 }
 
 /// Which markers count, where they are in the body, and their deviations from there.
-void learn_shape(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
+void learn_shape(SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
                  Sequence& sequence) {
+  constexpr int rounds = 2;
   for (const std::size_t marker : plan.markers) body.markers.push_back({marker, {}, 0, {}});
   at.counts.assign(plan.markers.size(), 1);
   // A marker that two views show in a few frames alone, perhaps wrongly, determines no pose.
@@ -169,12 +198,19 @@ void learn_shape(const SequenceData& work, const BodyPlan& plan, Estimated& at, 
   }
   at.shape = shape_of(work, plan, at.counts);
   find_loose(work, plan, at.counts, body, at.shape, sequence.frames, sequence.warnings);
-  learn_deviations(work, plan, at, body);
+  learn_deviations(work, plan, sequence, at, body);
+  for (int round = 0; round < rounds; ++round) {
+    pose_frames(work, plan, at, body);
+    raise_to_residuals(work, plan, at, body.deviation_mm);
+    for (const std::size_t marker : plan.markers) locate_marker(work, marker);
+    at.shape = shape_of(work, plan, at.counts);
+    learn_deviations(work, plan, sequence, at, body);
+  }
 }
 
 }  // namespace
 
-void estimate_body(const SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
+void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
                    Sequence& sequence) {
   constexpr double worst_turn_deg = 5, condition_limit = 150;
   learn_shape(work, plan, at, body, sequence);
@@ -270,11 +306,24 @@ std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan
   const Eigen::Vector3d place = pose->pose * *at.shape.in_body[i];
   const auto slope = point_by_step(place, centre);
   const Eigen::Matrix3d turn = pose->pose.rotation;
-  // Fewer others than usual carry their own deviations farther.
-  const double usual = double(std::ranges::count(at.counts, 1)) - 1;
-  const double fewer = is_by_others ? std::max(1.0, usual / double(full)) : 1;
-  return FramePlace{place, slope * pose->covariance * slope.transpose() +
-                               fewer * fewer * turn * at.spread[i] * turn.transpose()};
+  Eigen::Matrix3d spread = at.spread[i];
+  Eigen::Matrix3d covariance = slope * pose->covariance * slope.transpose();
+  if (is_by_others) {
+    // The spread holds the deviations of all others; fewer average less, and carry theirs farther.
+    const double fewer_than = std::max(1.0, double(others.size()) / double(full));
+    spread *= fewer_than * fewer_than;
+    RigidCovariance of_all = RigidCovariance::Zero(), of_seen = of_all;
+    for (const SeenMarker& other : others) {
+      const auto by_step = point_by_step(pose->pose * other.in_body, centre);
+      of_all += by_step.transpose() * by_step;
+      if (other.sights.size() >= 2) of_seen += by_step.transpose() * by_step;
+    }
+    const RigidCovariance fewer = of_seen.inverse() - of_all.inverse();
+    if (!fewer.allFinite()) return std::nullopt;
+    covariance += std::pow(body.deviation_mm, 2) * slope * fewer * slope.transpose();
+  }
+  covariance += turn * (spread + at.by_place[i]) * turn.transpose();
+  return FramePlace{place, covariance};
 }
 
 }  // namespace helicarm::track

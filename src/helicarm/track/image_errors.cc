@@ -63,24 +63,36 @@ std::optional<double> signed_gap(const SequenceData& work, std::size_t f, std::s
   return sign * std::sqrt(work.points[f][m]->chi2);
 }
 
-/// By how much a 95 % band is wider because the errors' variance is itself estimated: by as many independent
-/// gaps as the part that a marker's gaps have in common (texture moves with it) leaves.
-double few_gaps_factor(const SequenceData& work) {
-  constexpr double z = 1.96, fewest = 4;
-  double squares = 0, between = 0, count = 0, markers = 0;
+/// Squares of the gaps in standard deviations, and the part that a marker's gaps have in common.
+struct GapSquares {
+  double all = 0, common = 0, count = 0, markers = 0;
+  bool is_enough() const { return markers >= 2 && all > 0; }
+  double share() const { return std::clamp(common / all, 0.0, 1.0); }
+};
+
+GapSquares gap_squares(const SequenceData& work) {
+  GapSquares squares;
   for (std::size_t m = 0; m < work.markers; ++m) {
     double sum = 0, of_marker = 0, n = 0;
     for (std::size_t f = 0; f < work.frames; ++f)
       if (const auto gap = signed_gap(work, f, m)) sum += *gap, of_marker += *gap * *gap, ++n;
     if (n < 2) continue;
-    squares += of_marker;
-    count += n;
-    between += (sum * sum - of_marker) / (n - 1);
-    ++markers;
+    squares.all += of_marker;
+    squares.count += n;
+    squares.common += (sum * sum - of_marker) / (n - 1);
+    ++squares.markers;
   }
-  if (markers < 2 || !(squares > 0)) return 1;
-  const double common = std::clamp(between / squares, 0.0, 1.0);
-  const double independent = std::max(fewest, count / (1 + (count / markers - 1) * common));
+  return squares;
+}
+
+/// By how much a 95 % band is wider because the errors' variance is itself estimated: by as many independent
+/// gaps as the part that a marker's gaps have in common (texture moves with it) leaves.
+double few_gaps_factor(const SequenceData& work) {
+  constexpr double z = 1.96, fewest = 4;
+  const GapSquares squares = gap_squares(work);
+  if (!squares.is_enough()) return 1;
+  const double per_marker = squares.count / squares.markers;
+  const double independent = std::max(fewest, squares.count / (1 + (per_marker - 1) * squares.share()));
   return 1 + (z * z + 1) / (4 * independent);  // Student's quantile over the normal one
 }
 
@@ -119,6 +131,12 @@ std::vector<double> sigma_factors(SequenceData& work) {
       for (auto& sight : frame[m])
         if (sight) sight->sigma_px *= factors[m];
   return factors;
+}
+
+double lasting_share(const SequenceData& work) {
+  constexpr double usual = 0.3;
+  const GapSquares squares = gap_squares(work);
+  return squares.is_enough() ? squares.share() : usual;
 }
 
 double correlation_of(const SequenceData& work) {

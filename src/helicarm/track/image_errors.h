@@ -15,4 +15,8 @@ std::vector<double> sigma_factors(SequenceData& work);
 /// a marker moves with it. In units of each gap's standard deviation.
 double correlation_of(const SequenceData& work);
 
+/// The part of the images' variance that lasts over the sequence, by the signed ray gaps: a marker's mean
+/// place in its body is displaced by it, however many frames show it.
+double lasting_share(const SequenceData& work);
+
 }  // namespace helicarm::track

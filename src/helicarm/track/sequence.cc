@@ -21,6 +21,11 @@ namespace helicarm::track {
 namespace {
 
 constexpr double sight_floor_px = 0.02;
+constexpr double lost_mm = 5;  // a place that is less certain is none
+
+double largest_sigma(const Eigen::Matrix3d& covariance) {
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()[2]);
+}
 
 /// By the cameras' own covariance, common to all frames.
 Eigen::Matrix3d by_cameras(const SequenceData& work, const Eigen::Vector3d& place) {
@@ -109,10 +114,37 @@ bool contradicts(const SightedPoint& point, const FramePlace& by_body) {
   return off.norm() > farthest_mm && off.dot(spread.ldlt().solve(off)) > farthest_chi2;
 }
 
+/// Likewise for one image.
+bool contradicts(const Sight& sight, const FramePlace& by_body) {
+  constexpr double farthest_chi2 = 30;
+  if (!(sight.view->depth(by_body.place) > 1)) return true;
+  const auto slope = geometry::projection_jacobian(*sight.view, by_body.place);
+  Eigen::Matrix2d spread = slope * by_body.covariance * slope.transpose();
+  spread.diagonal().array() += sight.sigma_px * sight.sigma_px;
+  const Eigen::Vector2d off = sight.uv - sight.view->project(by_body.place);
+  return off.dot(spread.ldlt().solve(off)) > farthest_chi2;
+}
+
+/// Whether nothing but its own images says that this is the marker: its body has moved unseen for too long,
+/// and no other of its markers is at the right distance.
+bool is_unsupported(const SequenceData& work, const BodyPlan& body, const Estimated& at, std::size_t m,
+                    std::size_t f, const FramePlace& by_motion) {
+  constexpr double rigid_mm = 1;
+  if (largest_sigma(by_motion.covariance) < lost_mm) return false;
+  const auto i = std::size_t(std::ranges::find(body.markers, m) - body.markers.begin());
+  for (std::size_t k = 0; k < body.markers.size(); ++k) {
+    const auto& other = work.points[f][body.markers[k]];
+    if (k == i || !other || !at.shape.in_body[k] || !at.shape.in_body[i]) continue;
+    const double distance = (other->place - work.points[f][m]->place).norm(),
+                 known = (*at.shape.in_body[k] - *at.shape.in_body[i]).norm();
+    if (std::abs(distance - known) < rigid_mm) return false;
+  }
+  return true;
+}
+
 /// A marker in every frame: by two views, else by its body or its own smooth motion and what one view shows.
 void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies, std::size_t m,
                   Sequence& sequence) {
-  constexpr double lost_mm = 5;
   const auto holder = std::ranges::find_if(
       work.the_case.bodies, [&](const BodyPlan& body) { return std::ranges::count(body.markers, m) > 0; });
   const auto by_body = [&](std::size_t f, bool by_others) {
@@ -133,7 +165,11 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
     const auto by_motion =
         point && !by_others && holder != work.the_case.bodies.end() ? by_body(f, false) : std::nullopt;
     const auto& check = by_others ? by_others : by_motion;
-    const bool is_wrong = check && contradicts(*point, *check);
+    const bool is_wrong =
+        check && (contradicts(*point, *check) ||
+                  (by_motion &&
+                   is_unsupported(work, *holder, bodies[std::size_t(holder - work.the_case.bodies.begin())],
+                                  m, f, *by_motion)));
     if (is_wrong) seen.clear();
     for (std::size_t k = 0; k < work.views; ++k)
       if (work.sights[f][m][k] && !is_wrong) marker.views.push_back(k);
@@ -150,11 +186,13 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
         if (!is_smoothed) alone = smoothed_alone(work, m), is_smoothed = true;
         if (alone) guess = (*alone)[f];
       }
+      if (guess && seen.size() == 1 && contradicts(seen.front(), *guess)) {
+        seen.clear();
+        marker.views.clear();
+      }
       if (guess) {
         const FramePlace place = with_sights(*guess, seen);
-        const double sigma =
-            std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(place.covariance).eigenvalues()[2]);
-        if (sigma < lost_mm) {
+        if (largest_sigma(place.covariance) < lost_mm) {
           marker.status = seen.empty() ? MarkerStatus::predicted : MarkerStatus::one_view;
           marker.place = place;
         }
@@ -240,6 +278,7 @@ Sequence estimate_sequence(const TrackCase& the_case, const std::vector<FrameSig
   sequence.sigma_factor = sigma_factors(work);
   locate_all(work);
   sequence.correlation = correlation_of(work);
+  sequence.lasting = lasting_share(work);
   sequence.distances = distances_of(work);
   std::vector<Estimated> bodies(the_case.bodies.size());
   sequence.bodies.resize(the_case.bodies.size());

@@ -50,6 +50,7 @@ struct Sequence {
   std::vector<std::vector<TrackedBody>> relative;  ///< [body - 1][frame], to the first body
   std::vector<ViewDelay> delays;                   ///< per view
   double correlation = 0;                          ///< of the images' errors between neighbouring frames
+  double lasting = 0;                              ///< part of their variance that lasts over the sequence
   std::vector<double> sigma_factor;                ///< per marker, of the fits' standard deviations
   std::vector<MarkerDistance> distances;
   int repaired = 0, complete = 0;

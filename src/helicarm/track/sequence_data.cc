@@ -7,9 +7,14 @@ namespace helicarm::track {
 
 void locate_all(SequenceData& work) {
   work.points.assign(work.frames, std::vector<std::optional<SightedPoint>>(work.markers));
-  for (std::size_t f = 0; f < work.frames; ++f)
-    for (std::size_t m = 0; m < work.markers; ++m)
-      if (const auto seen = work.seen(f, m); seen.size() >= 2) work.points[f][m] = sighted_point(seen);
+  for (std::size_t m = 0; m < work.markers; ++m) locate_marker(work, m);
+}
+
+void locate_marker(SequenceData& work, std::size_t marker) {
+  for (std::size_t f = 0; f < work.frames; ++f) {
+    const auto seen = work.seen(f, marker);
+    work.points[f][marker] = seen.size() >= 2 ? sighted_point(seen) : std::nullopt;
+  }
 }
 
 OptionalPlace velocity_at(const SequenceData& work, std::size_t f, std::size_t m) {

@@ -29,6 +29,7 @@ struct SequenceData {
 };
 
 void locate_all(SequenceData& work);
+void locate_marker(SequenceData& work, std::size_t marker);
 
 /// By the neighbouring frames, mm a frame.
 OptionalPlace velocity_at(const SequenceData& work, std::size_t f, std::size_t m);

@@ -2,6 +2,7 @@
 #include "helicarm/track/sequence.h"
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <random>
 
@@ -104,6 +105,80 @@ TEST(Sequence, PlacesAndPosesAreWithinTheirBands) {
   EXPECT_NEAR(double(inside) / all, 0.95, 0.03);
   EXPECT_EQ(sequence.repaired, 0);
   EXPECT_FALSE(warning_of(sequence, Reason::markers_swapped));
+}
+
+/// Each marker hidden in the second view, later in both, in turn; its images displaced alike in all frames,
+/// as texture that moves with it does.
+std::vector<FrameSights> drawn_with_texture(const TrackCase& the_case, unsigned seed) {
+  constexpr int span = 4;
+  constexpr double texture_px = 0.05;
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  auto sights = drawn(the_case, none);
+  for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
+    std::array<Eigen::Vector2d, 2> texture;
+    for (Eigen::Vector2d& off : texture) off = texture_px * Eigen::Vector2d(normal(random), normal(random));
+    for (std::size_t f = 0; f < sights.size(); ++f) {
+      auto& of = sights[f].of[m];
+      for (std::size_t k = 0; k < 2; ++k)
+        of[k]->uv_raw += texture[k] + noise_px * Eigen::Vector2d(normal(random), normal(random));
+      const auto turn = f / span;
+      if (turn == m || turn == m + 1) of[1].reset();
+      if (turn == m + 1) of[0].reset();
+    }
+  }
+  return sights;
+}
+
+TEST(Sequence, BandsHoldErrorsThatLastForAllFrames) {
+  const TrackCase the_case = two_bodies();
+  std::array<int, 3> inside{}, all{};
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const Sequence sequence = estimate_sequence(the_case, drawn_with_texture(the_case, seed));
+    for (std::size_t f = 0; f < sequence.frames.size(); ++f)
+      for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
+        const TrackedMarker& marker = sequence.markers[f][m];
+        ASSERT_TRUE(marker.place);
+        const Eigen::Vector3d off = marker.place->place - place_of(m, int(f) + 1, none);
+        for (int k = 0; k < 3; ++k) {
+          inside[std::size_t(marker.status)] +=
+              std::abs(off[k]) < 1.96 * std::sqrt(marker.place->covariance(k, k));
+          ++all[std::size_t(marker.status)];
+        }
+      }
+  }
+  for (std::size_t status = 0; status < all.size(); ++status) {
+    ASSERT_GT(all[status], 350);
+    EXPECT_GT(double(inside[status]) / all[status], 0.92) << status_words[status];
+    EXPECT_LT(double(inside[status]) / all[status], 0.99) << status_words[status];
+  }
+}
+
+TEST(Sequence, ErrorsThatRayGapsDoNotShowWidenTheBand) {
+  const TrackCase the_case = two_bodies();
+  auto sights = drawn(the_case, none);
+  const double usual = estimate_sequence(the_case, sights).markers[20][1].place->covariance.trace();
+  // Horizontal: in the plane of both rays.
+  for (FrameSights& frame : sights) frame.of[1][0]->uv_raw.x() += 0.5 * std::sin(0.5 * frame.frame);
+  const Sequence sequence = estimate_sequence(the_case, sights);
+  const auto trace = [&](std::size_t m) { return sequence.markers[20][m].place->covariance.trace(); };
+  EXPECT_GT(trace(1), 1.5 * usual);
+  EXPECT_LT(trace(2), 1.3 * usual);
+}
+
+TEST(Sequence, LoneDiscsAfterALongGapAreNoMarker) {
+  const TrackCase the_case = two_bodies();
+  auto sights = drawn(the_case, none);
+  for (std::size_t f = 6; f < sights.size(); ++f)
+    for (std::size_t m = 4; m < 8; ++m) {
+      if (f == 39 && m == 5)
+        for (std::size_t k = 0; k < 2; ++k)
+          sights[f].of[m][k]->uv_raw =
+              the_case.views[k].camera.project(place_of(m, int(f) + 1, none) + Eigen::Vector3d(20, -15, 10));
+      else
+        sights[f].of[m].assign(2, std::nullopt);
+    }
+  EXPECT_EQ(estimate_sequence(the_case, sights).markers[39][5].status, MarkerStatus::lost);
 }
 
 TEST(Sequence, SwapOfTwoMarkersIsRepaired) {
