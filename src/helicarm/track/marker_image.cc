@@ -18,15 +18,16 @@ constexpr double same_px = 0.8;          // two fits of one disc
 /// Offsets of a disc and of the ring around it.
 struct Rings {
   std::vector<Eigen::Vector2i> disc, ring;
+  int reach = 0;
 };
 
 Rings rings_of(double radius_px) {
   const double radius = std::max(radius_px, least_radius_px);
   const double inner = radius + 1.5, outer = radius + 3.2;
   Rings rings;
-  const int reach = int(std::ceil(outer));
-  for (int v = -reach; v <= reach; ++v)
-    for (int u = -reach; u <= reach; ++u) {
+  rings.reach = int(std::ceil(outer));
+  for (int v = -rings.reach; v <= rings.reach; ++v)
+    for (int u = -rings.reach; u <= rings.reach; ++u) {
       const double distance = std::hypot(u, v);
       if (distance <= 0.8 * radius) rings.disc.emplace_back(u, v);
       if (distance >= inner && distance <= outer) rings.ring.emplace_back(u, v);
@@ -38,6 +39,11 @@ Rings rings_of(double radius_px) {
 float response_at(const image::Image<float>& grey, const Rings& rings, int u, int v) {
   float disc = 0, ring = 0;
   int in_disc = 0, in_ring = 0;
+  if (grey.contains(u - rings.reach, v - rings.reach) && grey.contains(u + rings.reach, v + rings.reach)) {
+    for (const Eigen::Vector2i& at : rings.disc) disc += grey(u + at.x(), v + at.y());
+    for (const Eigen::Vector2i& at : rings.ring) ring += grey(u + at.x(), v + at.y());
+    return ring / float(rings.ring.size()) - disc / float(rings.disc.size());
+  }
   for (const Eigen::Vector2i& at : rings.disc)
     if (grey.contains(u + at.x(), v + at.y())) disc += grey(u + at.x(), v + at.y()), ++in_disc;
   for (const Eigen::Vector2i& at : rings.ring)
