@@ -232,6 +232,34 @@ class Track(unittest.TestCase):
         self.assertIn("scale_disagrees", done.stderr)
         self.assertIn('"diameter_mm" is 3, the markers\' images are those of', done.stderr)
 
+    def test_smaller_diameter_than_the_markers_is_named(self):
+        def smaller(case, folder):
+            case["markers"]["diameter_mm"] = 0.7 * 2 * RADIUS
+        done = self.track(self.changed("smaller", smaller), "smaller-out")
+        self.assertIn('"diameter_mm" is 1.4, the markers\' images are those of', done.stderr)
+        figures = next(w["figures"] for w in json.loads((self.root / "smaller-out" / "track.json").read_text())["warnings"]
+                       if w["code"] == "scale_disagrees")
+        self.assertLess(figures["low_mm"], 2 * RADIUS)
+        self.assertGreater(figures["high_mm"], 2 * RADIUS)
+
+    def test_marker_in_no_image_of_the_first_frame_is_named(self):
+        def hide(case, folder):
+            for name, axes in CAMERAS.items():
+                (folder / f"{name}_{101 if name == 'B' else 1:04d}.png").write_bytes(image(axes, 1, False, ("J1",)))
+        done = self.track(self.changed("first-hidden", hide), "first-hidden-out")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn('frame 1: "J1" is found in no image: its place is that of its picks', done.stderr)
+        self.assertNotIn('"J2" is found in no image', done.stderr)
+        self.check_places(self.root / "first-hidden-out")
+
+    def test_markers_of_a_body_that_were_not_found_are_all_named(self):
+        def found(case, folder):
+            case["picks"] = []
+            case["bodies"] = [{"name": "jaw", "markers": ["M1", "M2", "M8", "M9"]}]
+        done = self.track(self.changed("not-found", found), "not-found-out")
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn('"M8", "M9" are not among the 6 markers found in the first frame, M1 to M6: pick them', done.stderr)
+
     def test_swap_in_mid_sequence_is_repaired_and_named(self):
         out = self.root / "swapped"
         shutil.copytree(self.root / "out", out)

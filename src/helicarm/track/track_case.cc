@@ -126,16 +126,29 @@ std::vector<Eigen::Vector3d> geometry_from(const fs::path& file, const TrackCase
   return places;
 }
 
-void read_bodies(TrackCase& read, const std::vector<pipeline::CaseBody>& bodies, const std::string& origin) {
+/// `is_picked`: by the user.
+void read_bodies(TrackCase& read, const std::vector<pipeline::CaseBody>& bodies, bool is_picked,
+                 const std::string& origin) {
   std::map<std::size_t, std::string> taken;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const auto refuse = [&](Reason reason, const std::string& problem) {
       throw BadInput(reason, fmt::format("{}: bodies[{}]: \"markers\": {}", origin, i, problem));
     };
     BodyPlan body{bodies[i].name, {}, {}};
+    std::vector<std::string> missing;
+    for (const std::string& name : bodies[i].markers)
+      if (std::ranges::find(read.markers, name) == read.markers.end()) missing.push_back('"' + name + '"');
+    if (!missing.empty())
+      refuse(
+          Reason::bad_value,
+          is_picked
+              ? fmt::format("{} {} no pick", fmt::join(missing, ", "), missing.size() == 1 ? "has" : "have")
+              : fmt::format("{} {} not among the {} markers found in the first frame{}: pick {}",
+                            fmt::join(missing, ", "), missing.size() == 1 ? "is" : "are", read.markers.size(),
+                            read.markers.empty() ? "" : fmt::format(", M1 to M{}", read.markers.size()),
+                            missing.size() == 1 ? "it" : "them"));
     for (const std::string& name : bodies[i].markers) {
       const auto found = std::ranges::find(read.markers, name);
-      if (found == read.markers.end()) refuse(Reason::bad_value, fmt::format("\"{}\" has no pick", name));
       const auto index = std::size_t(found - read.markers.begin());
       if (const auto [other, is_new] = taken.emplace(index, body.name); !is_new)
         refuse(Reason::name_clash,
@@ -183,7 +196,7 @@ Expected<TrackCase> read_track_case(const fs::path& path, const case_registratio
     else
       calibrate(read, base, frames);
     complete_picks(read, frames);
-    read_bodies(read, base.bodies, origin);
+    read_bodies(read, base.bodies, !base.picks.empty(), origin);
     return read;
   });
 }

@@ -69,6 +69,7 @@ Expected<Tracker> Tracker::begin(const TrackCase& the_case, int frame,
     tracker.check_rays();
     tracker.check_geometry();
     tracker.seek_first(images);
+    tracker.warn_of_unseen();
     tracker.absorb(tracker.first_);
     return tracker;
   });

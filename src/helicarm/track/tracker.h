@@ -97,6 +97,7 @@ class Tracker {
   void find_first(int frame, const std::vector<xray::XrayImage>& images);
   void check_rays();
   void seek_first(const std::vector<xray::XrayImage>& images);
+  void warn_of_unseen();
   void check_geometry() const;
   void update_delay(std::size_t marker, const FrameSights& sights, const Eigen::Vector3d& place,
                     const Eigen::Vector3d& velocity);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -13,33 +14,71 @@ namespace helicarm::track {
 
 namespace {
 
-/// What one appearance makes of the picked markers of a view.
-struct TriedAppearance {
-  double misfit, size;  ///< medians; size: logarithm of the fitted over the stated radius
-  double sigma;         ///< of the median size
-  std::size_t markers;
+/// A picked marker as one appearance fits it.
+struct FittedMarker {
+  double residual;  ///< rms, grey levels: a contrast that grows with the blur does not hide it
+  double size;      ///< logarithm of the fitted over the stated radius
 };
 
-/// Logarithms of the sizes that fit about as well as the best: a blurred small disc looks like a sharp large
+/// What one appearance makes of the picked markers of a view.
+struct TriedAppearance {
+  double polarity;
+  std::map<std::size_t, FittedMarker> markers;
+
+  double size() const {
+    std::vector<double> sizes;
+    for (const auto& [marker, fitted] : markers) sizes.push_back(fitted.size);
+    return median(std::move(sizes));
+  }
+  /// Of the median size, without those of other discs.
+  double sigma() const {
+    std::vector<double> off;
+    for (const auto& [marker, fitted] : markers) off.push_back(std::abs(fitted.size - size()));
+    return 1.25 * 1.4826 * median(std::move(off)) / std::sqrt(double(markers.size()));
+  }
+};
+
+/// Logarithms of the sizes that fit as well as the best: a blurred small disc looks almost like a sharp large
 /// one.
 struct SizeRange {
   double low = 0, high = 0, sigma = 0;
   std::size_t markers = 0;
 };
 
+/// Mean logarithm of the residuals over the least that any appearance leaves of the same marker.
+double excess_of(const TriedAppearance& tried, const std::map<std::size_t, double>& least) {
+  constexpr double most = 0.3;  // another disc
+  double sum = 0;
+  for (const auto& [marker, fitted] : tried.markers)
+    sum += std::min(most, std::log(fitted.residual / least.at(marker)));
+  return sum / double(tried.markers.size());
+}
+
+/// `all` of one polarity.
 SizeRange size_range(const std::vector<TriedAppearance>& all) {
-  constexpr double as_good = 1.1;  // of the least misfit
-  SizeRange range;
-  double least = 1e9;
-  for (const TriedAppearance& tried : all) range.markers = std::max(range.markers, tried.markers);
+  // A likelihood ratio of e^8 over some 80 pixels a marker, and what no profile explains.
+  constexpr double as_good = 0.1, model = 0.015;
+  std::map<std::size_t, double> least;
   for (const TriedAppearance& tried : all)
-    if (tried.markers == range.markers) least = std::min(least, tried.misfit);
+    for (const auto& [marker, fitted] : tried.markers) {
+      const auto [at, is_new] = least.emplace(marker, fitted.residual);
+      at->second = std::min(at->second, fitted.residual);
+    }
+  SizeRange range;
+  for (const TriedAppearance& tried : all) range.markers = std::max(range.markers, tried.markers.size());
+  const auto is_enough = [&](const TriedAppearance& tried) {
+    return 2 * tried.markers.size() >= range.markers;
+  };
+  double best = 1e9;
+  for (const TriedAppearance& tried : all)
+    if (is_enough(tried)) best = std::min(best, excess_of(tried, least));
   range.low = 1e9, range.high = -1e9;
   for (const TriedAppearance& tried : all)
-    if (tried.markers == range.markers && tried.misfit <= as_good * least) {
-      range.low = std::min(range.low, tried.size);
-      range.high = std::max(range.high, tried.size);
-      range.sigma = std::max(range.sigma, tried.sigma);
+    if (is_enough(tried) &&
+        excess_of(tried, least) <= best + std::max(model, as_good / double(tried.markers.size()))) {
+      range.low = std::min(range.low, tried.size());
+      range.high = std::max(range.high, tried.size());
+      range.sigma = std::max(range.sigma, tried.sigma());
     }
   return range;
 }
@@ -88,20 +127,19 @@ void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
           tried.profile = detection::BallProfile(blur, absorbance);
           tried.options = detection::fit_options_for(images[k]);
           std::vector<double> misfits, sizes;
+          TriedAppearance fits{polarity, {}};
           for (const MarkerPick& pick : given_->picks) {
             if (pick.view != k) continue;
             const double radius = radius_px(k, markers_[pick.marker].place);
             if (const auto found = picked_marker(images[k], pick.uv_raw, radius, click_px + radius, tried)) {
               misfits.push_back(found->misfit);
               sizes.push_back(std::log(found->image.radius_px / radius));
+              fits.markers[pick.marker] = {std::max(1e-9, found->misfit * std::abs(found->image.contrast)),
+                                           sizes.back()};
             }
           }
           if (misfits.empty()) continue;
-          const double middle = median(sizes);
-          double squares = 0;
-          for (const double size : sizes) squares += (size - middle) * (size - middle);
-          all.push_back(
-              {median(misfits), middle, 1.25 * std::sqrt(squares) / double(sizes.size()), sizes.size()});
+          all.push_back(std::move(fits));
           if (misfits.size() + 1 < most) continue;
           // A blurred small disc looks like a sharp large one: of what fits, the stated size decides.
           const double misfit = (median(misfits) + 0.1 * std::abs(median(sizes))) / double(misfits.size());
@@ -113,11 +151,27 @@ void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
           most = std::max(most, misfits.size());
         }
     if (most == 0) best.options = detection::fit_options_for(images[k]);
+    std::erase_if(all, [&](const TriedAppearance& tried) { return tried.polarity != best.polarity; });
     appearance_.push_back(best);
     sizes_of_views.push_back(size_range(all));
   }
   if (const auto contradiction = size_contradiction(sizes_of_views, given_->diameter_mm))
     warnings_.push_back(*contradiction);
+}
+
+void Tracker::warn_of_unseen() {
+  for (std::size_t m = 0; m < markers_.size(); ++m)
+    if (std::ranges::none_of(first_.of[m], [](const auto& image) { return image.has_value(); }))
+      warnings_.push_back(
+          {Reason::target_not_found,
+           fmt::format("frame {}: \"{}\" is found in no image{}", first_.frame, given_->markers[m],
+                       body_of_[m]
+                           ? ": its place is that of its picks, moved with its body, until two views "
+                             "show it; pick it again if it is visible, or begin where it is"
+                           : ": it is followed from where two views show it at its picks' place; pick "
+                             "it again if it is visible, or begin where it is"),
+           {},
+           {{"frame", double(first_.frame)}}});
 }
 
 void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) {
