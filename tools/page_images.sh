@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Pictures of every page of the desktop application in every state, at 1280 x 800 and 1920 x 1080, dark and light, with
-# usual and large text: tools/page_images.sh [FOLDER] [FILTER]; needs a built gui_window_test and xvfb-run.
+# usual and large text, and of its dialogs: tools/page_images.sh [FOLDER] [FILTER]; needs a built gui_window_test and
+# xvfb-run. Of your own cases: HELICARM_CASES=CASE:CASE tools/page_images.sh FOLDER GivenCases
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=${1:-build/page_images}

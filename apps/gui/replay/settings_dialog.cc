@@ -38,6 +38,7 @@ void SettingsDialog::add_page(QTabWidget& pages, const QString& title, Options S
 SettingsDialog::SettingsDialog(Settings settings, QWidget* parent)
     : QDialog(parent), given_(std::move(settings)) {
   setWindowTitle(tr("Settings"));
+  setObjectName("settings");
   auto* pages = new QTabWidget(this);
   add_page(*pages, tr("&Measurement"), &Settings::run, pipeline::run_fields);
   add_page(*pages, tr("R&egistration"), &Settings::search, case_registration::search_fields);

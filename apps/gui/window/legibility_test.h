@@ -77,12 +77,12 @@ inline double contrast_in(const QImage& image) {
   return largest;
 }
 
-inline void check_place(const QWidget& widget, const MainWindow& window, QStringList& wrong) {
+inline void check_place(const QWidget& widget, const QWidget& window, QStringList& wrong) {
   const QWidget* page = nullptr;  // what scrolls up and down
   for (const QWidget* up = widget.parentWidget(); up != nullptr; up = up->parentWidget())
     if (qobject_cast<const QScrollArea*>(up) != nullptr)
       page = static_cast<const QScrollArea*>(up)->viewport();
-  const QWidget& bounds = page != nullptr ? *page : static_cast<const QWidget&>(window);
+  const QWidget& bounds = page != nullptr ? *page : window;
   const QRect at(widget.mapTo(&bounds, QPoint()), widget.size());
   const bool is_cut = at.left() < 0 || at.right() >= bounds.width() ||
                       (page == nullptr && (at.top() < 0 || at.bottom() >= bounds.height()));
@@ -134,8 +134,8 @@ inline void check_card(const StepButton& card, const QWidget& page, QStringList&
   wrong << card.card().name + ": elided, and not on its page: " + card.card().why;
 }
 
-/// Of what is displayed at present.
-inline QStringList illegible(MainWindow& window) {
+/// Of the parts of a window or dialog that are displayed at present.
+inline QStringList illegible_parts(QWidget& window) {
   QStringList wrong;
   for (QWidget* widget : window.findChildren<QWidget*>()) {
     if (!widget->isVisible() || widget->window() != &window) continue;
@@ -149,6 +149,12 @@ inline QStringList illegible(MainWindow& window) {
     if (!is_reached_by_key(*widget) && widget->objectName() != "stop")
       wrong << described(*widget) + " is not reached by Tab";
   }
+  return wrong;
+}
+
+/// Of what is displayed at present.
+inline QStringList illegible(MainWindow& window) {
+  QStringList wrong = illegible_parts(window);
   if (window.statusBar()->geometry().bottom() >= window.height() ||
       window.statusBar()->height() < window.statusBar()->fontMetrics().height())
     wrong << "the status line is cut";

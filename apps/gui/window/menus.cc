@@ -84,7 +84,9 @@ void MainWindow::build_menus() {
 
   QMenu* help = menuBar()->addMenu(tr("&Help"));
   const auto notify = [this](const QString& title, const QString& words) {
-    show_beside(new QMessageBox(QMessageBox::Information, title, words, QMessageBox::Close, this));
+    auto* box = new QMessageBox(QMessageBox::Information, title, words, QMessageBox::Close, this);
+    box->setObjectName(title.toLower());
+    show_beside(box);
   };
   help->addAction(tr("&Keys"), QKeySequence::HelpContents, this, [notify] {
     notify(

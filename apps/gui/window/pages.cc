@@ -57,6 +57,7 @@ bool Page::event(QEvent* event) {
   const bool done = QWidget::event(event);
   if (event->type() == QEvent::LayoutRequest || event->type() == QEvent::Resize)
     setMinimumHeight(layout()->totalMinimumHeightForWidth(width()));
+  if (event->type() == QEvent::LayoutRequest) updateGeometry();  // smaller text may need less width
   return done;
 }
 

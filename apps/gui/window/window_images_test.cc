@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every page in every state: legible, reachable, and as images (tools/page_images.sh).
+#include <QAction>
+#include <QDockWidget>
 #include <QDoubleSpinBox>
+#include <QMessageBox>
+#include <QTabWidget>
+#include <iostream>
 
 #include "gui/controller/case_with_model_test.h"
 #include "gui/window/legibility_test.h"
@@ -11,6 +16,8 @@ namespace helicarm::gui {
 namespace {
 
 constexpr int large_text_px = 20;
+/// Within which the window is laid out after a change of its size or text.
+constexpr int layout_ms = 2000;
 
 class WindowImages : public Window {
  protected:
@@ -39,41 +46,73 @@ class WindowImages : public Window {
     click("registerModels");
     ASSERT_TRUE(wait("the model is registered", [&] { return state().registration && !state().busy; }));
   }
-  /// Every page at both sizes, in both themes, with usual and large text; saved if the variable
-  /// HELICARM_PICTURES names a folder.
-  void inspect(const char* name) {
-    const QString folder = qEnvironmentVariable("HELICARM_PICTURES");
-    const bool all = !folder.isEmpty();
-    ASSERT_TRUE(wait("the images are shown", [&] { return !window_->xray(0).is_computing(); }));
+  /// At both sizes, in both themes, with usual and large text; without HELICARM_PICTURES a part of these.
+  void in_every_appearance(const std::function<void(const QSize& size, const QString& appearance)>& look) {
     for (const QSize& size : {QSize(1280, 800), QSize(1920, 1080)})
       for (const style::Theme theme : {style::Theme::dark, style::Theme::light})
         for (const int text_px : {style::usual_text_px, large_text_px}) {
           const bool is_small = size.width() == 1280, is_dark = theme == style::Theme::dark;
-          if (!all && (is_dark != is_small || (!is_small && text_px != style::usual_text_px))) continue;
+          if (pictures_.isEmpty() && (is_dark != is_small || (!is_small && text_px != style::usual_text_px)))
+            continue;
           style::apply({theme, text_px});
           window_->resize(size);
-          for (const Phase phase : phases) {
-            if (!window_->strip().button(phase)->isVisible()) continue;
-            window_->strip().chosen(phase);
-            QTest::qWait(50);
-            const QString what = QString("%1-%2-%3x%4-%5-%6")
-                                     .arg(name)
-                                     .arg(card(phase).name.toLower())
-                                     .arg(size.width())
-                                     .arg(size.height())
-                                     .arg(theme == style::Theme::dark ? "dark" : "light")
-                                     .arg(text_px);
-            EXPECT_LE(window_->width(), size.width()) << what.toStdString();
-            EXPECT_LE(window_->height(), size.height()) << what.toStdString();
-            const QStringList wrong = illegible(*window_);
-            EXPECT_TRUE(wrong.isEmpty()) << what.toStdString() << ":\n" << wrong.join('\n').toStdString();
-            if (all) window_->grab().save(folder + '/' + what + ".png");
-          }
+          look(size, QString("%1x%2-%3-%4")
+                         .arg(size.width())
+                         .arg(size.height())
+                         .arg(is_dark ? "dark" : "light")
+                         .arg(text_px));
         }
+  }
+  /// What cannot be read or reached as soon as it is laid out; saved if HELICARM_PICTURES names a folder.
+  void expect_legible(QWidget& widget, const QString& what,
+                      const std::function<QStringList()>& illegible_of) {
+    QStringList wrong;
+    const auto is_laid_out = [&] {
+      QCoreApplication::processEvents();
+      wrong = illegible_of();
+      return wrong.isEmpty();
+    };
+    static_cast<void>(QTest::qWaitFor(is_laid_out, layout_ms));
+    EXPECT_TRUE(wrong.isEmpty()) << what.toStdString() << ":\n" << wrong.join('\n').toStdString();
+    if (!pictures_.isEmpty()) widget.grab().save(pictures_ + '/' + what + ".png");
+  }
+  /// Every page.
+  void inspect(const char* name) {
+    ASSERT_TRUE(wait("the images are shown", [&] { return !window_->xray(0).is_computing(); }));
+    in_every_appearance([&](const QSize& size, const QString& appearance) {
+      for (const Phase phase : phases) {
+        if (!window_->strip().button(phase)->isVisible()) continue;
+        window_->strip().chosen(phase);
+        const QString what = QString("%1-%2-%3").arg(name, card(phase).name.toLower(), appearance);
+        expect_legible(*window_, what, [&] { return illegible(*window_); });
+        EXPECT_LE(window_->width(), size.width()) << what.toStdString();
+        EXPECT_LE(window_->height(), size.height()) << what.toStdString();
+      }
+    });
+    back_to_usual();
+  }
+  void inspect_dialog(const char* name, QWidget& dialog) {
+    in_every_appearance([&](const QSize& size, const QString& appearance) {
+      const QString what = QString("dialog-%1-%2").arg(name, appearance);
+      expect_legible(dialog, what, [&] { return illegible_parts(dialog); });
+      EXPECT_LE(dialog.width(), size.width()) << what.toStdString();
+      EXPECT_LE(dialog.height(), size.height()) << what.toStdString();
+    });
+    dialog.close();
+    back_to_usual();
+  }
+  QAction* action(const char* words) {
+    for (QAction* each : window_->findChildren<QAction*>())
+      if (each->text().contains(words)) return each;
+    ADD_FAILURE() << "no action " << words;
+    return nullptr;
+  }
+  void back_to_usual() {
     window_->resize(1280, 800);
     style::apply({});
   }
 
+  const QString pictures_ = qEnvironmentVariable("HELICARM_PICTURES");
   simulation::SimulatedCase simulated_;
 };
 
@@ -165,6 +204,69 @@ TEST_F(WindowImages, Rehearsal) {
   ASSERT_TRUE(with_robot(
       "a path is planned", [&] { click("planWay"); }, [&] { return state().order.has_value(); }));
   inspect("rehearsal-planned");
+}
+
+TEST_F(WindowImages, DialogOfANewCase) {
+  ASSERT_NO_FATAL_FAILURE(write_tunnels({"AP:2,1", "LAT:88,-2", "OBL:45,3"}));
+  window_->open_paths({folder_ / "tunnels" / "AP.dcm", folder_ / "tunnels" / "LAT.dcm"});
+  ASSERT_TRUE(wait("the dialog is offered", [&] { return window_->new_case() != nullptr; }));
+  ASSERT_TRUE(
+      wait("the images are looked at", [&] { return !window_->new_case()->is_checking() && !state().busy; }));
+  inspect_dialog("new-case", *window_->new_case());
+}
+
+TEST_F(WindowImages, DialogOfTheSettings) {
+  action("ttings")->trigger();
+  auto* dialog = find<QDialog>("settings");
+  auto* pages = dialog->findChild<QTabWidget*>();
+  for (int page = 0; page < pages->count(); ++page) {
+    pages->setCurrentIndex(page);
+    dialog->show();
+    inspect_dialog(fmt::format("settings-{}", page + 1).c_str(), *dialog);
+    if (page + 1 == pages->count()) break;
+    action("ttings")->trigger();
+    QCoreApplication::sendPostedEvents(nullptr, QEvent::DeferredDelete);
+    dialog = find<QDialog>("settings");
+    pages = dialog->findChild<QTabWidget*>();
+  }
+}
+
+TEST_F(WindowImages, QuestionsAndHelp) {
+  ASSERT_NO_FATAL_FAILURE(open_tunnels());
+  window_->controller().erase_picks("FS");
+  ASSERT_TRUE(wait_idle());
+  window_->close();
+  inspect_dialog("unsaved-picks", *find<QMessageBox>("unsavedQuestion"));
+  action("&Keys")->trigger();
+  inspect_dialog("keys", *find<QMessageBox>("keys"));
+}
+
+TEST_F(WindowImages, Panels) {
+  ASSERT_NO_FATAL_FAILURE(open_tunnels());
+  for (const char* dock : {"measuresDock", "logDock"}) {
+    find<QDockWidget>(dock)->show();
+    inspect(dock);
+    find<QDockWidget>(dock)->hide();
+  }
+}
+
+/// Folders of cases, or of images, in HELICARM_CASES, with colons between.
+TEST_F(WindowImages, GivenCases) {
+  const QStringList folders = qEnvironmentVariable("HELICARM_CASES").split(':', Qt::SkipEmptyParts);
+  if (folders.isEmpty()) GTEST_SKIP() << "HELICARM_CASES names no folders";
+  for (const QString& folder : folders) {
+    const std::string name = fs::path(folder.toStdString()).filename().string();
+    SCOPED_TRACE(name);
+    window_->open_paths({folder.toStdString()});
+    ASSERT_TRUE(wait("it is read", [&] { return !state().busy; }));
+    if (window_->new_case() != nullptr) {
+      ASSERT_TRUE(wait("the images are looked at", [&] { return !window_->new_case()->is_checking(); }));
+      inspect_dialog((name + "-new-case").c_str(), *window_->new_case());
+    }
+    if (can_register(state())) register_model();
+    std::cout << name << ": " << seen() << std::endl;
+    inspect(name.c_str());
+  }
 }
 
 TEST_F(WindowImages, TextHasContrastInBothThemesAlsoInSelectedRows) {
