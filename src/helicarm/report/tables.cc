@@ -84,6 +84,7 @@ Cell status_of(const ViewFiducial& row) {
 
 Cell dots_of(const pipeline::ViewResult* view) {
   const rectification::Rectification& done = *view->rectification;
+  if (done.dots_found == 0 && !done.dots_expected) return {"–"};
   return {done.dots_expected ? fmt::format("{} of {}", done.dots_found, *done.dots_expected)
                              : std::to_string(done.dots_found)};
 }
@@ -382,7 +383,10 @@ Table rectification_table(const std::vector<pipeline::ViewResult>& views) {
       {{words("View", "Name of the X-ray view"), [](View v) { return Cell{v->name}; }},
        {words("Model", "Distortion model; identity: the image is taken as free of distortion"),
         [](View v) { return Cell{v->rectification->map.model->name()}; }},
-       {number("Dots", "Dots of the plate that were found; 0 for a flat panel or a given map"), dots_of},
+       {number("Dots",
+               "Dots of the plate that were found in this image; none for a flat panel, a plate image or a "
+               "given map"),
+        dots_of},
        {number("Residual rms, px", "Distance of the dots from the corrected lattice, root mean square, px"),
         [](View v) { return of_map(v, v->rectification->map.residual_rms_px, 3); }},
        {number("Residual max, px", "The largest of these distances, px"),

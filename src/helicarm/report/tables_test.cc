@@ -104,6 +104,7 @@ TEST(RectificationTable, ImageWithoutDistortionHasNoResiduals) {
   const Table table = rectification_table({view});
   EXPECT_EQ(cell(table, 0, "Model"), "identity");
   EXPECT_EQ(cell(table, 0, "Residual rms, px"), "–");
+  EXPECT_EQ(cell(table, 0, "Dots"), "–");
 }
 
 TEST(Tables, EveryRowHasACellPerColumn) {
