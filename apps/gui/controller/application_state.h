@@ -12,6 +12,7 @@
 
 #include "helicarm/operation/operation.h"
 #include "helicarm/pipeline/case.h"
+#include "helicarm/registration/motion.h"
 #include "helicarm/simulation/bone_meshes.h"
 
 namespace helicarm::case_registration {
@@ -37,7 +38,8 @@ inline constexpr std::array phases{Phase::acquire,  Phase::rectify, Phase::calib
 
 /// A registered model at a pose tried by hand.
 struct NudgedModel {
-  std::size_t model = 0;  ///< among those of the registration
+  std::size_t model = 0;                                           ///< among those of the registration
+  registration::RigidStep step = registration::RigidStep::Zero();  ///< from its registered pose
   geometry::RigidTransform world_from_model;
   std::vector<std::vector<Eigen::Vector2d>> outlines;  ///< per view, rectified px
 };
@@ -78,6 +80,7 @@ struct ApplicationState {
   std::map<std::string, double> touched_mm;  ///< deviation at the last touch
 
   std::vector<operation::OperationTunnel> tunnels;
+  std::vector<std::string> tool_lines = {};             ///< tunnels of which the case states the tool's line
   std::vector<std::string> landmarks;                   ///< other points to pick; of files only
   std::map<std::string, pipeline::BoneLabel> bones_of;  ///< of landmarks that are not picked yet
   std::vector<pipeline::Pick> picks;
@@ -93,8 +96,9 @@ struct ApplicationState {
   bool has_models = false;  ///< the case names models to be registered
   std::shared_ptr<const case_registration::CaseRegistration> registration = {};
   std::optional<NudgedModel> nudged = {};
-  std::vector<pipeline::Pick> registered_picks = {};  ///< at the registration
-  std::vector<std::string> models = {};               ///< names of the case's
+  std::vector<pipeline::Pick> registered_picks = {};                     ///< at the registration
+  std::vector<std::string> models = {};                                  ///< names of the case's
+  std::vector<std::optional<std::filesystem::path>> model_volumes = {};  ///< their CTs
 
   QString tour;      ///< description of the registration moves
   QString way = {};  ///< of the moves of `order`

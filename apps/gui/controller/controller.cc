@@ -162,6 +162,7 @@ Controller::Change Controller::measured(Equipment& equipment, const std::vector<
     if (other_models || result->failure) {
       state.registration.reset();
       state.nudged.reset();
+      forget_registrations();
     }
     state.result = result;
     state.failed_picks = failed_picks(state, state.failed_picks);

@@ -81,10 +81,14 @@ class Controller : public QObject {
   /// Removes a point's picks in all views, and the point if it is a landmark.
   void erase_picks(const std::string& point);
   void clear_picks();
-  bool can_undo_picks() const { return !earlier_picks_.empty(); }
-  bool can_redo_picks() const { return !later_picks_.empty(); }
-  void undo_picks() { step_picks(earlier_picks_, later_picks_); }
-  void redo_picks() { step_picks(later_picks_, earlier_picks_); }
+  /// Of picks, points to pick, tunnels left out, models moved by hand and their registration.
+  bool can_undo() const { return !earlier_.empty() && takes_picks(); }
+  bool can_redo() const { return !later_.empty() && takes_picks(); }
+  /// What is undone or repeated next; empty without one.
+  QString undoes() const { return earlier_.empty() ? QString() : earlier_.back().what; }
+  QString redoes() const { return later_.empty() ? QString() : later_.back().what; }
+  void undo() { step_edits(earlier_, later_); }
+  void redo() { step_edits(later_, earlier_); }
   void measure();
   /// Reads the case again if a file of it has changed.
   void measure_again();
@@ -92,8 +96,8 @@ class Controller : public QObject {
   /// Registers the models of a measured case, the nudged one from its present pose.
   void register_models();
   /// Moves a registered model from its registered pose, about its centre; its outlines follow as soon as they
-  /// are computed.
-  void nudge(std::size_t model, const registration::RigidStep& step);
+  /// are computed. `continues`: as a part of the move before, for undo.
+  void nudge(std::size_t model, const registration::RigidStep& step, bool continues = false);
 
   void unlock(const std::string& who);
   void register_robot();
@@ -128,6 +132,17 @@ class Controller : public QObject {
  private:
   using Change = std::function<void(ApplicationState&)>;
   using Picks = std::vector<pipeline::Pick>;
+  /// What a person has made, before or after the change `what`.
+  struct Edit {
+    QString what;
+    Picks picks;
+    std::vector<operation::OperationTunnel> tunnels;
+    std::vector<std::string> landmarks;
+    std::map<std::string, pipeline::BoneLabel> bones_of;
+    std::shared_ptr<const case_registration::CaseRegistration> registration;
+    Picks registered_picks;
+    std::optional<NudgedModel> nudged;
+  };
 
   void begin(Phase phase, std::string doing, std::function<Change()> work);
   void finish(Phase phase, const Expected<Change>& done);
@@ -138,8 +153,12 @@ class Controller : public QObject {
   /// From any thread: a state change during the work.
   void meanwhile(Change change);
   void take_waiting_image();
-  void change_picks(Picks picks, bool measurable);
-  void step_picks(std::vector<Picks>& from, std::vector<Picks>& to);
+  void change_picks(Picks picks, bool measurable, const QString& what);
+  Edit edit_named(const QString& what) const;
+  void remember_edit(const QString& what);
+  /// Registrations to other calibrated views are not returned to.
+  void forget_registrations();
+  void step_edits(std::vector<Edit>& from, std::vector<Edit>& to);
   void picks_changed(bool measurable);
   bool has_all_images() const;
   Change measured(Equipment& equipment, const std::vector<pipeline::Pick>& picks);
@@ -156,10 +175,10 @@ class Controller : public QObject {
   std::optional<operation::LiveTool> live_tool_;
   std::optional<operation::PlanWatch> plan_watch_;  ///< of the displayed path
   std::string followed_;
-  std::vector<Picks> earlier_picks_, later_picks_;  ///< for undo and redo, the last is the next
-  bool outlining_ = false;                          ///< of the nudged model
-  bool measures_again_ = false;                     ///< after the work in progress
-  std::function<void()> next_source_;               ///< opened as soon as the work in progress has ended
+  std::vector<Edit> earlier_, later_;  ///< for undo and redo, the last is the next
+  bool outlining_ = false;             ///< of the nudged model
+  bool measures_again_ = false;        ///< after the work in progress
+  std::function<void()> next_source_;  ///< opened as soon as the work in progress has ended
   case_registration::RegisterOptions options_;
   std::optional<operation::FreshnessLimits> freshness_;
   QTimer images_;

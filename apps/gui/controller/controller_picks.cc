@@ -9,17 +9,52 @@
 
 namespace helicarm::gui {
 
-void Controller::change_picks(Picks picks, bool measurable) {
-  earlier_picks_.push_back(std::exchange(state_.picks, std::move(picks)));
-  later_picks_.clear();
+Controller::Edit Controller::edit_named(const QString& what) const {
+  return {what,
+          state_.picks,
+          state_.tunnels,
+          state_.landmarks,
+          state_.bones_of,
+          state_.registration,
+          state_.registered_picks,
+          state_.nudged};
+}
+
+void Controller::remember_edit(const QString& what) {
+  earlier_.push_back(edit_named(what));
+  later_.clear();
+}
+
+void Controller::forget_registrations() {
+  for (auto* edits : {&earlier_, &later_})
+    for (Edit& edit : *edits) {
+      edit.registration.reset();
+      edit.nudged.reset();
+    }
+}
+
+void Controller::change_picks(Picks picks, bool measurable, const QString& what) {
+  remember_edit(what);
+  state_.picks = std::move(picks);
   keep_unsaved_picks();
   picks_changed(measurable);
 }
 
-void Controller::step_picks(std::vector<Picks>& from, std::vector<Picks>& to) {
+void Controller::step_edits(std::vector<Edit>& from, std::vector<Edit>& to) {
   if (!takes_picks() || from.empty()) return;
-  to.push_back(std::exchange(state_.picks, std::move(from.back())));
+  Edit edit = std::move(from.back());
   from.pop_back();
+  to.push_back(edit_named(edit.what));
+  const bool other_picks = !are_same(edit.picks, state_.picks);
+  state_.picks = std::move(edit.picks);
+  state_.tunnels = std::move(edit.tunnels);
+  state_.landmarks = std::move(edit.landmarks);
+  state_.bones_of = std::move(edit.bones_of);
+  state_.registration = std::move(edit.registration);
+  state_.registered_picks = std::move(edit.registered_picks);
+  state_.nudged = std::move(edit.nudged);
+  if (!outlining_) outline_nudged();
+  if (!other_picks) return emit changed();
   keep_unsaved_picks();
   picks_changed(has_all_images());
 }
@@ -62,6 +97,7 @@ void Controller::add_landmark(const std::string& name, std::optional<pipeline::B
   if (name.empty() || is_taken)
     return emit refused(Phase::plan, name.empty() ? tr("A landmark needs a name.")
                                                   : tr("There is a point of this name already."));
+  remember_edit(tr("landmark %1").arg(QString::fromStdString(name)));
   state_.landmarks.push_back(name);
   state_.bones_of.erase(name);
   if (bone) state_.bones_of.emplace(name, *std::move(bone));
@@ -70,6 +106,7 @@ void Controller::add_landmark(const std::string& name, std::optional<pipeline::B
 
 void Controller::leave_out_tunnels() {
   if (state_.source != Source::files || !takes_picks()) return;
+  remember_edit(tr("tunnels left out"));
   std::erase_if(state_.tunnels, [&](const auto& tunnel) { return is_unpicked(state_, tunnel); });
   emit changed();
 }
@@ -94,7 +131,8 @@ void Controller::pick(pipeline::Pick pick) {
   const std::string point = pick.name;
   picks.push_back(std::move(pick));
   const bool completes = is_picked(picks, state_.views, point);
-  change_picks(std::move(picks), completes);  // shows its position and ray gap immediately
+  // Shows its position and ray gap immediately.
+  change_picks(std::move(picks), completes, tr("pick of %1").arg(QString::fromStdString(point)));
 }
 
 void Controller::set_snap(const std::string& point, pipeline::Snap snap, const std::string& view) {
@@ -108,24 +146,28 @@ void Controller::set_snap(const std::string& point, pipeline::Snap snap, const s
     }
   if (!changes) return;
   const bool completes = is_picked(picks, state_.views, point);
-  change_picks(std::move(picks), completes);
+  change_picks(std::move(picks), completes, tr("snap of %1").arg(QString::fromStdString(point)));
 }
 
 void Controller::take_offered_picks() {
-  if (takes_picks()) change_picks(state_.offered_picks, has_all_images());
+  if (takes_picks()) change_picks(state_.offered_picks, has_all_images(), tr("the plan's picks"));
 }
 
 void Controller::erase_picks(const std::string& point) {
   Picks picks = state_.picks;
   const auto erased = std::erase_if(picks, [&](const pipeline::Pick& pick) { return pick.name == point; });
-  if (!takes_picks()) return;
-  const auto forgotten = std::erase(state_.landmarks, point);
-  if (forgotten > 0 && erased == 0) emit changed();
-  if (erased > 0) change_picks(std::move(picks), has_all_images());
+  const bool is_landmark = std::ranges::find(state_.landmarks, point) != state_.landmarks.end();
+  if (!takes_picks() || (erased == 0 && !is_landmark)) return;
+  remember_edit(tr("deletion of %1").arg(QString::fromStdString(point)));
+  std::erase(state_.landmarks, point);
+  if (erased == 0) return emit changed();
+  state_.picks = std::move(picks);
+  keep_unsaved_picks();
+  picks_changed(has_all_images());
 }
 
 void Controller::clear_picks() {
-  if (takes_picks() && !state_.picks.empty()) change_picks({}, has_all_images());
+  if (takes_picks() && !state_.picks.empty()) change_picks({}, has_all_images(), tr("deletion of all picks"));
 }
 
 }  // namespace helicarm::gui

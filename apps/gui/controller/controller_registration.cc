@@ -47,7 +47,8 @@ void Controller::register_models() {
           };
           const auto done = std::make_shared<const CaseRegistration>(
               value_or_throw(gui::register_models(*equipment, picks, from, tell)));
-          return [done, picks](ApplicationState& state) {
+          return [this, done, picks](ApplicationState& state) {
+            remember_edit(tr("registration"));
             state.registration = done;
             state.registered_picks = picks;
             state.nudged.reset();
@@ -55,15 +56,20 @@ void Controller::register_models() {
         });
 }
 
-void Controller::nudge(std::size_t model, const registration::RigidStep& step) {
+void Controller::nudge(std::size_t model, const registration::RigidStep& step, bool continues) {
   if (state_.busy || !state_.registration || model >= state_.registration->models.size()) return;
+  const bool is_there =
+      state_.nudged ? state_.nudged->model == model && state_.nudged->step == step : step.isZero(0);
+  if (is_there) return;
+  const QString name = QString::fromStdString(state_.registration->models[model].registration.name);
+  if (!continues) remember_edit(tr("move of %1").arg(name));
   const case_registration::RegisteredModel& registered = state_.registration->models[model];
   const registration::Registration& from = registered.registration;
   Outlines until_then = state_.nudged && state_.nudged->model == model ? std::move(state_.nudged->outlines)
                                                                        : registered.outlines;
   state_.nudged.reset();
   if (!step.isZero(0) && registered.model)
-    state_.nudged = {model, registration::moved_about(from.world_from_model, from.centre, step),
+    state_.nudged = {model, step, registration::moved_about(from.world_from_model, from.centre, step),
                      std::move(until_then)};
   emit changed();
   if (!outlining_) outline_nudged();

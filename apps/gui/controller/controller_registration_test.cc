@@ -203,6 +203,54 @@ TEST_F(ControllerRegistration, CancelDuringTheSearchEndsIt) {
   EXPECT_EQ(told.back(), "bone: search");
 }
 
+TEST_F(ControllerRegistration, UndoTakesBackMovesLandmarksAndRegistrations) {
+  register_models();
+  const auto first = state().registration;
+  ASSERT_TRUE(first);
+  registration::RigidStep step = registration::RigidStep::Zero();
+  step[3] = 1;
+  controller_->nudge(0, step);
+  step[3] = 2;
+  controller_->nudge(0, step, true);  // the same drag
+  EXPECT_EQ(controller_->undoes(), "move of bone");
+  controller_->nudge(0, step);  // is there
+  controller_->add_landmark("epicondyle");
+  EXPECT_EQ(controller_->undoes(), "landmark epicondyle");
+  controller_->undo();
+  EXPECT_TRUE(state().landmarks.empty());
+  ASSERT_TRUE(state().nudged);
+  controller_->undo();
+  EXPECT_FALSE(state().nudged);
+  EXPECT_EQ(controller_->redoes(), "move of bone");
+  controller_->redo();
+  ASSERT_TRUE(state().nudged);
+  EXPECT_EQ(state().nudged->step, step);
+  register_models();
+  ASSERT_NE(state().registration, first);
+  EXPECT_FALSE(state().nudged);
+  controller_->undo();
+  EXPECT_EQ(state().registration, first);
+  EXPECT_TRUE(state().nudged);
+}
+
+TEST_F(ControllerRegistration, UndoReturnsToNoRegistrationOfOtherViews) {
+  register_models();
+  ASSERT_TRUE(state().registration);
+  registration::RigidStep step = registration::RigidStep::Zero();
+  step[3] = 1;
+  controller_->nudge(0, step);
+  case_registration::RegisterOptions options;
+  options.run.motion_sigma_mm = 0.5;
+  controller_->set_options(options);
+  wait([&] { return !state().busy; });
+  ASSERT_FALSE(state().registration);
+  while (controller_->can_undo()) {
+    controller_->undo();
+    EXPECT_FALSE(state().registration);
+    EXPECT_FALSE(state().nudged);
+  }
+}
+
 TEST(Steps, RegistrationIsOfCasesWithModels) {
   EXPECT_FALSE(steps_of({})[std::size_t(Phase::registration)].is_offered);
 }

@@ -4,6 +4,7 @@
 
 #include "gui/controller/controller.h"
 #include "gui/controller/equipment.h"
+#include "gui/controller/pick_checks.h"
 #include "gui/controller/unsaved_picks.h"
 #include "helicarm/operation/plan_fields.h"
 #include "helicarm/pipeline/case.h"
@@ -95,8 +96,8 @@ void Controller::open(Source source, const fs::path& folder, std::string doing,
                   .arg(QString::fromStdString(state_.case_folder->string())));
   auto old = std::exchange(equipment_, nullptr);
   live_tool_.reset();
-  earlier_picks_.clear();
-  later_picks_.clear();
+  earlier_.clear();
+  later_.clear();
   watch_no_files();
   state_ = ApplicationState{};
   state_.asked_for = folder;
@@ -240,7 +241,9 @@ QString Controller::loss() const {
                             return view.xray_image != nullptr;
                           });
   if (operates && (has_images || state_.busy)) return tr("End this operation? Its record is kept.");
-  if (can_undo_picks() && (state_.picks_not_kept || !state_.case_folder))
+  const bool has_other_picks =
+      std::ranges::any_of(earlier_, [&](const Edit& edit) { return !are_same(edit.picks, state_.picks); });
+  if (has_other_picks && (state_.picks_not_kept || !state_.case_folder))
     return tr("The changed picks are not kept in a file. Discard them?");
   return {};
 }
@@ -251,20 +254,29 @@ Controller::Change Controller::with_case(pipeline::Case the_case, Equipment& equ
   const std::vector<ViewFile> files = files_of(the_case);
   const Change found = measured(equipment, unsaved.value_or(the_case.picks));
   std::vector<std::string> models;
-  for (const pipeline::CaseModel& model : the_case.models) models.push_back(model.name);
+  std::vector<std::optional<fs::path>> volumes;
+  for (const pipeline::CaseModel& model : the_case.models) {
+    models.push_back(model.name);
+    volumes.push_back(model.volume ? std::optional(the_case.folder / *model.volume) : std::nullopt);
+  }
   return [this, the_case = std::move(the_case), unsaved = std::move(unsaved), files, found,
-          models = std::move(models)](ApplicationState& state) {
+          models = std::move(models), volumes = std::move(volumes)](ApplicationState& state) {
     for (const pipeline::CaseView& view : the_case.views) state.views.push_back(view.name);
     state.files = files;
     state.calibrator = the_case.calibrator;
     state.tunnels = tunnels_of(the_case, unsaved.value_or(the_case.picks));
     state.picks = unsaved.value_or(the_case.picks);
     state.has_unsaved_picks = unsaved.has_value();
-    if (unsaved) earlier_picks_.push_back(the_case.picks);
+    if (unsaved) {
+      earlier_.push_back(edit_named(tr("the restored picks")));
+      earlier_.back().picks = the_case.picks;
+    }
+    for (const guidance::ToolLine& line : the_case.tool_lines) state.tool_lines.push_back(line.tunnel);
     complete_landmarks(state);
     found(state);
     state.has_models = !models.empty();
     state.models = models;
+    state.model_volumes = volumes;
   };
 }
 

@@ -91,6 +91,23 @@ TEST(Steps, PlanIsGoodOnlyWithAllEndsLocatedAndShowsTheLargestError) {
   EXPECT_EQ(card.figure, "within 0.56 mm (95 %)");  // 0.2 sqrt(7.815)
 }
 
+TEST(Steps, VerifyWarnsOfAToolLineWhoseTunnelIsNotLocated) {
+  ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
+  state.measured = true;
+  state.tool_lines = {"femur", "tibia"};
+  auto result = std::make_shared<pipeline::Result>(*state.result);
+  guidance::LineError near{};
+  result->verifications.push_back({"tibia", near, near});
+  state.result = result;
+  const StepCard lacking = card_of(steps_of(state), Phase::verify);
+  EXPECT_EQ(lacking.status, StepStatus::warning);
+  EXPECT_THAT(lacking.why.toStdString(), HasSubstr("femur"));
+  result = std::make_shared<pipeline::Result>(*result);
+  result->verifications.push_back({"femur", near, near});
+  state.result = result;
+  EXPECT_EQ(card_of(steps_of(state), Phase::verify).status, StepStatus::good);
+}
+
 TEST(Steps, PointThatCannotBeLocatedRefusesThePlan) {
   ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
   state.measured = true;

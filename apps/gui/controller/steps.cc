@@ -154,8 +154,19 @@ void warn_off_plan(StepCard& card, double distance_mm) {
   card.why = tr("more than %1 mm off the plan").arg(guidance::most_off_plan_mm);
 }
 
+/// Tunnels of which the case states the tool's line and the result gives no distance.
+QStringList not_verified(const ApplicationState& state) {
+  QStringList lacking;
+  for (const std::string& tunnel : state.tool_lines)
+    if (std::ranges::find(state.result->verifications, tunnel, &guidance::Verification::name) ==
+        state.result->verifications.end())
+      lacking << text(tunnel);
+  return lacking;
+}
+
 /// The tool lines of a case, compared with their tunnels in the images alone.
-void verify_images(StepCard& card, const pipeline::Result& result) {
+void verify_images(StepCard& card, const ApplicationState& state) {
+  const pipeline::Result& result = *state.result;
   double worst = 0;
   int ends = 0;
   for (const guidance::Verification& line : result.verifications)
@@ -173,13 +184,17 @@ void verify_images(StepCard& card, const pipeline::Result& result) {
     card.status = StepStatus::warning;
     card.why = tr("an end is not located");
   }
+  if (const QStringList lacking = not_verified(state); !lacking.isEmpty()) {
+    card.status = StepStatus::warning;
+    card.why = tr("%1: not compared, its ends are not located").arg(lacking.join(", "));
+  }
   warn_off_plan(card, worst);
 }
 
 void verify(StepCard& card, const ApplicationState& state) {
   if (state.outcomes.empty()) {
     if (state.is_replayed) return;
-    verify_images(card, *state.result);
+    verify_images(card, state);
     if (card.status != StepStatus::waiting) return;
     if (!is_exported(state)) {
       if (state.source != Source::files && !state.exported) return;

@@ -29,6 +29,9 @@ void SettingsDialog::add_page(QTabWidget& pages, const QString& title, Options S
     box->setObjectName(QString::fromUtf8(field.name.data(), qsizetype(field.name.size())));
     form->addRow(QCoreApplication::translate("Field", label_of(field).c_str()), box);
     form->labelForField(box)->setToolTip(box->toolTip());
+    for (QWidget* entry : box->findChildren<QWidget*>(QString(), Qt::FindDirectChildrenOnly))
+      if (entry->accessibleName().isEmpty())
+        entry->setAccessibleName(QCoreApplication::translate("Field", label_of(field).c_str()));
     readers_.push_back([&field, box, part](Settings& settings) { field.set(settings.*part, box->value()); });
     resetters_.push_back([&field, box] { box->set(field.get(Options{})); });
   }
@@ -40,6 +43,7 @@ SettingsDialog::SettingsDialog(Settings settings, QWidget* parent)
   setWindowTitle(tr("Settings"));
   setObjectName("settings");
   auto* pages = new QTabWidget(this);
+  pages->setUsesScrollButtons(false);  // larger text widens the dialog
   add_page(*pages, tr("&Measurement"), &Settings::run, pipeline::run_fields);
   add_page(*pages, tr("R&egistration"), &Settings::search, case_registration::search_fields);
   add_page(*pages, tr("&Operation"), &Settings::plan, operation::plan_fields);

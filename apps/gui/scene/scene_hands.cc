@@ -58,6 +58,46 @@ SceneCamera SceneView::near_camera() const {
 
 void SceneView::look_near() { move_camera(near_camera()); }
 
+void SceneView::look_at_robot() {
+  std::vector<Eigen::Vector3d> places;
+  for (const phantom::CalibratorBall& ball : scene_.balls) places.push_back(ball.centre_in_calibrator);
+  for (const DrawnLink& link : drawn_links(live_))
+    for (const Eigen::Vector3d& end : {link.axis.from, link.axis.to}) places.push_back(end);
+  if (live_.calibrator_from_tip) places.push_back(live_.calibrator_from_tip->translation);
+  move_camera(overview_of(places, aspect()));
+}
+
+void SceneView::set_handle(const std::optional<Handle>& handle) {
+  if (!handle && !handle_) return;
+  handle_ = handle;
+  update();
+}
+
+std::optional<QPointF> SceneView::handle_place() const {
+  if (!handle_) return {};
+  const auto at = seen_at(camera_, aspect(), handle_->place);
+  if (!at || at->cwiseAbs().maxCoeff() > 1) return {};
+  return QPointF((at->x() + 1) / 2 * width(), (1 - at->y()) / 2 * height());
+}
+
+/// Across the line of sight at the handle's depth, or about the line of sight through it.
+void SceneView::drag_handle(const QPointF& from, const QPointF& to) {
+  const auto centre = handle_place();
+  if (!centre) return;
+  const bool continues = std::exchange(has_dragged_, true);
+  const Eigen::Vector3d off = handle_->place - camera_.position;
+  if (dragged_ == HandlePart::middle) {
+    const double mm_per_px = 2 * std::tan(camera_.height_deg * EIGEN_PI / 360) * off.dot(camera_.forward()) /
+                             std::max(1, height());
+    const QPointF by = mm_per_px * (to - from);
+    emit handle_shifted(by.x() * camera_.right() - by.y() * camera_.up, continues);
+  } else {
+    const QPointF a = from - *centre, b = to - *centre;
+    const double angle = std::atan2(a.x() * b.y() - a.y() * b.x(), QPointF::dotProduct(a, b));
+    emit handle_turned(angle * off.normalized(), continues);
+  }
+}
+
 void SceneView::move_camera(const SceneCamera& camera) {
   camera_ = camera;
   moved_ = true;
@@ -65,11 +105,17 @@ void SceneView::move_camera(const SceneCamera& camera) {
   if (std::exchange(preset_, Preset::free) != Preset::free) emit preset_changed(Preset::free);
 }
 
-void SceneView::mousePressEvent(QMouseEvent* event) { mouse_ = event->position(); }
+void SceneView::mousePressEvent(QMouseEvent* event) {
+  mouse_ = event->position();
+  const auto handle = handle_place();
+  dragged_ = handle && event->button() == Qt::LeftButton ? handle_part(*handle, mouse_) : HandlePart::none;
+  has_dragged_ = false;
+}
 
 void SceneView::mouseMoveEvent(QMouseEvent* event) {
   const QPointF way = event->position() - mouse_;
-  mouse_ = event->position();
+  const QPointF from = std::exchange(mouse_, event->position());
+  if (dragged_ != HandlePart::none && (event->buttons() & Qt::LeftButton)) return drag_handle(from, mouse_);
   if (event->buttons() & Qt::LeftButton)
     move_camera(turned(camera_, turn_per_pixel * way.x(), -turn_per_pixel * way.y()));
   else if (event->buttons() & Qt::RightButton)

@@ -99,6 +99,21 @@ Q_DECLARE_OPERATORS_FOR_FLAGS(SceneParts)
 inline constexpr SceneParts all_parts{ScenePart::calibrator | ScenePart::rays | ScenePart::points |
                                       ScenePart::models | ScenePart::bones | ScenePart::robot};
 
+/// How opaque the parts are drawn, 0 to 1; large ellipsoids are drawn less opaque.
+struct SceneOpacity {
+  double calibrator = 0.16;  ///< its body
+  double points = 1;         ///< and tunnels
+  double models = 0.45;      ///< those not named
+  double bones = 0.38;
+  double robot = 1;
+  std::map<std::string, double> model = {};
+
+  double of_model(const std::string& name) const {
+    const auto own = model.find(name);
+    return own == model.end() ? models : own->second;
+  }
+};
+
 /// The scene of these parts; the camera still looks at all of it.
 ResultScene only(SceneParts parts, ResultScene scene);
 

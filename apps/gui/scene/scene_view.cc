@@ -83,12 +83,14 @@ void SceneView::show_bones(std::optional<BoneMeshes> bones) {
 }
 
 void SceneView::show_models(std::vector<ModelShape> models) {
+  const auto before = model_names();
   models_ = std::move(models);
   std::vector<ModelSurfaces::Model> drawn;
   for (const ModelShape& shape : models_) drawn.push_back(shape.model);
   surfaces_.keep(drawn);
   result_changed_ = models_changed_ = live_changed_ = true;
   redraw();
+  if (model_names() != before) emit objects_changed();
 }
 
 void SceneView::show_live(const LiveScene& live) {
@@ -128,8 +130,10 @@ void SceneView::draw() {
       stage.set_slice(tre_ ? std::optional(slice_of(*tre_, slice_axis_, slice_mm_)) : std::nullopt,
                       tre_scale_);
     if (live_changed_) stage.set_live(parts_ & ScenePart::robot ? live_ : without_robot(live_));
+    if (opacity_changed_) stage.set_opacity(opacity_);
     stage.clear_sight(camera_);
-    result_changed_ = bones_changed_ = models_changed_ = slice_changed_ = live_changed_ = false;
+    result_changed_ = bones_changed_ = models_changed_ = slice_changed_ = live_changed_ = opacity_changed_ =
+        false;
   });
   drawn_.setDevicePixelRatio(devicePixelRatioF());
   last_render_ms_ = double(timer.nsecsElapsed()) * 1e-6;
@@ -156,12 +160,21 @@ void SceneView::show_parts(SceneParts parts) {
   parts_ = parts;
   result_changed_ = bones_changed_ = models_changed_ = live_changed_ = true;
   redraw();
+  emit objects_changed();
+}
+
+void SceneView::set_opacity(const SceneOpacity& opacity) {
+  opacity_ = opacity;
+  opacity_changed_ = models_changed_ = live_changed_ = true;
+  redraw();
+  emit objects_changed();
 }
 
 void SceneView::hide_models(std::set<std::string> names) {
   hidden_ = std::move(names);
   result_changed_ = models_changed_ = live_changed_ = true;
   redraw();
+  emit objects_changed();
 }
 
 std::vector<std::string> SceneView::model_names() const {
@@ -185,7 +198,7 @@ std::vector<DrawnModel> SceneView::drawn_models() const {
   std::vector<DrawnModel> drawn;
   for (const ModelShape& shape : models_)
     drawn.push_back({is_drawn(shape) ? surfaces_.of(shape.model) : nullptr, colour_of(shape),
-                     shape.calibrator_from_model, shape.moves_with});
+                     shape.calibrator_from_model, shape.moves_with, opacity_.of_model(shape.name)});
   return drawn;
 }
 
@@ -245,6 +258,10 @@ void SceneView::paint_overlay(QPainter& painter) {
   if (tre_) taken.push_back(paint_colour_bar(painter, size(), tr("TRE, mm rms"), tre_scale_));
   paint_triad(painter, size(), camera_);
   paint_labels(painter, size(), camera_, labels(), taken);
+  if (const auto at = handle_place()) {
+    painter.setRenderHint(QPainter::Antialiasing);
+    paint_handle(painter, *at, QColor(handle_->colour[0], handle_->colour[1], handle_->colour[2]));
+  }
 }
 
 }  // namespace helicarm::gui

@@ -12,6 +12,7 @@
 #include "gui/scene/scene_camera.h"
 #include "gui/scene/scene_values.h"
 #include "gui/scene/tre_slice.h"
+#include "gui/xray/model_handle.h"
 #include "helicarm/simulation/bone_meshes.h"
 
 namespace helicarm::gui {
@@ -43,6 +44,8 @@ class SceneView : public QWidget {
   void set_notice(const QString& notice);
   void show_parts(SceneParts parts);
   SceneParts parts() const { return parts_; }
+  void set_opacity(const SceneOpacity& opacity);
+  const SceneOpacity& opacity() const { return opacity_; }
   /// Models that are not drawn, by name.
   void hide_models(std::set<std::string> names);
   const std::set<std::string>& hidden_models() const { return hidden_; }
@@ -61,6 +64,16 @@ class SceneView : public QWidget {
   Preset preset() const { return preset_; }
   /// Close to the knee, from outside.
   void look_near();
+  /// From outside, with the whole robot in sight.
+  void look_at_robot();
+  /// Of the model that the left button moves.
+  struct Handle {
+    Eigen::Vector3d place;
+    Colour colour;
+  };
+  void set_handle(const std::optional<Handle>& handle);
+  /// Where the handle is drawn; empty without one in sight.
+  std::optional<QPointF> handle_place() const;
   /// Largest scale of the drawn 95 % ellipsoids; initially 10. Large ones are enlarged less, or not.
   void set_error_scale(double scale);
 
@@ -69,6 +82,12 @@ class SceneView : public QWidget {
   QSize sizeHint() const override { return {420, 420}; }
 
  signals:
+  /// Other parts, models or opacities are drawn.
+  void objects_changed();
+  /// The handle is dragged by this shift (mm) or turn (rotation vector about it). `continues`: the drag has
+  /// begun before.
+  void handle_shifted(const Eigen::Vector3d& by_mm, bool continues);
+  void handle_turned(const Eigen::Vector3d& by_rad, bool continues);
   void preset_changed(helicarm::gui::SceneView::Preset preset);
 
  protected:
@@ -85,6 +104,7 @@ class SceneView : public QWidget {
   SceneCamera camera_of(Preset preset) const;
   SceneCamera near_camera() const;
   void move_camera(const SceneCamera& camera);
+  void drag_handle(const QPointF& from, const QPointF& to);
   void redraw();
   void draw();
   void paint_overlay(QPainter& painter);
@@ -109,6 +129,10 @@ class SceneView : public QWidget {
   QString notice_;
   SceneParts parts_ = all_parts;
   std::set<std::string> hidden_;
+  SceneOpacity opacity_;
+  std::optional<Handle> handle_;
+  HandlePart dragged_ = HandlePart::none;
+  bool has_dragged_ = false;
 
   Preset preset_ = Preset::free;
   bool moved_ = false;  ///< by the user, away from the preset
@@ -116,7 +140,7 @@ class SceneView : public QWidget {
   QPointF mouse_;
   std::unique_ptr<OffscreenStage> stage_;
   bool result_changed_ = true, bones_changed_ = true, models_changed_ = true, slice_changed_ = true,
-       live_changed_ = true;
+       live_changed_ = true, opacity_changed_ = true;
   QImage drawn_;  ///< null: to be redrawn
   double last_render_ms_ = 0;
 };

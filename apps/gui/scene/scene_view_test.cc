@@ -124,6 +124,61 @@ TEST_F(ShownScene, ToolRobotAndBonesMove) {
   EXPECT_LT(colours_in(acquired_view("empty")), 150u);  // the triad's letters
 }
 
+TEST_F(ShownScene, TheRobotComesIntoTheView) {
+  const LiveScene now = live();
+  view_.show_live(now);
+  view_.look_near();
+  const QImage near = acquired_view("robot_near");
+  view_.look_at_robot();
+  const QImage whole = acquired_view("robot_whole");
+  EXPECT_GT(pixels_apart(near, whole), 5000);
+  view_.show_live({});
+  EXPECT_GT(pixels_apart(acquired_view("robot_gone"), whole), 2000);
+}
+
+TEST_F(ShownScene, PartsAreDrawnAsOpaqueAsWished) {
+  view_.show_bones(bones());
+  view_.set_preset(SceneView::Preset::lateral);
+  const QImage glass = acquired_view("bones_glass");
+  int changes = 0;
+  QObject::connect(&view_, &SceneView::objects_changed, &view_, [&] { ++changes; });
+  SceneOpacity opacity;
+  opacity.bones = 1;
+  view_.set_opacity(opacity);
+  EXPECT_EQ(changes, 1);
+  EXPECT_GT(pixels_apart(acquired_view("bones_opaque"), glass), 2000);
+  view_.set_opacity({});
+  EXPECT_EQ(pixels_apart(acquired_view("bones_glass"), glass), 0);
+}
+
+TEST_F(ShownScene, AHandleIsDraggedAcrossTheLineOfSightAndTurnedAboutIt) {
+  view_.set_preset(SceneView::Preset::ap);
+  const Eigen::Vector3d place = phantom::middle_of(simulated().the_case.calibrator);
+  view_.set_handle(SceneView::Handle{place, {250, 204, 21}});
+  ASSERT_TRUE(view_.handle_place());
+  const QPoint middle = view_.handle_place()->toPoint();
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero(), turn = Eigen::Vector3d::Zero();
+  QObject::connect(&view_, &SceneView::handle_shifted, &view_,
+                   [&](const Eigen::Vector3d& by, bool) { shift += by; });
+  QObject::connect(&view_, &SceneView::handle_turned, &view_,
+                   [&](const Eigen::Vector3d& by, bool) { turn += by; });
+  const auto drag = [&](const QPoint& from, const QPoint& to) {
+    QTest::mousePress(&view_, Qt::LeftButton, {}, from);
+    QMouseEvent move(QEvent::MouseMove, to, view_.mapToGlobal(QPointF(to)), Qt::NoButton, Qt::LeftButton, {});
+    QApplication::sendEvent(&view_, &move);
+    QTest::mouseRelease(&view_, Qt::LeftButton, {}, to);
+  };
+  drag(middle, middle + QPoint(30, 0));
+  EXPECT_GT(shift.norm(), 1);
+  view_.set_handle(SceneView::Handle{place + shift, {250, 204, 21}});
+  EXPECT_NEAR(view_.handle_place()->x() - middle.x(), 30, 1);
+  EXPECT_NEAR(view_.handle_place()->y() - middle.y(), 0, 1);
+  EXPECT_TRUE(turn.isZero());
+  view_.set_handle(SceneView::Handle{place, {250, 204, 21}});
+  drag(middle + QPoint(int(handle_radius), 0), middle + QPoint(0, int(handle_radius)));
+  EXPECT_NEAR(turn.norm(), 0.5 * EIGEN_PI, 0.05);
+}
+
 TEST_F(ShownScene, ModelsStandAtTheirPoses) {
   view_.set_preset(SceneView::Preset::ap);
   const QImage bare = acquired_view("models_none");

@@ -22,7 +22,6 @@ using Eigen::Vector3d;
 
 /// A larger ellipsoid does not hide what it contains.
 constexpr double opaque_mm = 15, large_ellipsoid_opacity = 0.3;
-constexpr double bone_opacity = 0.38, model_opacity = 0.45, cone_opacity = 0.16;
 
 void give(vtkActor* actor, const ShapeBuilder& shapes) {
   vtkPolyDataMapper::SafeDownCast(actor->GetMapper())->SetInputData(shapes.build());
@@ -70,8 +69,9 @@ Stage::Stage() {
   tool_ = add(true);
   for (vtkActor*& link : links_) link = add(true);
   slice_ = add(false);
-  for (const guidance::Bone& bone : guidance::knee_bones()) make_glass(of_bone(bones_, bone), bone_opacity);
-  make_glass(cone_ = add(true), cone_opacity);
+  for (const guidance::Bone& bone : guidance::knee_bones())
+    make_glass(of_bone(bones_, bone), SceneOpacity().bones);
+  make_glass(cone_ = add(true), SceneOpacity().calibrator);
 
   ShapeBuilder tool;
   tool.add_tube({{0, 0, -150}, {0, 0, -30}}, 9, 9, palette::tool_grip);
@@ -164,9 +164,24 @@ void Stage::set_result(const ResultScene& scene, double error_scale) {
   give(cone_, cone);
   give(points_, points);
   for (const auto& [bone, shapes] : bone_points) give(of_bone(bone_points_, bone), shapes);
-  const double opacity = largest_mm > opaque_mm ? large_ellipsoid_opacity : 1;
+  has_large_ellipsoids_ = largest_mm > opaque_mm;
+  make_points_glass();
+}
+
+void Stage::make_points_glass() {
+  const double opacity =
+      has_large_ellipsoids_ ? std::min(large_ellipsoid_opacity, points_opacity_) : points_opacity_;
   make_glass(points_, opacity);
   for (const auto& [bone, actor] : bone_points_) make_glass(actor, opacity);
+}
+
+void Stage::set_opacity(const SceneOpacity& opacity) {
+  make_glass(cone_, opacity.calibrator);
+  for (const auto& [bone, actor] : bones_) make_glass(actor, opacity.bones);
+  for (vtkActor* link : links_) make_glass(link, opacity.robot);
+  make_glass(tool_, opacity.robot);
+  points_opacity_ = opacity.points;
+  make_points_glass();
 }
 
 void Stage::set_bones(const std::optional<BoneMeshes>& bones) {
@@ -186,7 +201,7 @@ void Stage::set_slice(const std::optional<TreSlice>& slice, const TreScale& scal
 Stage::ModelActors Stage::add_model() {
   const ModelActors made{add(true), add(true)};
   make_glass(made.depth, 0.001);  // rounds to nothing, but writes its depth: folds behind are not blended
-  make_glass(made.surface, model_opacity);
+  make_glass(made.surface, SceneOpacity().models);
   made.depth->SetMapper(made.surface->GetMapper());
   made.surface->GetMapper()->ScalarVisibilityOff();
   const vtkSmartPointer<vtkActor> last = cone_;  // glass hides what is drawn after it
@@ -208,6 +223,7 @@ void Stage::set_models(const std::vector<DrawnModel>& models) {
     }
     if (i >= models.size()) continue;
     const auto& [red, green, blue] = models[i].colour;
+    actor->GetProperty()->SetOpacity(models[i].opacity);
     actor->GetProperty()->SetColor(red / 255.0, green / 255.0, blue / 255.0);
   }
   models_ = models;
@@ -238,7 +254,7 @@ void Stage::set_live(const LiveScene& live) {
   }
   move(tool_, live.calibrator_from_tip);
   for (std::size_t i = 0; i < models_.size(); ++i) {
-    const auto& [surface, colour, calibrator_from_model, moves_with] = models_[i];
+    const auto& [surface, colour, calibrator_from_model, moves_with, opacity] = models_[i];
     const geometry::RigidTransform moved = moves_with ? motion_of(*moves_with) : geometry::RigidTransform();
     for (vtkActor* actor : {model_actors_[i].depth, model_actors_[i].surface})
       move(actor, surface ? std::optional(moved * calibrator_from_model) : std::nullopt);

@@ -23,6 +23,7 @@ struct DrawnModel {
   Colour colour;
   geometry::RigidTransform calibrator_from_model;
   std::optional<guidance::Bone> moves_with;
+  double opacity = SceneOpacity().models;
 };
 
 /// The scene in VTK. Lives as long as one OpenGL context, which must be current in every call.
@@ -39,6 +40,9 @@ class Stage {
   void set_models(const std::vector<DrawnModel>& models);
   /// Moves existing parts; only a new path is built.
   void set_live(const LiveScene& live);
+
+  /// Of all parts but the models, which bring their own.
+  void set_opacity(const SceneOpacity& opacity);
 
   /// Hides the links of the arm that hide the rest from this camera.
   void clear_sight(const SceneCamera& camera);
@@ -57,6 +61,7 @@ class Stage {
   /// The actor of a bone, added if it is new.
   vtkActor* of_bone(std::map<guidance::Bone, vtkActor*>& actors, const guidance::Bone& bone);
   ModelActors add_model();
+  void make_points_glass();
   void move(vtkActor* actor, const std::optional<geometry::RigidTransform>& calibrator_from_body);
 
   vtkNew<vtkGenericOpenGLRenderWindow> window_;
@@ -72,6 +77,8 @@ class Stage {
   std::vector<DrawnModel> models_;  ///< of the first actors
   std::vector<DrawnLink> drawn_links_;
   std::vector<Eigen::Vector3d> shown_path_;
+  double points_opacity_ = 1;
+  bool has_large_ellipsoids_ = false;
 };
 
 }  // namespace helicarm::gui

@@ -67,8 +67,11 @@ int main(int argc, char** argv) {
     window.open_paths(paths);
   else if (words.isSet(plan))
     window.open_plan(words.value(plan).toStdString());
+  else if (!kept.value("tour/offered").toBool())
+    window.start_tour();  // at the first start
   else
     window.open_rehearsal();
+  QSettings().setValue("tour/offered", true);
   for (const int signal : {SIGTERM, SIGINT}) std::signal(signal, [](int) { told_to_end = 1; });
   QTimer listener;
   QObject::connect(&listener, &QTimer::timeout, [] {

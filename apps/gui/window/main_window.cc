@@ -16,6 +16,7 @@
 
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
+#include "gui/window/points_panel.h"
 #include "gui/window/register_page.h"
 #include "gui/window/style.h"
 #include "gui/xray/text.h"
@@ -94,6 +95,7 @@ void MainWindow::build() {
     show_picks();
     show_measures();
     show_outlines();
+    show_handles();
   });
   sides->addWidget(build_right());
   sides->setStretchFactor(1, 3);
@@ -106,6 +108,9 @@ void MainWindow::build() {
   build_replay();
   build_measures();
   build_log();
+  build_panels();
+  build_tour();
+  build_handles();
 }
 
 QLayout* MainWindow::build_top() {
@@ -150,9 +155,9 @@ void MainWindow::build_pages() {
   plan_ = new PlanPage(controller_, this);
   navigate_ = new NavigatePage(controller_, this);
   auto* verify = new VerifyPage(controller_, this);
-  for (Page* page :
-       std::initializer_list<Page*>{acquire, rectify, new CalibratePage(controller_, this), plan_, navigate_,
-                                    verify, new RegisterPage(controller_, this)}) {
+  register_ = new RegisterPage(controller_, this);
+  for (Page* page : std::initializer_list<Page*>{acquire, rectify, new CalibratePage(controller_, this),
+                                                 plan_, navigate_, verify, register_}) {
     auto* scrolled = new QScrollArea;
     scrolled->setWidgetResizable(true);
     scrolled->setFrameShape(QFrame::NoFrame);
@@ -163,9 +168,12 @@ void MainWindow::build_pages() {
     all_pages_.push_back(page);
   }
   connect(acquire, &AcquirePage::rehearsal_wanted, this, &MainWindow::open_rehearsal);
+  connect(acquire, &AcquirePage::tour_wanted, this, &MainWindow::ask_tour);
   connect(acquire, &AcquirePage::folder_wanted, this, &MainWindow::ask_folder);
   connect(acquire, &AcquirePage::new_case_wanted, this, &MainWindow::ask_new_case);
   connect(rectify, &RectifyPage::layer_wanted, panels_, &XrayPanels::set_layer);
+  connect(register_, &RegisterPage::slices_wanted, this, &MainWindow::open_ct_of);
+  connect(register_, &RegisterPage::held_changed, this, &MainWindow::show_handles);
   connect(plan_, &PlanPage::target_changed, this, &MainWindow::show_picks);
   connect(plan_, &PlanPage::map_wanted, this, [this](const std::optional<TreCut>& cut) {
     cut_ = cut;
@@ -247,13 +255,22 @@ void MainWindow::show_state() {
   else if (std::ranges::none_of(state.refusals, stands))
     statusBar()->clearMessage();
   save_->setEnabled(state.has_unsaved_picks);
-  undo_->setEnabled(controller_.can_undo_picks() && controller_.takes_picks());
-  redo_->setEnabled(controller_.can_redo_picks() && controller_.takes_picks());
+  show_edits();
   show_images();
   show_picks();
   show_outlines();
   show_models();
+  show_handles();
+  points_->show_state(state);
   focus_->restore(pages_->currentWidget());
+}
+
+void MainWindow::show_edits() {
+  const QString undoes = controller_.undoes(), redoes = controller_.redoes();
+  undo_->setEnabled(controller_.can_undo());
+  redo_->setEnabled(controller_.can_redo());
+  undo_->setText(undoes.isEmpty() ? tr("&Undo") : tr("&Undo: %1").arg(undoes));
+  redo_->setText(redoes.isEmpty() ? tr("&Redo") : tr("&Redo: %1").arg(redoes));
 }
 
 void MainWindow::refresh_present() {
@@ -384,6 +401,7 @@ void MainWindow::show_phase(Phase phase) {
   strip_->choose(phase);
   pages_->setCurrentIndex(int(phase));
   show_picks();
+  show_handles();
 }
 
 void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
@@ -479,6 +497,19 @@ void MainWindow::show_live() {
     }
   }
   scene_->show_live(scene);
+  look_at_the_robot(scene);
+}
+
+void MainWindow::look_at_the_robot(const LiveScene& scene) {
+  const ApplicationState& state = controller_.state();
+  const bool is_known = scene.calibrator_from_base && scene.joints;
+  const bool registers = state.busy == Phase::navigate && !state.hand_eye_rms_mm && !is_known;
+  if (out_of_date_.isEmpty())
+    scene_->set_notice(registers ? tr("The robot is drawn as soon as it is registered") : QString());
+  const RobotView wanted = !is_known ? RobotView::unknown : state.order ? RobotView::path : RobotView::whole;
+  if (std::exchange(robot_view_, wanted) == wanted) return;
+  if (wanted == RobotView::whole) scene_->look_at_robot();
+  if (wanted == RobotView::path) scene_->look_near();
 }
 
 bool MainWindow::eventFilter(QObject* watched, QEvent* event) {

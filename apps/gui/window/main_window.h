@@ -27,6 +27,12 @@
 
 namespace helicarm::gui {
 
+class PointsPanel;
+class RegisterPage;
+struct CtTunnel;
+class Tour;
+struct TourStep;
+
 /// Steps, two X-ray images, the scene, the page of the step, and the live data; shows the controller's state.
 class MainWindow : public QMainWindow {
   Q_OBJECT
@@ -45,6 +51,8 @@ class MainWindow : public QMainWindow {
   LiveBar& live_bar() { return *live_bar_; }
 
   void open_rehearsal();
+  /// Makes and opens a simulated case, and walks through the window with it.
+  void start_tour();
   void open_plan(const std::filesystem::path& plan);
   /// A case folder, a session's folder, or X-ray images: these are shown, and two or more are offered as a
   /// new case.
@@ -85,6 +93,11 @@ class MainWindow : public QMainWindow {
   /// The table, X-ray image or scene that has the focus to the clipboard, else the window.
   void copy();
   void build_recent();
+  /// A case of markers through a sequence, in a window of its own.
+  void open_sequence(const std::filesystem::path& folder);
+  /// Slices of a CT, to find its bones, in a window of its own.
+  void open_ct(const std::filesystem::path& file, std::vector<CtTunnel> tunnels);
+  void open_ct_of(std::size_t model);
   void open_session(const std::filesystem::path& session);
   std::filesystem::path new_session() const;
   void remember(Folder kind, const std::filesystem::path& folder);
@@ -92,6 +105,7 @@ class MainWindow : public QMainWindow {
   /// The controller's, with the recorded steps at a replayed moment.
   ApplicationState displayed_state() const;
   void refresh_present();
+  void show_edits();
   void show_state();
   void show_images();
   void show_picks();
@@ -111,6 +125,24 @@ class MainWindow : public QMainWindow {
   void ask_of_pick(std::size_t view, const QString& name, const QPoint& at);
   void show_steps();
   void build_log();
+  void build_panels();
+  void build_tour();
+  void ask_tour();
+  std::vector<TourStep> tour_steps();
+  void build_handles();
+  /// At the bottom, hidden; to be docked elsewhere or to float.
+  QDockWidget* add_panel(const QString& title, const char* name, QWidget* content);
+  struct HeldModel {
+    std::size_t model;
+    registration::RigidStep step;  ///< from its registered pose
+    Eigen::Vector3d centre;        ///< at the displayed pose
+  };
+  std::optional<HeldModel> held_model() const;
+  void show_handles();
+  /// By a drag between raw pixels.
+  void drag_model(std::size_t panel, HandlePart part, const QPointF& from, const QPointF& to, bool continues);
+  /// The robot comes into the scene's view as soon as it is registered, the path when it is planned.
+  void look_at_the_robot(const LiveScene& scene);
   /// A line of the log, with the time.
   void log(const QString& words);
   void log_steps(const StepCards& before);
@@ -150,6 +182,10 @@ class MainWindow : public QMainWindow {
   QStackedWidget* pages_ = nullptr;
   std::vector<Page*> all_pages_;
   PlanPage* plan_ = nullptr;
+  RegisterPage* register_ = nullptr;
+  PointsPanel* points_ = nullptr;
+  Tour* tour_ = nullptr;
+  std::vector<QDockWidget*> docks_;  ///< panels that `build_panels` has made
   NavigatePage* navigate_ = nullptr;
   ReplayPanel* replay_ = nullptr;
   QDockWidget* replay_dock_ = nullptr;
@@ -196,6 +232,7 @@ class MainWindow : public QMainWindow {
   Source shown_source_ = Source::none;
   Phase phase_ = Phase::acquire;
   unsigned looks_ = 0;
+  enum class RobotView { unknown, whole, path } robot_view_ = RobotView::unknown;
   bool moved_on_ = false;  ///< the user chose a step; it stays until the next success
 };
 

@@ -8,6 +8,7 @@
 
 #include "gui/controller/steps.h"
 #include "gui/window/ask_files.h"
+#include "gui/window/bones_window.h"
 #include "gui/window/main_window.h"
 
 namespace helicarm::gui {
@@ -38,6 +39,10 @@ void MainWindow::build_menus() {
     ask_files(this, tr("X-rays"), QFileDialog::ExistingFiles, {},
               [this](const std::vector<fs::path>& chosen) { leave_for(chosen); });
   });
+  file->addAction(tr("Slices and &bones of a CT..."), this, [this] {
+    ask_files(this, tr("CT"), QFileDialog::ExistingFile, {},
+              [this](const std::vector<fs::path>& chosen) { open_ct(chosen.front(), {}); });
+  });
   recent_menu_ = file->addMenu(tr("&Recent"));
   build_recent();
   file->addSeparator();
@@ -51,8 +56,8 @@ void MainWindow::build_menus() {
   file->addAction(tr("&Quit"), QKeySequence(tr("Ctrl+Q")), this, &QWidget::close);
 
   QMenu* edit = menuBar()->addMenu(tr("&Edit"));
-  undo_ = edit->addAction(tr("&Undo pick"), QKeySequence::Undo, &controller_, &Controller::undo_picks);
-  redo_ = edit->addAction(tr("&Redo pick"), QKeySequence::Redo, &controller_, &Controller::redo_picks);
+  undo_ = edit->addAction(tr("&Undo"), QKeySequence::Undo, &controller_, &Controller::undo);
+  redo_ = edit->addAction(tr("&Redo"), QKeySequence::Redo, &controller_, &Controller::redo);
   edit->addAction(tr("&Measure again"), QKeySequence(Qt::Key_F5), &controller_, &Controller::measure_again);
   edit->addSeparator();
   edit->addAction(tr("&Copy image or table"), QKeySequence::Copy, this, &MainWindow::copy);
@@ -67,6 +72,8 @@ void MainWindow::build_menus() {
   view->addAction(replay_dock_->toggleViewAction());
   view->addAction(measures_dock_->toggleViewAction());
   view->addAction(log_dock_->toggleViewAction());
+  for (const QDockWidget* dock : docks_)
+    if (dock->features() & QDockWidget::DockWidgetClosable) view->addAction(dock->toggleViewAction());
   build_layers_menu(view);
   build_scene_menu(view);
   build_appearance_menu(view);
@@ -95,7 +102,8 @@ void MainWindow::build_menus() {
            "Enter: press; hold it on a yellow button\n"
            "Ctrl+N rehearsal, Ctrl+Shift+N case of X-ray images, Ctrl+O open, Ctrl+5 two or four images, "
            "Ctrl+E export, Ctrl+C copy, Ctrl+P screenshot, Ctrl+, settings\n"
-           "F5 measures again, Ctrl+S saves the picks, Ctrl+Z undoes a pick, Ctrl+Shift+Z repeats it, Delete "
+           "F5 measures again, Ctrl+S saves the picks, Ctrl+Z undoes a change, Ctrl+Shift+Z repeats it, "
+           "Delete "
            "removes the end "
            "chosen in the table\n\n"
            "On an X-ray image: + - 0 zoom, arrows pan, Shift+arrows and Enter place a tunnel's end, dragging "
@@ -103,6 +111,7 @@ void MainWindow::build_menus() {
            "In 3-D: 1 AP, 2 lateral, 3 outside, 4 near, arrows turn, + - zoom, R resets\n\n"
            "Replay: J and L step, K plays"));
   });
+  help->addAction(tr("&Tour"), this, &MainWindow::ask_tour);
   help->addAction(tr("&About"), this, [notify] {
     notify(tr("About helicarm"),
            tr("helicarm %1\nResearch instrument, not a medical device.").arg(HELICARM_VERSION));

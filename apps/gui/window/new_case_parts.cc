@@ -48,9 +48,12 @@ QWidget* NewCaseDialog::build_preset_row() {
   preset_->setEditable(true);
   preset_->setInsertPolicy(QComboBox::NoInsert);
   preset_->lineEdit()->setPlaceholderText(tr("name of the C-arm"));
+  preset_->setAccessibleName(tr("Name of the C-arm"));
+  preset_->lineEdit()->setAccessibleName(preset_->accessibleName());
   preset_->setToolTip(tr("Calibrator, plate, maps and detector are kept under this name for further cases"));
   intensifier_ = new QLineEdit;
   intensifier_->setObjectName("intensifier");
+  intensifier_->setAccessibleName(tr("Intensifier or detector"));
   intensifier_->setPlaceholderText(tr("intensifier or detector, e.g. 31 cm, field 2"));
   auto* save = new QPushButton(tr("&Keep preset"));
   save->setObjectName("keepPreset");
@@ -75,6 +78,7 @@ QWidget* NewCaseDialog::build_images() {
   column->setContentsMargins(0, 0, 0, 0);
   table_ = new QTableWidget(0, image_columns);
   table_->setObjectName("caseImages");
+  table_->setAccessibleName(tr("Images of the case"));
   table_->setHorizontalHeaderLabels({tr("File"), tr("Frame"), tr("View"), tr("Distortion by"), tr("Found")});
   table_->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
   table_->horizontalHeader()->setSectionResizeMode(found_column, QHeaderView::Stretch);
@@ -136,6 +140,7 @@ QWidget* NewCaseDialog::build_choices() {
   auto* row = new QHBoxLayout;
   folder_ = new QLineEdit;
   folder_->setObjectName("caseFolder");
+  folder_->setAccessibleName(tr("Folder of the case"));
   auto* browse = new QPushButton(tr("Folder..."));
   row->addWidget(folder_, 1);
   row->addWidget(browse);

@@ -12,8 +12,11 @@
 #include <string_view>
 
 #include "gui/controller/equipment.h"
+#include "gui/controller/stale.h"
 #include "gui/window/ask_files.h"
+#include "gui/window/bones_window.h"
 #include "gui/window/main_window.h"
+#include "gui/window/sequence_window.h"
 
 namespace helicarm::gui {
 namespace fs = std::filesystem;
@@ -71,6 +74,8 @@ void MainWindow::leave_then(std::function<void()> act) {
 }
 
 void MainWindow::leave_for(const std::vector<fs::path>& paths) {
+  const bool has_own_window = paths.size() == 1 && (is_sequence(paths.front()) || is_volume(paths.front()));
+  if (has_own_window) return open_paths(paths);
   leave_then([this, paths] { open_paths(paths); });
 }
 
@@ -121,7 +126,9 @@ void MainWindow::open_paths(const std::vector<fs::path>& paths) {
     if (first.filename() == "case.json" || first.filename() == "session.log")
       return open_paths({fs::absolute(first).parent_path()});
     if (first.extension() == ".json") return open_plan(first);
+    if (is_volume(first)) return open_ct(first, {});
   }
+  if (paths.size() == 1 && is_sequence(first)) return open_sequence(first);
   const bool is_folder = paths.size() == 1 && fs::is_directory(first);
   if (is_folder && fs::exists(first / "session.log")) return open_session(first);
   if (!is_folder) return open_images(paths);
@@ -130,6 +137,36 @@ void MainWindow::open_paths(const std::vector<fs::path>& paths) {
   if (!loose.empty()) return open_images(loose, true);
   remember(Folder::cases, first);
   controller_.open_case(first);
+}
+
+void MainWindow::open_sequence(const fs::path& folder) {
+  remember(Folder::cases, folder);
+  auto* sequence = findChild<SequenceWindow*>("sequence");
+  if (sequence == nullptr || sequence->is_busy()) sequence = new SequenceWindow(this);
+  show_beside(sequence);
+  sequence->open(folder, all_frames(folder));
+}
+
+void MainWindow::open_ct(const fs::path& file, std::vector<CtTunnel> tunnels) {
+  auto* bones = new BonesWindow(this);
+  show_beside(bones);
+  bones->open(file, std::move(tunnels));
+}
+
+void MainWindow::open_ct_of(std::size_t model) {
+  const ApplicationState& state = controller_.state();
+  if (!state.registration || model >= state.model_volumes.size() || !state.model_volumes[model]) return;
+  const case_registration::RegisteredModel& registered = state.registration->models.at(model);
+  const geometry::RigidTransform model_from_world = registered.registration.world_from_model.inverse();
+  std::vector<CtTunnel> tunnels;
+  if (stale_model(state, model).isEmpty() && !registered.registration.failure)
+    for (std::size_t i = 0; i < registered.tunnel_ends.size(); ++i) {
+      const auto& [start, end] = registered.tunnel_ends[i];
+      tunnels.push_back({registered.tunnels[i].name,
+                         model_from_world * registered.points[start].place.in_calibrator,
+                         model_from_world * registered.points[end].place.in_calibrator});
+    }
+  open_ct(*state.model_volumes[model], std::move(tunnels));
 }
 
 void MainWindow::open_images(const std::vector<fs::path>& files, bool offers_one) {

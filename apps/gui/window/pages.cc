@@ -4,6 +4,7 @@
 
 #include <QButtonGroup>
 #include <QHBoxLayout>
+#include <QHeaderView>
 #include <QRadioButton>
 #include <QVBoxLayout>
 
@@ -57,7 +58,8 @@ bool Page::event(QEvent* event) {
   const bool done = QWidget::event(event);
   if (event->type() == QEvent::LayoutRequest || event->type() == QEvent::Resize)
     setMinimumHeight(layout()->totalMinimumHeightForWidth(width()));
-  if (event->type() == QEvent::LayoutRequest) updateGeometry();  // smaller text may need less width
+  if (event->type() == QEvent::LayoutRequest || event->type() == QEvent::Show)
+    updateGeometry();  // also of smaller text that came while it was hidden
   return done;
 }
 
@@ -99,12 +101,15 @@ AcquirePage::AcquirePage(Controller& controller, QWidget* parent)
   row->setContentsMargins(0, 0, 0, 0);
   auto* rehearse = new QPushButton(tr("&New rehearsal"));
   auto* open = new QPushButton(tr("&Open a case..."));
-  row->addWidget(rehearse);
-  row->addWidget(open);
+  auto* tour = new QPushButton(tr("&Tour"));
+  tour->setObjectName("startTour");
+  tour->setToolTip(tr("Walks through the window with a simulated case"));
+  for (QPushButton* button : {rehearse, open, tour}) row->addWidget(button);
   layout()->addWidget(ways_in_);
   new_case_ = add_button({}, "newCase", [this] { emit new_case_wanted(); });
   connect(rehearse, &QPushButton::clicked, this, &AcquirePage::rehearsal_wanted);
   connect(open, &QPushButton::clicked, this, &AcquirePage::folder_wanted);
+  connect(tour, &QPushButton::clicked, this, &AcquirePage::tour_wanted);
   where_ = new QLabel;
   where_->setWordWrap(true);
   layout()->addWidget(where_);
@@ -189,6 +194,8 @@ RectifyPage::RectifyPage(Controller& controller, QWidget* parent)
   }
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
   table_ = add_table(report::rectification_table({}), "rectifyTable");
+  constexpr int residual = 3;
+  table_->horizontalHeader()->moveSection(residual, 1);  // number first
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 

@@ -52,6 +52,7 @@ class AcquirePage : public Page {
  signals:
   void rehearsal_wanted();
   void folder_wanted();
+  void tour_wanted();
   void new_case_wanted();
 
  private:
@@ -107,6 +108,8 @@ class PlanPage : public Page {
   bool snaps() const { return snap_->isChecked(); }
   /// How clicks are taken where no end is chosen in the table.
   bool snaps_new_clicks() const { return snaps_new_; }
+  /// Selects a point in the table, if it can be clicked.
+  void choose(const QString& point);
   /// Deselects an end chosen in the table once it is placed in every view.
   void placed(const std::string& point);
 

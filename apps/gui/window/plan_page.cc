@@ -133,9 +133,7 @@ void PlanPage::add_landmark_row() {
   const auto take = [this, name, bone, side] {
     controller_.add_landmark(name->text().trimmed().toStdString(),
                              bone_in(bone->text(), side->currentIndex()));
-    for (int i = 0; i < ends_->rowCount(); ++i)
-      if (ends_->item(i, 0)->text() == name->text().trimmed())
-        ends_->setCurrentCell(i, 0, QItemSelectionModel::ClearAndSelect | QItemSelectionModel::Rows);
+    choose(name->text().trimmed());
     name->clear();
   };
   connect(add, &QPushButton::clicked, this, take);
@@ -338,6 +336,12 @@ QString PlanPage::next_words() const {
         "Register the models first (Alt+7): their plans hold the tunnels. To locate another point, name it "
         "below.");
   return tr("This case has no points: name one below, then click it in two X-ray images.");
+}
+
+void PlanPage::choose(const QString& point) {
+  for (std::size_t row = 0; row < clickable_; ++row)
+    if (ends_->item(int(row), 0)->text() == point)
+      ends_->setCurrentCell(int(row), 0, QItemSelectionModel::ClearAndSelect | QItemSelectionModel::Rows);
 }
 
 void PlanPage::placed(const std::string& point) {

@@ -5,6 +5,7 @@
 #include <QSignalBlocker>
 #include <QVBoxLayout>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "gui/controller/stale.h"
@@ -91,8 +92,7 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
               "bone's edges in every X-ray image."),
            controller, parent) {
   register_ = add_button(tr("Register models"), "registerModels", [this] {
-    reset_hand();
-    nudge();  // none: the case's start
+    leave_as_registered();  // the case's start
     controller_.register_models();
   });
   says_ = new QLabel;
@@ -107,6 +107,9 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
   slices_->setAlignment(Qt::AlignLeft | Qt::AlignTop);
   layout()->addWidget(slices_);
   connect(tunnels_, &QTableWidget::currentCellChanged, this, &RegisterPage::show_slices);
+  ct_ = add_button(tr("Slices of the CT..."), "ctSlices",
+                   [this] { emit slices_wanted(std::size_t(std::max(0, model_->currentIndex()))); });
+  ct_->setToolTip(tr("The chosen model's CT in three directions, with its planned tunnels"));
   points_ = add_table(case_registration::points_table({}), "modelPointTable");
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
@@ -132,14 +135,15 @@ void RegisterPage::add_hand() {
     by->setSuffix(turns ? tr(" °") : tr(" mm"));
     by->setRange(-180, 180);
     by->setSingleStep(0.5);
-    by->setDecimals(1);
+    by->setDecimals(2);
     by->setKeyboardTracking(false);
     grid->addWidget(by, 1 + i / 3, i % 3);
-    connect(by, &PoseBox::valueChanged, this, &RegisterPage::nudge);
+    connect(by, &PoseBox::valueChanged, this,
+            [this, field = std::size_t(i)](double value) { nudge(field, value); });
   }
   connect(model_, &QComboBox::currentIndexChanged, this, [this] {
-    reset_hand();
-    nudge();
+    leave_as_registered();
+    emit held_changed();
   });
   layout()->addWidget(hand_);
   from_here_ =
@@ -148,20 +152,51 @@ void RegisterPage::add_hand() {
   grid->addWidget(from_here_, 0, 1, 1, 2);
 }
 
-void RegisterPage::reset_hand() {
-  for (PoseBox* by : by_) {
-    const QSignalBlocker quiet(by);
-    by->setValue(0);
-  }
+std::optional<std::size_t> RegisterPage::movable() const {
+  if (!hand_->isEnabled() || model_->currentIndex() < 0) return {};
+  return std::size_t(model_->currentIndex());
 }
 
-void RegisterPage::nudge() {
-  registration::RigidStep step;
-  for (int i = 0; i < 3; ++i) {
-    step[i] = by_[std::size_t(i + 3)]->value() * EIGEN_PI / 180;
-    step[i + 3] = by_[std::size_t(i)]->value();
+namespace {
+
+constexpr double deg = EIGEN_PI / 180;
+
+/// The field's value of a step: shifts in mm, then turns in degrees.
+double field_of(const registration::RigidStep& step, std::size_t field) {
+  return field < 3 ? step[Eigen::Index(field + 3)] : step[Eigen::Index(field - 3)] / deg;
+}
+
+}  // namespace
+
+void RegisterPage::leave_as_registered() {
+  if (model_->currentIndex() >= 0)
+    controller_.nudge(std::size_t(model_->currentIndex()), registration::RigidStep::Zero());
+}
+
+void RegisterPage::nudge(std::size_t field, double value) {
+  if (model_->currentIndex() < 0) return;
+  const auto model = std::size_t(model_->currentIndex());
+  const auto& nudged = controller_.state().nudged;
+  registration::RigidStep step =
+      nudged && nudged->model == model ? nudged->step : registration::RigidStep::Zero();
+  if (field < 3)
+    step[Eigen::Index(field + 3)] = value;
+  else
+    step[Eigen::Index(field - 3)] = value * deg;
+  controller_.nudge(model, step);
+}
+
+/// The fields follow a model that is dragged, and undo.
+void RegisterPage::show_hand(const ApplicationState& state) {
+  if (state.nudged && int(state.nudged->model) < model_->count()) {
+    const QSignalBlocker quiet(model_);
+    model_->setCurrentIndex(int(state.nudged->model));
   }
-  if (model_->currentIndex() >= 0) controller_.nudge(std::size_t(model_->currentIndex()), step);
+  for (std::size_t field = 0; field < by_.size(); ++field) {
+    const double value = state.nudged ? field_of(state.nudged->step, field) : 0;
+    const QSignalBlocker quiet(by_[field]);
+    if (std::abs(value - by_[field]->value()) > 0.005) by_[field]->setValue(value);
+  }
 }
 
 void RegisterPage::show_state(const ApplicationState& state) {
@@ -169,6 +204,8 @@ void RegisterPage::show_state(const ApplicationState& state) {
   register_->setEnabled(can);
   hand_->setEnabled(can && state.registration);
   from_here_->setEnabled(can && state.nudged);
+  const std::size_t chosen = std::size_t(std::max(0, model_->currentIndex()));
+  ct_->setEnabled(state.registration && chosen < state.model_volumes.size() && state.model_volumes[chosen]);
   says_->setText(words_of(state));
   std::vector<RegisteredModel> models = listed_models(state);
   models_->fill(table_of_models(state, models));
@@ -177,12 +214,16 @@ void RegisterPage::show_state(const ApplicationState& state) {
   listed_ = std::move(models);
   drawn_.first = -1;
   show_slices();
+  list_models(state);
+  show_hand(state);
+}
+
+void RegisterPage::list_models(const ApplicationState& state) {
   if (shown_ == state.registration) return;
   shown_ = state.registration;
   const QSignalBlocker quiet(model_);
   const int chosen = model_->currentIndex();
   model_->clear();
-  reset_hand();
   if (shown_)
     for (const RegisteredModel& model : shown_->models) model_->addItem(text(model.registration.name));
   model_->setCurrentIndex(std::clamp(chosen, std::min(0, model_->count() - 1), model_->count() - 1));

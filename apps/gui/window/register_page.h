@@ -19,6 +19,14 @@ class RegisterPage : public Page {
  public:
   RegisterPage(Controller& controller, QWidget* parent);
   void show_state(const ApplicationState& state) override;
+  /// The chosen model, where it can be moved by hand.
+  std::optional<std::size_t> movable() const;
+
+ signals:
+  /// Another model is chosen, or none can be moved.
+  void held_changed();
+  /// Of the CT of a model.
+  void slices_wanted(std::size_t model);
 
  protected:
   void resizeEvent(QResizeEvent* event) override;
@@ -26,11 +34,14 @@ class RegisterPage : public Page {
  private:
   void add_hand();
   void show_slices();
-  void nudge();
-  void reset_hand();
+  /// The field's part of the chosen model's step from its registered pose.
+  void nudge(std::size_t field, double value);
+  void leave_as_registered();
+  void list_models(const ApplicationState& state);
+  void show_hand(const ApplicationState& state);
   QString words_of(const ApplicationState& state) const;
 
-  QPushButton *register_, *from_here_;
+  QPushButton *register_, *from_here_, *ct_;
   QLabel* says_;
   PageTable *models_, *tunnels_, *points_;
   QLabel* slices_;  ///< of the selected tunnel, or the first

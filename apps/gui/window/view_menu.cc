@@ -78,8 +78,10 @@ void MainWindow::build_scene_menu(QMenu* view) {
     action->setChecked(true);
     connect(action, &QAction::toggled, this, [this, own = part](bool on) {
       SceneParts parts = scene_->parts();
-      scene_->show_parts(parts.setFlag(own, on));
+      if (parts.testFlag(own) != on) scene_->show_parts(parts.setFlag(own, on));
     });
+    connect(scene_, &SceneView::objects_changed, action,
+            [this, action, own = part] { action->setChecked(scene_->parts().testFlag(own)); });
   }
   QMenu* models = menu->addMenu(tr("&Each model"));
   connect(menu, &QMenu::aboutToShow, models, [this, models] {
@@ -158,6 +160,7 @@ void MainWindow::restore_layout() {
   restoreGeometry(recent_.value("window/geometry").toByteArray());
   restoreState(recent_.value("window/state").toByteArray());
   for (QDockWidget* dock : {replay_dock_, measures_dock_, log_dock_}) dock->hide();  // until they are used
+  for (QDockWidget* dock : docks_) dock->hide();
   for (QSplitter* splitter : findChildren<QSplitter*>())
     if (!splitter->objectName().isEmpty())
       splitter->restoreState(recent_.value("window/" + splitter->objectName()).toByteArray());

@@ -124,7 +124,7 @@ TEST_F(WindowWithTunnels, DraggedPickMovesItsPoint) {
   const Eigen::Vector2d before = pick_of(state(), "FS", state().views[0])->uv_raw;
   ASSERT_NO_FATAL_FAILURE(drag(0, before, {25, 0}));
   EXPECT_GT((pick_of(state(), "FS", state().views[0])->uv_raw - before).norm(), 5);
-  EXPECT_TRUE(window_->controller().can_undo_picks());
+  EXPECT_TRUE(window_->controller().can_undo());
 }
 
 TEST_F(WindowWithTunnels, AClickThatFoundNoBallIsNoPickUntilItIsTakenAsItIs) {

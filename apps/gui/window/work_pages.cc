@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pages of the navigation and verification steps.
 #include <QDesktopServices>
+#include <QHBoxLayout>
 #include <QUrl>
 #include <QVBoxLayout>
 #include <algorithm>
@@ -38,6 +39,9 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
                      [this] { controller_.plan_order(tunnel_->currentText().toStdString()); });
   go_ = add_hold(tr("4  &Move to the tunnel"), "go", [this] { controller_.go(); });
   withdraw_ = add_hold(tr("5  With&draw the tool"), "withdraw", [this] { controller_.withdraw(); });
+  auto* ends = new QHBoxLayout;  // in one row: on a small screen all buttons are in sight
+  for (QWidget* button : {go_, withdraw_}) ends->addWidget(button, 1);
+  static_cast<QVBoxLayout*>(layout())->addLayout(ends);
   for (HoldButton* button : {unlock_, register_, go_, withdraw_})
     connect(button, &HoldButton::released, this, &NavigatePage::tell);
   tell_why_last();  // the buttons stay where they are

@@ -68,6 +68,8 @@ void XrayView::clear(const QString& why) {
   superseded_.clear();
   refusal_.reset();
   measures_ = {};
+  handle_.reset();
+  handle_in_layer_.reset();
   cursor_.reset();
   drag_ = {};
   computing_ = false;
@@ -168,6 +170,12 @@ void XrayView::set_outlines(std::vector<ModelOutline> rectified) {
   carry_live();
 }
 
+void XrayView::set_handle(const std::optional<ModelHandle>& rectified) {
+  if (!rectified && !handle_) return;
+  handle_ = rectified;
+  carry_live();
+}
+
 void XrayView::set_tool(const std::optional<guidance::ImageLine>& rectified, const QString& note) {
   if (!rectified && !live_.has_tool()) return;
   live_.set_tool(rectified, note);
@@ -239,6 +247,7 @@ void XrayView::carry_live() {
   if (shown_) {
     live_.carry(view(), shown_->layer);
     measures_.carry(view(), shown_->layer);
+    handle_in_layer_ = handle_ ? in_layer(view(), shown_->layer, handle_->centre) : std::nullopt;
   }
   update();
 }

@@ -13,6 +13,7 @@
 #include "gui/xray/live_marks.h"
 #include "gui/xray/mark_groups.h"
 #include "gui/xray/measure_marks.h"
+#include "gui/xray/model_handle.h"
 #include "gui/xray/refusal_text.h"
 #include "gui/xray/residual_scale.h"
 
@@ -67,6 +68,8 @@ class XrayView : public QWidget {
   void set_path(std::vector<Eigen::Vector2d> rectified);
   void set_tool(const std::optional<guidance::ImageLine>& rectified, const QString& note);
   void set_outlines(std::vector<ModelOutline> rectified);
+  /// Of the model that the left button moves; removed as the picks are.
+  void set_handle(const std::optional<ModelHandle>& rectified);
   void set_picks(std::vector<FreshPick> raw);
   /// Drawn over everything; removed as the picks are.
   void set_measures(std::vector<EvaluatedMeasure> measures);
@@ -97,6 +100,8 @@ class XrayView : public QWidget {
   void pick_moved(const QString& name, QPointF raw_pixel);
   /// A right click, without a drag, on a movable pick.
   void pick_menu_wanted(const QString& name, const QPoint& global);
+  /// The handle is dragged from one raw pixel to the next. `continues`: the drag has begun before.
+  void handle_dragged(helicarm::gui::HandlePart part, QPointF from_raw, QPointF to_raw, bool continues);
   void hovered(std::optional<helicarm::gui::MarkUnderCursor> mark);
   void layer_changed(helicarm::gui::Layer layer);
   void window_changed(helicarm::image::GreyWindow window);
@@ -125,6 +130,8 @@ class XrayView : public QWidget {
     bool may_pick = false;
     QString pick = {};                    ///< name of the movable pick under the press
     std::optional<ClickMark> click = {};  ///< of a measure, while measuring
+    HandlePart handle = HandlePart::none;
+    bool has_moved_handle = false;
   };
 
   const pipeline::ViewResult& view() const { return result_->views[view_]; }
@@ -141,6 +148,8 @@ class XrayView : public QWidget {
   void pick_at(const QPointF& place);
   QString movable_at(const QPointF& place) const;
   void move_click(const QPointF& place);
+  HandlePart handle_at(const QPointF& place) const;
+  void move_handle(const QPointF& from, const QPointF& to);
   void show_moved(const std::optional<QPointF>& raw);
   void hover_at(const QPointF& place);
   void hover_over(const std::optional<MarkUnderCursor>& mark);
@@ -179,6 +188,8 @@ class XrayView : public QWidget {
   bool details_visible_ = false;
   LiveMarks live_;
   MeasureMarks measures_;
+  std::optional<ModelHandle> handle_;
+  std::optional<Eigen::Vector2d> handle_in_layer_;
   ImageFrame frame_;
   QPixmap still_;  ///< image and marks; null: to be redrawn
 

@@ -74,6 +74,8 @@ void XrayView::mousePressEvent(QMouseEvent* event) {
     drag_.click = measures_.click_near(event->position(), reach, frame_);
   else if (left)
     drag_.pick = movable_at(event->position());
+  if (left && !measuring_ && drag_.pick.isEmpty()) drag_.handle = handle_at(event->position());
+  if (drag_.handle != HandlePart::none) drag_.may_pick = false;
   update();
 }
 
@@ -85,6 +87,7 @@ void XrayView::mouseMoveEvent(QMouseEvent* event) {
   if ((at - drag_.from).manhattanLength() >= threshold) drag_.moved = true;
   if (drag_.button != Qt::NoButton && drag_.moved) {
     drag_.last = at;
+    if (drag_.handle != HandlePart::none) return move_handle(at - by, at);
     if (!drag_.pick.isEmpty()) return show_moved(raw_at(at));
     if (drag_.click) return move_click(at);
     if (drag_.button == Qt::RightButton) return adjust_window(by);
@@ -113,6 +116,17 @@ void XrayView::move_click(const QPointF& place) {
   const double half = 0.5 / devicePixelRatioF();  // centre of the screen pixel
   if (const auto raw = raw_at(place + QPointF(half, half)))
     Q_EMIT measure_click_moved(drag_.click->number, drag_.click->click, *raw);
+}
+
+HandlePart XrayView::handle_at(const QPointF& place) const {
+  return handle_ && handle_in_layer_ ? handle_part(frame_.to_widget(*handle_in_layer_), place)
+                                     : HandlePart::none;
+}
+
+void XrayView::move_handle(const QPointF& from, const QPointF& to) {
+  const auto from_raw = raw_at(from), to_raw = raw_at(to);
+  if (from_raw && to_raw)
+    Q_EMIT handle_dragged(drag_.handle, *from_raw, *to_raw, std::exchange(drag_.has_moved_handle, true));
 }
 
 QString XrayView::movable_at(const QPointF& place) const {

@@ -37,6 +37,8 @@ void XrayView::paintEvent(QPaintEvent*) {
   if (shown_) {
     live_.paint(painter, frame_, QRectF(rect()).adjusted(6, 6, -6, -6));
     measures_.paint(painter, frame_);
+    if (handle_ && handle_in_layer_)
+      paint_handle(painter, frame_.to_widget(*handle_in_layer_), handle_->colour);
     if (magnifier_) paint_magnifier(painter);
     if (cursor_) paint_open_cross(painter, frame_.to_widget(*cursor_), Qt::white, 4, 16);
   }

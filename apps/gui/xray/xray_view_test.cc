@@ -66,6 +66,39 @@ TEST_F(XrayViewTest, ClickGivesARawPixelInEveryLayerAtAnyZoom) {
   }
 }
 
+TEST_F(XrayViewTest, TheHandleOfAModelIsDraggedByItsMiddleAndByItsRing) {
+  const Eigen::Vector2d centre(shown().xray_image->pixels.width() / 2.0,
+                               shown().xray_image->pixels.height() / 2.0);
+  view.set_handle(ModelHandle{centre, Qt::yellow});
+  const Eigen::Vector2d raw = shown().rectification->map.raw_from_rectified(centre);
+  const QPoint middle = view.place_of({raw.x(), raw.y()})->toPoint();
+  std::vector<std::pair<HandlePart, bool>> dragged;
+  QPointF way;
+  QObject::connect(&view, &XrayView::handle_dragged, &view,
+                   [&](HandlePart part, const QPointF& from, const QPointF& to, bool continues) {
+                     dragged.emplace_back(part, continues);
+                     way += to - from;
+                   });
+  view.set_picking(true);
+  QSignalSpy picked(&view, &XrayView::picked);
+  drag(middle, middle + QPoint(40, 0), Qt::LeftButton);
+  EXPECT_EQ(dragged,
+            (std::vector{std::pair(HandlePart::middle, false), std::pair(HandlePart::middle, true)}));
+  EXPECT_NEAR(way.x(), 40 / view.zoom_factor(), 3);
+  EXPECT_NEAR(way.y(), 0, 1);
+  dragged.clear();
+  drag(middle + QPoint(int(handle_radius), 0), middle + QPoint(0, int(handle_radius)), Qt::LeftButton);
+  ASSERT_EQ(dragged.size(), 2u);
+  EXPECT_EQ(dragged[0], std::pair(HandlePart::ring, false));
+  dragged.clear();
+  drag(middle + QPoint(90, 0), middle + QPoint(120, 0), Qt::LeftButton);
+  EXPECT_TRUE(dragged.empty());
+  EXPECT_EQ(picked.count(), 0);
+  view.set_handle({});
+  drag(middle, middle + QPoint(40, 0), Qt::LeftButton);
+  EXPECT_TRUE(dragged.empty());
+}
+
 TEST_F(XrayViewTest, MarksAreDrawnWhereAClickGivesTheirPixel) {
   pipeline::Result bare;
   xray::XrayImage dot;

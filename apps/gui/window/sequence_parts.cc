@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parts of the window of a sequence: controls, film, and its tables.
+#include <QHBoxLayout>
+#include <QHeaderView>
+#include <QVBoxLayout>
+
+#include "gui/window/sequence_window.h"
+#include "gui/window/style.h"
+#include "gui/xray/text.h"
+#include "gui/xray/xray_view.h"
+#include "helicarm/localization/error_bound.h"
+
+namespace helicarm::gui {
+namespace {
+
+constexpr int film_ms = 100;
+
+QTableWidget* add_list(const char* name, const QString& spoken) {
+  auto* table = new QTableWidget;
+  table->setObjectName(name);
+  table->setAccessibleName(spoken);
+  table->setEditTriggers(QAbstractItemView::NoEditTriggers);
+  table->setTabKeyNavigation(false);
+  table->verticalHeader()->hide();
+  table->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
+  return table;
+}
+
+QTableWidgetItem* cell_of(const QString& words, bool is_bad = false) {
+  auto* cell = new QTableWidgetItem(words);
+  if (is_bad) cell->setForeground(style::colours().red);
+  return cell;
+}
+
+QString words_of_marker(const track::TrackedMarker& marker) {
+  switch (marker.status) {
+    case track::MarkerStatus::lost:
+      return SequenceWindow::tr("lost");
+    case track::MarkerStatus::one_view:
+      return SequenceWindow::tr("one view");
+    case track::MarkerStatus::predicted:
+      return SequenceWindow::tr("predicted");
+    case track::MarkerStatus::tracked:
+      break;
+  }
+  return marker.place ? SequenceWindow::tr("±%1 mm").arg(localization::length_at_95(marker.place->covariance),
+                                                         0, 'f', 2)
+                      : QString();
+}
+
+}  // namespace
+
+SequenceWindow::SequenceWindow(QWidget* parent) : QDialog(parent) {
+  setObjectName("sequence");
+  setWindowFlag(Qt::WindowMaximizeButtonHint);
+  auto* column = new QVBoxLayout(this);
+  column->addWidget(build_top());
+  says_ = new QLabel;
+  says_->setObjectName("sequenceSays");
+  says_->setWordWrap(true);
+  column->addWidget(says_);
+  column->addWidget(build_film(), 3);
+  column->addWidget(build_tables(), 2);
+  connect(&clock_, &QTimer::timeout, this, &SequenceWindow::play_on);
+  clock_.setInterval(film_ms);
+  resize(1100, 740);
+  allow();
+}
+
+QWidget* SequenceWindow::build_top() {
+  auto* top = new QWidget;
+  auto* row = new QHBoxLayout(top);
+  row->setContentsMargins(0, 0, 0, 0);
+  frames_ = new QLineEdit;
+  frames_->setObjectName("sequenceFrames");
+  frames_->setAccessibleName(tr("Frames, first-last or first-last:step"));
+  frames_->setToolTip(frames_->accessibleName());
+  row->addWidget(new QLabel(tr("Frames")));
+  row->addWidget(frames_);
+  const auto add = [&](const QString& words, const char* name, auto act) {
+    auto* button = new QPushButton(words);
+    button->setObjectName(name);
+    button->setAutoDefault(false);
+    row->addWidget(button);
+    connect(button, &QPushButton::clicked, this, act);
+    return button;
+  };
+  read_ = add(tr("&Read"), "sequenceRead", [this] { read(); });
+  follow_ = add(tr("&Follow the markers"), "sequenceFollow", [this] { follow(); });
+  cancel_ = add(tr("&Cancel"), "sequenceCancel", [this] { *stopped_ = true; });
+  write_ = add(tr("&Write tables and report..."), "sequenceWrite", [this] { ask_and_write(); });
+  save_film_ = add(tr("&Save the film..."), "sequenceFilm", [this] { ask_and_film(); });
+  save_film_->setToolTip(tr("Each frame as displayed, with its marks, as a PNG"));
+  return top;
+}
+
+QWidget* SequenceWindow::build_film() {
+  auto* whole = new QWidget;
+  auto* column = new QVBoxLayout(whole);
+  column->setContentsMargins(0, 0, 0, 0);
+  film_frame_ = new QWidget;
+  film_row_ = new QHBoxLayout(film_frame_);
+  film_row_->setContentsMargins(0, 0, 0, 0);
+  column->addWidget(film_frame_, 1);
+  auto* row = new QHBoxLayout;
+  play_ = new QPushButton(tr("&Play"));
+  play_->setObjectName("sequencePlay");
+  play_->setAutoDefault(false);
+  connect(play_, &QPushButton::clicked, this, [this] {
+    if (clock_.isActive()) return clock_.stop();
+    if (slider_->value() == slider_->maximum()) slider_->setValue(0);
+    clock_.start();
+  });
+  slider_ = new QSlider(Qt::Horizontal);
+  slider_->setObjectName("sequenceSlider");
+  slider_->setAccessibleName(tr("Frame"));
+  connect(slider_, &QSlider::valueChanged, this, &SequenceWindow::read_frame);
+  number_ = new QLabel;
+  row->addWidget(play_);
+  row->addWidget(slider_, 1);
+  row->addWidget(number_);
+  column->addLayout(row);
+  return whole;
+}
+
+QWidget* SequenceWindow::build_tables() {
+  auto* whole = new QWidget;
+  auto* row = new QHBoxLayout(whole);
+  row->setContentsMargins(0, 0, 0, 0);
+  markers_ = add_list("markerList", tr("Markers"));
+  markers_->setColumnCount(6);
+  markers_->setHorizontalHeaderLabels(
+      {tr("Marker"), tr("Now"), tr("Tracked"), tr("One view"), tr("Predicted, lost"), tr("Worst ±95 %, mm")});
+  by_frames_ = add_list("markersByFrames", tr("Markers by frames"));
+  connect(by_frames_, &QTableWidget::cellClicked, this, [this](int frame, int) { set_frame(frame); });
+  connect(by_frames_, &QTableWidget::cellActivated, this, [this](int frame, int) { set_frame(frame); });
+  row->addWidget(markers_, 1);
+  row->addWidget(by_frames_, 1);
+  return whole;
+}
+
+void SequenceWindow::allow() {
+  const bool is_followed = shown_ && shown_->sequence;
+  read_->setEnabled(!busy_);
+  follow_->setEnabled(!busy_ && shown_);
+  cancel_->setEnabled(busy_);
+  write_->setEnabled(!busy_ && is_followed && !shown_->sequence->failure);
+  save_film_->setEnabled(!busy_ && shown_ && !film_);
+  for (QWidget* control : std::initializer_list<QWidget*>{play_, slider_})
+    control->setEnabled(shown_ != nullptr);
+}
+
+void SequenceWindow::show_views() {
+  while (views_.size() > shown_->given.views.size()) {
+    delete views_.back();
+    views_.pop_back();
+  }
+  while (views_.size() < shown_->given.views.size()) {
+    views_.push_back(new XrayView);
+    views_.back()->set_layer(Layer::raw);
+    film_row_->addWidget(views_.back());
+  }
+}
+
+void SequenceWindow::fill_tables() {
+  const auto& markers = shown_->given.markers;
+  const auto& sequence = shown_->sequence;
+  markers_->setRowCount(int(markers.size()));
+  const auto list = sequence ? marker_list(*sequence, markers) : std::vector<MarkerSummary>();
+  for (int row = 0; row < markers_->rowCount(); ++row) {
+    for (int column = 0; column < markers_->columnCount(); ++column)
+      markers_->setItem(row, column, cell_of("–"));
+    markers_->item(row, 0)->setText(text(markers[std::size_t(row)]));
+    if (list.empty()) continue;
+    const MarkerSummary& marker = list[std::size_t(row)];
+    markers_->item(row, 2)->setText(QString::number(marker.frames[0]));
+    markers_->item(row, 3)->setText(QString::number(marker.frames[1]));
+    markers_->item(row, 4)->setText(QString("%1, %2").arg(marker.frames[2]).arg(marker.frames[3]));
+    markers_->item(row, 5)->setText(marker.frames[0] > 0 ? fixed(marker.worst_95_mm, 2) : "–");
+  }
+  QStringList titles{tr("Frame")};
+  for (const std::string& marker : markers) titles << text(marker);
+  by_frames_->setColumnCount(int(titles.size()));
+  by_frames_->setHorizontalHeaderLabels(titles);
+  by_frames_->setRowCount(sequence ? int(sequence->frames.size()) : 0);
+  for (int row = 0; row < by_frames_->rowCount(); ++row) {
+    by_frames_->setItem(row, 0, cell_of(QString::number(sequence->frames[std::size_t(row)])));
+    for (std::size_t m = 0; m < markers.size(); ++m) {
+      const track::TrackedMarker& marker = sequence->markers[std::size_t(row)][m];
+      by_frames_->setItem(row, int(m) + 1,
+                          cell_of(words_of_marker(marker), marker.status != track::MarkerStatus::tracked));
+    }
+  }
+}
+
+/// The displayed frame's row, and each marker's state in it.
+void SequenceWindow::mark_frame() {
+  if (!shown_->sequence) return;
+  by_frames_->setCurrentCell(displayed_, 0);
+  for (int row = 0; row < markers_->rowCount(); ++row) {
+    const track::TrackedMarker& now = shown_->sequence->markers[std::size_t(displayed_)][std::size_t(row)];
+    markers_->setItem(row, 1, cell_of(words_of_marker(now), now.status != track::MarkerStatus::tracked));
+  }
+}
+
+}  // namespace helicarm::gui

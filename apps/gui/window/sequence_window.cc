@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/window/sequence_window.h"
+
+#include <QApplication>
+#include <QPointer>
+#include <QRegularExpression>
+#include <QThreadPool>
+#include <QVBoxLayout>
+#include <algorithm>
+#include <climits>
+
+#include "gui/controller/steps.h"
+#include "gui/window/ask_files.h"
+#include "gui/xray/text.h"
+#include "gui/xray/xray_view.h"
+#include "helicarm/core/json.h"
+#include "helicarm/localization/error_bound.h"
+#include "helicarm/track/track.h"
+#include "helicarm/xray/read_xray_image.h"
+
+namespace helicarm::gui {
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Thrown by the progress of a cancelled work.
+struct Cancelled {};
+
+Expected<std::shared_ptr<const FollowedSequence>> read_sequence(const fs::path& folder,
+                                                                const std::string& frames) {
+  return guarded([&]() -> std::shared_ptr<const FollowedSequence> {
+    const auto range = value_or_throw(case_registration::frame_range_from(frames));
+    track::TrackCase given = value_or_throw(track::read_track_case(folder, range));
+    const std::vector<track::SequenceView> views(given.views.begin(), given.views.end());
+    auto images = value_or_throw(track::SequenceImages::open(views, range));
+    return std::make_shared<const FollowedSequence>(
+        FollowedSequence{std::move(given), std::move(images), range, {}});
+  });
+}
+
+}  // namespace
+
+std::vector<MarkerSummary> marker_list(const track::Sequence& sequence,
+                                       const std::vector<std::string>& markers) {
+  std::vector<MarkerSummary> list(markers.size());
+  for (std::size_t m = 0; m < markers.size(); ++m) {
+    list[m].name = markers[m];
+    for (const auto& frame : sequence.markers) {
+      const track::TrackedMarker& marker = frame[m];
+      ++list[m].frames[std::size_t(marker.status)];
+      if (marker.status == track::MarkerStatus::tracked && marker.place)
+        list[m].worst_95_mm =
+            std::max(list[m].worst_95_mm, localization::length_at_95(marker.place->covariance));
+    }
+  }
+  return list;
+}
+
+bool is_sequence(const fs::path& folder) {
+  const auto json = read_json(folder / "case.json");
+  return json && json->is_object() && json->contains("markers");
+}
+
+QString all_frames(const fs::path& folder) {
+  const auto json = read_json(folder / "case.json");
+  if (!json || !json->contains("views") || !json->at("views").is_array() || json->at("views").empty())
+    return {};
+  const Json& view = json->at("views").front();
+  if (!view.is_object() || !view.contains("image") || !view.at("image").is_string()) return {};
+  const fs::path file = folder / view.at("image").get<std::string>();
+  const QString name = text(file.filename().string());
+  const auto from = name.indexOf("{frame"), to = name.indexOf('}', from);
+  if (from < 0 || to < 0) return QString("1-%1").arg(xray::count_frames(file).value_or(1));
+  const QRegularExpression numbered("^" + QRegularExpression::escape(name.left(from)) + "(\\d+)" +
+                                    QRegularExpression::escape(name.mid(to + 1)) + "$");
+  const bool has_offset = view.contains("frame_offset") && view.at("frame_offset").is_number_integer();
+  const int offset = has_offset ? view.at("frame_offset").get<int>() : 0;
+  int first = INT_MAX, last = INT_MIN;
+  std::error_code unreadable;
+  for (const fs::directory_entry& entry : fs::directory_iterator(file.parent_path(), unreadable))
+    if (const auto match = numbered.match(text(entry.path().filename().string())); match.hasMatch()) {
+      first = std::min(first, match.captured(1).toInt() - offset);
+      last = std::max(last, match.captured(1).toInt() - offset);
+    }
+  return first <= last ? QString("%1-%2").arg(first).arg(last) : QString();
+}
+
+SequenceWindow::~SequenceWindow() { *stopped_ = true; }
+
+void SequenceWindow::open(const fs::path& folder, const QString& frames) {
+  folder_ = folder;
+  frames_->setText(frames);
+  setWindowTitle(tr("Sequence: %1").arg(text(folder.string())));
+  read();
+}
+
+void SequenceWindow::run(const QString& doing,
+                         std::function<Expected<std::shared_ptr<const FollowedSequence>>()> work) {
+  if (busy_) return;
+  busy_ = true;
+  *stopped_ = false;
+  says_->setText(doing);
+  allow();
+  QThreadPool::globalInstance()->start([self = QPointer<SequenceWindow>(this), work = std::move(work)] {
+    const auto done = work();
+    QMetaObject::invokeMethod(
+        qApp,
+        [self, done] {
+          if (self) self->take(done);
+        },
+        Qt::QueuedConnection);
+  });
+}
+
+void SequenceWindow::take(const Expected<std::shared_ptr<const FollowedSequence>>& done) {
+  busy_ = false;
+  if (!done) {
+    says_->setText(sentence_of(done.error()));
+    return allow();
+  }
+  shown_ = *done;
+  const auto& sequence = shown_->sequence;
+  QStringList words;
+  if (!sequence)
+    words << tr("%1 frames of %2 views, %3 markers; not followed yet.")
+                 .arg(shown_->range.count())
+                 .arg(shown_->given.views.size())
+                 .arg(shown_->given.markers.size());
+  else
+    words << tr("%1 of %2 frames with all %3 markers tracked.")
+                 .arg(sequence->complete)
+                 .arg(sequence->frames.size())
+                 .arg(shown_->given.markers.size());
+  if (sequence && sequence->failure) words << sentence_of(*sequence->failure);
+  for (const auto* warnings : {&shown_->given.warnings, sequence ? &sequence->warnings : nullptr})
+    if (warnings)
+      for (const Warning& warning : *warnings) words << sentence_of(warning);
+  says_->setText(words.join('\n'));
+  slider_->setRange(0, shown_->range.count() - 1);
+  displayed_ = -1;
+  show_views();
+  fill_tables();
+  allow();
+  read_frame();
+}
+
+void SequenceWindow::read() {
+  run(tr("The case and its images are read."),
+      [folder = folder_, frames = frames_->text().trimmed().toStdString()] {
+        return read_sequence(folder, frames);
+      });
+}
+
+void SequenceWindow::follow() {
+  if (!shown_) return;
+  const auto tell = [self = QPointer<SequenceWindow>(this), all = shown_->range.count()](int frame) {
+    QMetaObject::invokeMethod(
+        qApp,
+        [self, frame, all] {
+          if (self && self->busy_) self->says_->setText(tr("Frame %1 of %2").arg(frame).arg(all));
+        },
+        Qt::QueuedConnection);
+  };
+  run(tr("The markers are followed."),
+      [from = shown_, stopped = stopped_, tell]() -> Expected<std::shared_ptr<const FollowedSequence>> {
+        try {
+          auto followed = std::make_shared<FollowedSequence>(*from);
+          auto sequence = track::run_track(from->given, from->range, {}, [&](int frame) {
+            tell(frame);
+            if (*stopped) throw Cancelled();
+          });
+          if (!sequence) return tl::unexpected(sequence.error());
+          followed->sequence = *std::move(sequence);
+          return followed;
+        } catch (const Cancelled&) {
+          return fail(Reason::interrupted, "cancelled");
+        }
+      });
+}
+
+void SequenceWindow::read_frame() {
+  if (!shown_ || reading_ || displayed_ == slider_->value()) return;
+  reading_ = true;
+  const int number = slider_->value();
+  QThreadPool::globalInstance()->start([self = QPointer<SequenceWindow>(this), of = shown_, number] {
+    auto images = std::make_shared<Expected<std::vector<xray::XrayImage>>>(
+        of->images.at(of->range.first + number * of->range.step));
+    QMetaObject::invokeMethod(
+        qApp,
+        [self, of, number, images] {
+          if (!self) return;
+          self->reading_ = false;
+          if (self->shown_ == of) self->show_frame(number, *images);
+          self->read_frame();  // another one is wanted meanwhile
+        },
+        Qt::QueuedConnection);
+  });
+}
+
+void SequenceWindow::show_frame(int number, const Expected<std::vector<xray::XrayImage>>& images) {
+  displayed_ = number;
+  const int frame = shown_->range.first + number * shown_->range.step;
+  number_->setText(tr("frame %1").arg(frame));
+  if (!images) {
+    clock_.stop();
+    return says_->setText(sentence_of(images.error()));
+  }
+  auto result = std::make_shared<pipeline::Result>();
+  for (std::size_t i = 0; i < images->size(); ++i) {
+    pipeline::ViewResult& view = result->views.emplace_back();
+    view.name = shown_->given.views[i].images.name;
+    view.xray_image = std::make_shared<const xray::XrayImage>((*images)[i]);
+  }
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    views_[i]->show_view(result, i, true);
+    std::vector<FreshPick> marks;
+    if (const auto& sequence = shown_->sequence)
+      for (std::size_t m = 0; m < shown_->given.markers.size(); ++m)
+        if (const auto& seen = sequence->images[std::size_t(number)][m * views_.size() + i])
+          marks.push_back({text(shown_->given.markers[m]), seen->uv_raw});
+    views_[i]->set_picks(std::move(marks));
+  }
+  mark_frame();
+  if (!film_) return;
+  const QString name = QString("frame-%1.png").arg(frame, 5, 10, QChar('0'));
+  QImage film(film_frame_->size(), QImage::Format_RGB32);
+  film_frame_->render(&film);
+  if (!film.save(QString::fromStdString((*film_ / name.toStdString()).string()))) {
+    says_->setText(tr("%1 cannot be written.").arg(name));
+    film_.reset();
+  } else if (number == slider_->maximum()) {
+    says_->setText(tr("The film's frames are in %1.").arg(text(film_->string())));
+    film_.reset();
+  } else {
+    slider_->setValue(number + 1);
+  }
+  allow();
+}
+
+void SequenceWindow::play_on() {
+  if (reading_) return;
+  if (slider_->value() == slider_->maximum()) return clock_.stop();
+  slider_->setValue(slider_->value() + 1);
+}
+
+void SequenceWindow::ask_and_write() {
+  ask_files(this, tr("Folder for the tables and the report"), QFileDialog::Directory, {},
+            [this](const std::vector<fs::path>& chosen) {
+              if (!shown_ || !shown_->sequence) return;
+              const auto written = track::write_track(*shown_->sequence, shown_->given, chosen.front());
+              says_->setText(written ? tr("Written to %1.").arg(text(chosen.front().string()))
+                                     : sentence_of(written.error()));
+            });
+}
+
+void SequenceWindow::ask_and_film() {
+  ask_files(this, tr("Folder for the frames of the film"), QFileDialog::Directory, {},
+            [this](const std::vector<fs::path>& chosen) {
+              film_ = chosen.front();
+              displayed_ = -1;
+              slider_->setValue(0);
+              allow();
+              read_frame();
+            });
+}
+
+}  // namespace helicarm::gui

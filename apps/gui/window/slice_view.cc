@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/window/slice_view.h"
+
+#include <QKeyEvent>
+#include <QMouseEvent>
+#include <QPainter>
+#include <QWheelEvent>
+#include <algorithm>
+#include <cmath>
+
+#include "gui/xray/label_placer.h"
+#include "gui/xray/mark_painter.h"
+#include "gui/xray/text.h"
+
+namespace helicarm::gui {
+namespace {
+
+/// The voxel axes to the right and downwards in a slice across `axis`.
+std::pair<int, int> axes_of(int axis) {
+  if (axis == 0) return {1, 2};
+  return {0, axis == 1 ? 2 : 1};
+}
+
+Eigen::Vector3d spacing_of(const volume::Volume& ct) {
+  return ct.patient_from_voxel.linear().colwise().norm().transpose();
+}
+
+/// Up in the image is superior.
+bool is_upwards(int axis) { return axis != 2; }
+
+}  // namespace
+
+QImage slice_image(const CtScene& scene, int axis) {
+  const volume::Volume& ct = *scene.ct;
+  const auto [right, down] = axes_of(axis);
+  const int width = ct.size[right], height = ct.size[down];
+  const int at = std::clamp(int(std::lround(scene.cursor[axis])), 0, ct.size[axis] - 1);
+  QImage image(width, height, QImage::Format_RGB32);
+  const double range = std::max(1.0, scene.high_hu - scene.low_hu);
+  for (int v = 0; v < height; ++v)
+    for (int u = 0; u < width; ++u) {
+      Eigen::Vector3i voxel;
+      voxel[axis] = at;
+      voxel[right] = u;
+      voxel[down] = v;
+      const std::size_t i = (std::size_t(voxel.z()) * std::size_t(ct.size.y()) + std::size_t(voxel.y())) *
+                                std::size_t(ct.size.x()) +
+                            std::size_t(voxel.x());
+      const double share = (double(ct.voxels[i]) - scene.low_hu) / range;
+      const int grey = int(std::lround(255 * std::clamp(share, 0.0, 1.0)));
+      QRgb colour = qRgb(grey, grey, grey);
+      if (scene.labels && (*scene.labels)[i] > 0) {
+        const QColor ink = ink::of_model(std::size_t((*scene.labels)[i] - 1));
+        colour = qRgb((grey + ink.red()) / 2, (grey + ink.green()) / 2, (grey + ink.blue()) / 2);
+      }
+      image.setPixel(u, is_upwards(axis) ? height - 1 - v : v, colour);
+    }
+  return image;
+}
+
+SliceView::SliceView(int axis, QWidget* parent) : QWidget(parent), axis_(axis) {
+  setFocusPolicy(Qt::StrongFocus);
+  setObjectName(QString("slice%1").arg(axis));
+  setAccessibleName(axis == 2   ? tr("Slice across z")
+                    : axis == 1 ? tr("Slice across y")
+                                : tr("Slice across x"));
+  setToolTip(tr("A click or the arrow keys move the cursor; the wheel, + and - the slice"));
+}
+
+void SliceView::show_scene(const CtScene& scene) {
+  scene_ = scene;
+  drawn_ = scene_.ct ? slice_image(scene_, axis_) : QImage();
+  update();
+}
+
+SliceView::Frame SliceView::frame() const {
+  const auto [right, down] = axes_of(axis_);
+  const Eigen::Vector3d spacing = spacing_of(*scene_.ct);
+  const double wide_mm = spacing[right] * drawn_.width(), high_mm = spacing[down] * drawn_.height();
+  const double scale = std::min(width() / wide_mm, height() / high_mm);
+  return {{0.5 * (width() - scale * wide_mm), 0.5 * (height() - scale * high_mm)},
+          scale * spacing[right],
+          scale * spacing[down]};
+}
+
+QPointF SliceView::place_of(const Eigen::Vector3d& voxel) const {
+  const auto [right, down] = axes_of(axis_);
+  const Frame at = frame();
+  const double v = is_upwards(axis_) ? drawn_.height() - 1 - voxel[down] : voxel[down];
+  return at.origin + QPointF((voxel[right] + 0.5) * at.across, (v + 0.5) * at.down);
+}
+
+void SliceView::place(const QPointF& at) {
+  if (!scene_.ct) return;
+  const auto [right, down] = axes_of(axis_);
+  const Frame drawn = frame();
+  const QPointF off = at - drawn.origin;
+  Eigen::Vector3d voxel = scene_.cursor;
+  voxel[right] = off.x() / drawn.across - 0.5;
+  const double v = off.y() / drawn.down - 0.5;
+  voxel[down] = is_upwards(axis_) ? drawn_.height() - 1 - v : v;
+  emit placed(voxel.cwiseMax(0).cwiseMin((scene_.ct->size.array() - 1).matrix().cast<double>()));
+}
+
+void SliceView::move_slice(double by) {
+  if (!scene_.ct) return;
+  Eigen::Vector3d voxel = scene_.cursor;
+  voxel[axis_] = std::clamp(voxel[axis_] + by, 0.0, double(scene_.ct->size[axis_] - 1));
+  emit placed(voxel);
+}
+
+void SliceView::mousePressEvent(QMouseEvent* event) {
+  if (event->button() == Qt::LeftButton) place(event->position());
+}
+
+void SliceView::mouseMoveEvent(QMouseEvent* event) {
+  if (event->buttons() & Qt::LeftButton) place(event->position());
+}
+
+void SliceView::wheelEvent(QWheelEvent* event) {
+  move_slice(event->angleDelta().y() > 0 ? 1 : -1);
+  event->accept();
+}
+
+void SliceView::keyPressEvent(QKeyEvent* event) {
+  if (!scene_.ct) return QWidget::keyPressEvent(event);
+  const Frame drawn = frame();
+  const QPointF at = place_of(scene_.cursor);
+  switch (event->key()) {
+    case Qt::Key_Left:
+      return place(at - QPointF(drawn.across, 0));
+    case Qt::Key_Right:
+      return place(at + QPointF(drawn.across, 0));
+    case Qt::Key_Up:
+      return place(at - QPointF(0, drawn.down));
+    case Qt::Key_Down:
+      return place(at + QPointF(0, drawn.down));
+    case Qt::Key_Plus:
+    case Qt::Key_Equal:
+      return move_slice(1);
+    case Qt::Key_Minus:
+      return move_slice(-1);
+    default:
+      QWidget::keyPressEvent(event);
+  }
+}
+
+void SliceView::paintEvent(QPaintEvent*) {
+  QPainter painter(this);
+  painter.fillRect(rect(), QColor(13, 16, 21));
+  if (!scene_.ct) return;
+  const Frame at = frame();
+  painter.setRenderHint(QPainter::SmoothPixmapTransform);
+  painter.drawImage(QRectF(at.origin, QSizeF(at.across * drawn_.width(), at.down * drawn_.height())), drawn_);
+  painter.setRenderHint(QPainter::Antialiasing);
+  const Eigen::Affine3d voxel_from_patient = scene_.ct->patient_from_voxel.inverse();
+  constexpr double near_voxels = 2;
+  for (const CtTunnel& tunnel : scene_.tunnels) {
+    const Eigen::Vector3d start = voxel_from_patient * tunnel.start, end = voxel_from_patient * tunnel.end;
+    painter.setPen(QPen(ink::tunnel, 2, Qt::DashLine));  // projected onto the slice
+    painter.drawLine(place_of(start), place_of(end));
+    outlined_text(painter, place_of(end) + QPointF(6, -6), text(tunnel.name), ink::tunnel);
+  }
+  for (const auto& [name, seed] : scene_.seeds) {
+    const bool is_near = std::abs(seed[axis_] - scene_.cursor[axis_]) <= near_voxels;
+    if (!is_near) continue;
+    paint_open_cross(painter, place_of(seed), ink::point, 3, 9);
+    outlined_text(painter, place_of(seed) + QPointF(8, -6), name, ink::point);
+  }
+  paint_open_cross(painter, place_of(scene_.cursor), Qt::white, 5, 14);
+  if (hasFocus()) {
+    painter.setPen(QPen(palette().highlight().color(), 2));
+    painter.setBrush(Qt::NoBrush);
+    painter.drawRect(QRectF(rect()).adjusted(1, 1, -1, -1));
+  }
+}
+
+}  // namespace helicarm::gui
