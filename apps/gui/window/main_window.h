@@ -126,6 +126,8 @@ class MainWindow : public QMainWindow {
   void show_steps();
   void build_log();
   void build_panels();
+  /// Out of the column at the right, to float on another screen or be docked.
+  void build_scene_apart(QMenu* view);
   void build_tour();
   void ask_tour();
   std::vector<TourStep> tour_steps();

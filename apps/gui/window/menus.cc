@@ -74,6 +74,7 @@ void MainWindow::build_menus() {
   view->addAction(log_dock_->toggleViewAction());
   for (const QDockWidget* dock : docks_)
     if (dock->features() & QDockWidget::DockWidgetClosable) view->addAction(dock->toggleViewAction());
+  build_scene_apart(view);
   build_layers_menu(view);
   build_scene_menu(view);
   build_appearance_menu(view);

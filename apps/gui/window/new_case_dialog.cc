@@ -2,6 +2,7 @@
 #include "gui/window/new_case_dialog.h"
 
 #include <QApplication>
+#include <QEvent>
 #include <QMenu>
 #include <QPointer>
 #include <QSignalBlocker>
@@ -32,6 +33,16 @@ QString words_of(const ViewPlate& plate) {
 }
 
 }  // namespace
+
+bool NewCaseDialog::event(QEvent* event) {
+  constexpr int narrowest = 860;
+  const bool done = QDialog::event(event);
+  if (layout() == nullptr) return done;
+  if (event->type() == QEvent::StyleChange) setMinimumWidth(style::scaled(narrowest));
+  if (event->type() == QEvent::LayoutRequest || event->type() == QEvent::Resize)
+    setMinimumHeight(layout()->totalMinimumHeightForWidth(width()));
+  return done;
+}
 
 void NewCaseDialog::add_images(const std::vector<pipeline::NewImage>& images) {
   for (const pipeline::NewImage& image : images) {
@@ -149,7 +160,7 @@ void NewCaseDialog::show_row(int row) {
   cell(view_column, text(image.view.empty() ? checked.view : image.view), true);
   auto* found = cell(found_column, checked.failure ? sentence_of(*checked.failure) : text(checked.found));
   found->setToolTip(found->text());
-  found->setForeground(checked.failure ? style::colours().red : style::colours().text);
+  found->setForeground(checked.failure ? QBrush(style::colours().red) : QBrush());
   show_frame(row);
   show_view_plate(row);
 }

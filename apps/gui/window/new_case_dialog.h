@@ -35,6 +35,10 @@ class NewCaseDialog : public QDialog {
   /// The case is written.
   void created(const std::filesystem::path& folder);
 
+ protected:
+  /// As high as its texts need at its width, as wide as larger text needs.
+  bool event(QEvent* event) override;
+
  private:
   QWidget* build_preset_row();
   QWidget* build_images();

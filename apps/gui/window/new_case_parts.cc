@@ -83,7 +83,8 @@ QWidget* NewCaseDialog::build_images() {
   table_->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
   table_->horizontalHeader()->setSectionResizeMode(found_column, QHeaderView::Stretch);
   table_->verticalHeader()->hide();
-  table_->verticalHeader()->setDefaultSectionSize(34);
+  table_->verticalHeader()->setMinimumSectionSize(34);
+  table_->verticalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);  // what was found wraps
   table_->setSelectionBehavior(QAbstractItemView::SelectRows);
   column->addWidget(table_, 1);
   connect(table_, &QTableWidget::itemChanged, this, [this](const QTableWidgetItem* item) {

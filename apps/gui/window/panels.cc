@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Panels of the scene's objects and of the points, and the handles of models.
+#include <QAction>
 #include <QDockWidget>
+#include <QMenu>
 
 #include "gui/controller/hand_moves.h"
 #include "gui/window/main_window.h"
@@ -31,6 +33,27 @@ void MainWindow::build_panels() {
     plan_->choose(point);
     panels_->display(view);
   });
+}
+
+void MainWindow::build_scene_apart(QMenu* view) {
+  QDockWidget* dock = add_panel(tr("Scene"), "sceneDock", nullptr);
+  QAction* apart = view->addAction(tr("Scene in a pa&nel of its own"));
+  apart->setObjectName("sceneApart");
+  apart->setCheckable(true);
+  connect(apart, &QAction::toggled, this, [this, dock](bool on) {
+    if (on) {
+      dock->setWidget(scene_);
+      dock->setFloating(true);
+      dock->resize(right_->width(), right_->width());
+    } else {
+      right_->insertWidget(0, scene_);
+      right_->setStretchFactor(0, 1);
+    }
+    dock->setVisible(on);
+    scene_->show();
+  });
+  connect(dock->toggleViewAction(), &QAction::toggled, apart,
+          &QAction::setChecked);  // also when it is closed
 }
 
 void MainWindow::build_handles() {

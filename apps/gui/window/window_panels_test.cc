@@ -101,6 +101,20 @@ TEST_F(WindowPanels, EachObjectOfTheSceneIsHiddenAndMadeTransparent) {
   EXPECT_TRUE(find<QCheckBox>("shown:Calibrator")->isChecked());
 }
 
+TEST_F(WindowPanels, TheSceneMovesIntoAPanelOfItsOwnAndBack) {
+  auto* apart = find<QAction>("sceneApart");
+  auto* dock = find<QDockWidget>("sceneDock");
+  EXPECT_FALSE(dock->isVisible());
+  apart->trigger();
+  EXPECT_TRUE(dock->isVisible());
+  EXPECT_EQ(window_->scene().window(), dock);
+  EXPECT_TRUE(window_->scene().isVisible());
+  dock->close();
+  EXPECT_FALSE(apart->isChecked());
+  EXPECT_EQ(window_->scene().window(), window_.get());
+  EXPECT_TRUE(window_->scene().isVisible());
+}
+
 TEST_F(WindowPanels, PointsAreListedByViewsAndChosenThere) {
   ASSERT_NO_FATAL_FAILURE(open_tunnels());
   auto* table = find<QTableWidget>("pointTable");

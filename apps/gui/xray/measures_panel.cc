@@ -19,6 +19,7 @@ constexpr int through_fiducials = 0, at_depth = 1;  // entries before the points
 QTableWidget* result_table() {
   auto* table = new QTableWidget(0, 6);
   table->setObjectName("measuresTable");
+  table->setAccessibleName(QObject::tr("Measures"));
   const std::array columns{
       std::pair(QObject::tr("No."), QObject::tr("Number of the measure")),
       std::pair(QObject::tr("Measure"), QObject::tr("Kind of the measure")),
@@ -117,7 +118,8 @@ QWidget* MeasuresPanel::build_plane() {
   depth_->setAccessibleName(tr("Distance of the plane from the source"));
   depth_->setRange(100, 3000);
   depth_->setValue(700);
-  depth_->setSuffix(tr(" mm from the source"));
+  depth_->setToolTip(depth_->accessibleName());
+  depth_->setSuffix(tr(" mm"));  // the window stays within 1280 px with large text
   row->addWidget(depth_);
   connect(plane_, &QComboBox::currentIndexChanged, this, &MeasuresPanel::show_measures);
   connect(depth_, &QDoubleSpinBox::valueChanged, this, &MeasuresPanel::show_measures);
