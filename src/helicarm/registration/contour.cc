@@ -10,6 +10,7 @@
 
 #include "helicarm/core/statistics.h"
 #include "helicarm/geometry/triangulation.h"
+#include "helicarm/registration/thickness.h"
 
 namespace helicarm::registration {
 namespace {
@@ -69,6 +70,10 @@ bool has_shadow(const std::vector<Vector2d>& pixels, double cell) {
 /// Share of the contour that counts at least, so that no pose gains by leaving the image.
 constexpr double least_visible = 0.5;
 constexpr double sample_step = 0.5;  // of the profile, raster pixels
+// From the contour, raster pixels: an edge that is predicted farther away is that of another line of it.
+constexpr double farthest_edge = 2;
+
+constexpr double cut_reach_mm = 2;  // beside a cut there is its own edge, which the image does not show
 
 /// Attenuation between pixels; nothing where it is not valid.
 std::optional<double> attenuation_at(const Raster& raster, const Vector2d& at) {
@@ -83,16 +88,17 @@ std::optional<double> attenuation_at(const Raster& raster, const Vector2d& at) {
   return (1 - y) * ((1 - x) * value(0, 0) + x * value(1, 0)) + y * ((1 - x) * value(0, 1) + x * value(1, 1));
 }
 
-/// The attenuation along the normal, samples on either side of the contour's point; three parallel profiles
-/// are averaged. Nothing where a part is hidden or beyond the field.
-std::optional<std::vector<double>> profile_along(const Raster& raster, const Vector2d& at,
+/// What `value_at` gives along the normal, samples on either side of the contour's point; three parallel
+/// profiles are averaged. Nothing where a part is hidden or beyond the field.
+template <class ValueAt>
+std::optional<std::vector<double>> profile_along(const ValueAt& value_at, const Vector2d& at,
                                                  const Vector2d& normal, double reach) {
   const int half = int(std::ceil(reach / sample_step)) + 3;
   std::vector<double> profile(std::size_t(2 * half + 1), 0);
   const Vector2d tangent(-normal.y(), normal.x());
   for (int i = -half; i <= half; ++i)
     for (const double aside : {-1.0, 0.0, 1.0}) {
-      const auto value = attenuation_at(raster, at + i * sample_step * normal + aside * tangent);
+      const std::optional<double> value = value_at(at + i * sample_step * normal + aside * tangent);
       if (!value) return std::nullopt;
       profile[std::size_t(i + half)] += *value / 3;
     }
@@ -122,25 +128,46 @@ std::optional<double> steepest_fall(const std::vector<double>& profile, double a
   return best;
 }
 
+bool is_at_cut(const Vector3d& in_model, const std::vector<Vector3d>& cuts) {
+  return std::ranges::any_of(cuts,
+                             [&](const Vector3d& cut) { return (cut - in_model).norm() < cut_reach_mm; });
+}
+
 /// A point of the contour that the image shows.
 struct VisiblePoint {
   const ContourPoint* point;
   std::vector<double> profile;
-  std::optional<double> residual = {};  ///< full-resolution pixels, outward
+  double predicted_px = 0;              ///< the edge's place; full-resolution pixels, outward
+  std::optional<double> residual = {};  ///< from there
 };
 
 void find_edges(std::vector<VisiblePoint>& points, double about_px, const Raster& raster, double reach) {
   for (VisiblePoint& point : points) {
-    const auto edge = steepest_fall(point.profile, about_px / raster.factor, reach);
-    point.residual = edge ? std::optional(raster.factor * *edge) : std::nullopt;
+    const auto edge = steepest_fall(point.profile, (point.predicted_px + about_px) / raster.factor, reach);
+    point.residual = edge ? std::optional(raster.factor * *edge - point.predicted_px) : std::nullopt;
   }
 }
 
-/// The offset that most residuals have in common: weighted means from their median on.
+/// Expects each edge where the body's thickness falls most steeply: inside the contour of a rounded body, and
+/// elsewhere where another line of the contour runs beside it. Points without an edge near them are removed.
+void predict_edges(std::vector<VisiblePoint>& points, const Thickness& thickness, const Raster& raster,
+                   double reach) {
+  const auto thickness_at = [&](const Vector2d& at) { return std::optional(thickness.at(at)); };
+  std::erase_if(points, [&](VisiblePoint& point) {
+    const auto profile =
+        profile_along(thickness_at, raster.raster_at(point.point->pixel), point.point->normal, reach);
+    const auto edge = steepest_fall(*profile, 0, reach);
+    point.predicted_px = edge ? raster.factor * *edge : 0;
+    return !edge || std::abs(*edge) > farthest_edge;
+  });
+}
+
+/// The offset that most residuals have in common: weighted means from their median on. With the predicted
+/// places it lies inwards.
 double common_offset(const std::vector<VisiblePoint>& points, const ContourOptions& options) {
-  std::vector<double> residuals;
+  std::vector<double> residuals, predicted;
   for (const VisiblePoint& point : points)
-    if (point.residual) residuals.push_back(*point.residual);
+    if (point.residual) residuals.push_back(*point.residual), predicted.push_back(point.predicted_px);
   if (residuals.empty()) return 0;
   double offset = median(residuals);
   constexpr int means = 10;
@@ -153,7 +180,8 @@ double common_offset(const std::vector<VisiblePoint>& points, const ContourOptio
     }
     offset = sum / weights;
   }
-  return std::clamp(offset, -options.inward_px, 0.0);
+  const double place = median(std::move(predicted));
+  return std::clamp(offset, -options.inward_px - place, -place);
 }
 
 }  // namespace
@@ -205,29 +233,39 @@ std::vector<ContourPoint> apparent_contour(const Surface& surface, const geometr
 
 ViewObservation compare_contour(const Raster& raster, const geometry::View& view, const Surface& surface,
                                 const geometry::RigidTransform& world_from_model, const Vector3d& centre,
-                                const ContourOptions& options) {
+                                const ContourOptions& options, const std::vector<Vector3d>& cuts) {
   ViewObservation observation;
-  const auto contour = apparent_contour(surface, view, world_from_model, contour_spacing * raster.factor);
+  auto contour = apparent_contour(surface, view, world_from_model, contour_spacing * raster.factor);
+  if (!cuts.empty())
+    std::erase_if(contour, [&, model_from_world = world_from_model.inverse()](const ContourPoint& point) {
+      return is_at_cut(model_from_world * point.in_world, cuts);
+    });
+  const auto value_at = [&](const Vector2d& at) { return attenuation_at(raster, at); };
   std::vector<VisiblePoint> points;
   for (const ContourPoint& point : contour)
-    if (auto profile = profile_along(raster, raster.raster_at(point.pixel), point.normal,
-                                     options.reach + options.inward_px / raster.factor))
+    if (auto profile = profile_along(
+            value_at, raster.raster_at(point.pixel), point.normal,
+            options.reach + (options.inward_px > 0 ? farthest_edge : 0) + options.inward_px / raster.factor))
       points.push_back({&point, std::move(*profile)});
+  const std::size_t visible = points.size();
+  if (options.inward_px > 0)
+    predict_edges(points, Thickness(surface, view, world_from_model, raster), raster, options.reach);
   double offset = 0;
   find_edges(points, offset, raster, options.reach);
   if (options.inward_px > 0) {
     find_edges(points, common_offset(points, options), raster, options.reach);
     offset = common_offset(points, options);
   }
-  const double counted = std::max(double(points.size()), least_visible * double(contour.size()));
+  const double counted =
+      std::max(double(points.size()), least_visible * double(contour.size() - (visible - points.size())));
   double sum2 = 0, weights = 0;
-  for (const VisiblePoint& visible : points) {
-    const ContourPoint& point = *visible.point;
+  for (const VisiblePoint& seen : points) {
+    const ContourPoint& point = *seen.point;
     Comparison comparison;
     comparison.pixel = point.pixel;
     comparison.weight = 1 / counted;
-    if (visible.residual) {
-      const double residual = *visible.residual - offset;
+    if (seen.residual) {
+      const double residual = *seen.residual - offset;
       comparison.agreement = 1 / (1 + std::pow(residual / (2 * options.sigma_px), 2));
       const Vector3d by_point =
           geometry::projection_jacobian(view, point.in_world).transpose() * point.normal;

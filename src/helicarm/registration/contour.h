@@ -25,15 +25,19 @@ std::vector<ContourPoint> apparent_contour(const Surface& surface, const geometr
 inline constexpr double contour_spacing = 2;  ///< of the points that are compared, pixels of the raster
 
 struct ContourOptions {
-  double reach = 6;      ///< pixels of the raster, on either side, where an edge is looked for
-  double sigma_px = 1;   ///< full-resolution pixels; scale of the robust weight and of the information
-  double inward_px = 0;  ///< full-resolution pixels; most by which all edges may lie inside the contour
+  double reach = 6;     ///< pixels of the raster, on either side, where an edge is looked for
+  double sigma_px = 1;  ///< full-resolution pixels; scale of the robust weight and of the information
+  /// Full-resolution pixels; most by which all edges may lie inside the contour. Over 0, of a bone: each edge
+  /// is expected where the thickness of the body falls most steeply
+  double inward_px = 0;
 };
 
 /// Compares the contour with the image's edges along its normals, after the offset that they have in common.
-/// Agreement: the robust weight of an edge, 0 without one.
+/// Agreement: the robust weight of an edge, 0 without one. Points whose edge is another line's are left out.
+/// `cuts`: where the body goes on, model coordinates; its contour beside them does not count.
 ViewObservation compare_contour(const Raster& raster, const geometry::View& view, const Surface& surface,
                                 const geometry::RigidTransform& world_from_model,
-                                const Eigen::Vector3d& centre, const ContourOptions& options);
+                                const Eigen::Vector3d& centre, const ContourOptions& options,
+                                const std::vector<Eigen::Vector3d>& cuts = {});
 
 }  // namespace helicarm::registration

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/registration/surface_scene_test.h"
+#include "helicarm/registration/thickness.h"
 
 namespace helicarm::registration {
 namespace {
@@ -57,6 +58,61 @@ TEST(CompareContour, ACommonOffsetIsLimitedAndInwards) {
   const Raster raster = raster_of_ball(0);
   EXPECT_LT(compared(raster, drawn_mm + 2, 1).score, 0.6);
   EXPECT_NEAR(compared(raster, drawn_mm - 1, 4).score, compared(raster, drawn_mm - 1).score, 0.02);
+}
+
+/// Two balls of 14 mm beside each other along the ray, one 2 mm further left in the image: two lines there.
+Surface two_balls() {
+  const auto apart = [](const Vector3d& p) {
+    return std::min((p - Vector3d(0, -15, 0)).norm(), (p - Vector3d(2, 15, 0)).norm()) - drawn_mm;
+  };
+  return *prepare_surface(phantom::surface_of(apart, {Vector3d(-18, -33, -18), Vector3d(20, 33, 18)}, 0.8),
+                          "balls");
+}
+
+TEST(Thickness, IsTheWayThroughABody) {
+  const Raster raster = raster_of_ball(0);
+  const Surface ball = ball_of(drawn_mm);
+  const Thickness thickness(ball, view_from(0), {}, raster);
+  const auto through = [&](double x) {
+    return thickness.at(raster.raster_at(view_from(0).project(Vector3d(x, 0, 0))));
+  };
+  EXPECT_NEAR(through(0), 2 * drawn_mm, 0.1);
+  EXPECT_NEAR(through(10), 2 * std::sqrt(drawn_mm * drawn_mm - 100), 0.2);
+  EXPECT_EQ(through(16), 0);
+  EXPECT_EQ(through(1000), 0);
+}
+
+TEST(CompareContour, TheEdgeOfARoundBodyIsExpectedInsideItsContour) {
+  const Raster raster = raster_of_ball(0);
+  const auto common = [&](double inward_px) {
+    double left = 0, information = 0;
+    for (const Comparison& each : compared(raster, drawn_mm, inward_px).comparisons)
+      left += each.gradient[edge_offset], information += each.information(edge_offset, edge_offset);
+    return left / information;
+  };
+  EXPECT_LT(std::abs(common(1)), 0.1);
+}
+
+TEST(CompareContour, LinesBesideEachOtherAreExpectedWhereTheBodyThickens) {
+  const Surface balls = two_balls();
+  const Model drawn = *model_from("balls", balls.mesh);
+  const Raster raster = attenuation_raster(image_of(filled_volume(drawn), {}, view_from(0), "AP", 1));
+  const auto mean_square = [&](double inward_px) {
+    return compare_contour(raster, view_from(0), balls, {}, Vector3d::Zero(), {5, 1, inward_px}).residual_px;
+  };
+  EXPECT_LT(mean_square(1), 0.7 * mean_square(0));
+}
+
+TEST(CompareContour, BesideACutTheContourDoesNotCount) {
+  const Raster raster = raster_of_ball(0);
+  const Surface ball = ball_of(drawn_mm);
+  const std::vector<Vector3d> cuts = {{0, 0, drawn_mm}};
+  const auto whole = compare_contour(raster, view_from(0), ball, {}, Vector3d::Zero(), {5, 1, 0});
+  const auto part = compare_contour(raster, view_from(0), ball, {}, Vector3d::Zero(), {5, 1, 0}, cuts);
+  EXPECT_LT(part.comparisons.size(), whole.comparisons.size());
+  EXPECT_NEAR(part.score, whole.score, 0.05);
+  const Eigen::Vector2d cut = view_from(0).project(cuts[0]);
+  for (const Comparison& each : part.comparisons) EXPECT_GT((each.pixel - cut).norm(), 3.5);
 }
 
 }  // namespace
