@@ -68,9 +68,9 @@ def segment(ct, seeds=None, *, label_map=None, voxel_mm=None, tiff_offset_hu=0.0
       seeds: {name: (x, y, z)} in the volume's patient frame, mm; space: of the seeds, "LPS", "RAS" or "LAS". threshold_hu:
         bone is what has at least this value; None: 200, more in a noisy CT. gap_mm: gaps of the cortex up to twice this
         width do not open the marrow cavity. neck: parts are one bone where the neck between them has at least this share of
-        the smaller part's radius. label_map, labels: instead of seeds, a label map on the CT's grid and
-        {name: [label, ...]}. out: folder for the masks (NRRD), surfaces (STL), segment.png and segment.json, or None.
-        progress: called with the name of each step; an exception from it ends the work.
+        the smaller part's radius, or two thirds of that where the neck is long. label_map, labels: instead of seeds, a label
+        map on the CT's grid and {name: [label, ...]}. out: folder for the masks (NRRD), surfaces (STL), segment.png and
+        segment.json, or None. progress: called with the name of each step; an exception from it ends the work.
     Returns segment.json (threshold_hu, bones with volume_cm3, surface_cm2, centre_mm, box_mm, cut_off, contacts; warnings,
     notes) and labels: (z, y, x) bytes with each bone's label, 0 elsewhere; .transpose(2, 1, 0) is on the grid of a Volume.
     Raises InputError, and RefusedError for a seed on no bone and for two seeds on one.

@@ -19,6 +19,12 @@ constexpr float air_hu = -400;
 // Of the voxels of a CT of a limb 1 to 10 % are bone; more than half are another kind of image.
 constexpr double most_bone = 0.5;
 constexpr double fragment_mm = 1.5;
+// The neck's radius relative to the bone's within 1.5 of its radii: a bone's neck has a length, there it is
+// 0.85 and more. Where two balls meet it is 0.55: their depth grows from the rim of the contact; 0.68 of two
+// metacarpals.
+constexpr double length_in_radii = 1.5, has_length = 0.8;
+// What then suffices of the option's width: a femoral neck has half its head's radius.
+constexpr double long_neck_share = 2.0 / 3;
 
 Work thresholded(const volume::Volume& ct, double threshold, double margin_mm,
                  const pipeline::Progress& progress) {
@@ -88,6 +94,13 @@ std::vector<std::uint32_t> outside_of(const volume::Volume& ct, const Work& work
   return outside;
 }
 
+/// Whether a neck of that width joins a bone's parts by its length.
+bool is_long_neck(Watershed& regions, const Neck& neck, const DepthMap& depth, double width,
+                  double neck_width) {
+  return width >= long_neck_share * neck_width &&
+         regions.local_width(neck, depth, length_in_radii) >= has_length;
+}
+
 }  // namespace
 
 std::size_t index_in(const volume::Volume& ct, const Vector3i& at) {
@@ -109,7 +122,8 @@ std::vector<Join> join_regions(Parts& parts, const std::vector<std::uint32_t>& o
     if (a == b || (seeded[a] && seeded[b])) continue;
     const bool is_fragment = std::min(regions.depths[a], regions.depths[b]) <= parts.small;
     const double width = is_fragment ? 1 : regions.local_width(neck, parts.depth());
-    if (width < neck_width && !is_fragment) continue;
+    if (width < neck_width && !is_fragment && !is_long_neck(regions, neck, parts.depth(), width, neck_width))
+      continue;
     Join join = narrowest[a].width < narrowest[b].width ? narrowest[a] : narrowest[b];
     if (!is_fragment && width < join.width) join = {width, neck};
     const char has_seed = seeded[a] | seeded[b];

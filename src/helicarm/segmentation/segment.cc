@@ -10,6 +10,7 @@
 
 #include "helicarm/segmentation/bones.h"
 #include "helicarm/segmentation/contacts.h"
+#include "helicarm/volume/hounsfield.h"
 
 namespace helicarm::segmentation {
 namespace {
@@ -114,6 +115,13 @@ std::string nearest_bone(const volume::Volume& ct, Parts& parts, const Vector3d&
   return fmt::format("the nearest bone is {:.1f} mm away at {}", std::sqrt(least), text_of(nearest));
 }
 
+/// Where values are hardly Hounsfield units the threshold says nothing, and no seed helps; else empty.
+std::string other_unit(const volume::Volume& ct) {
+  const auto warnings = volume::check_hounsfield(ct, "the CT");
+  if (!warnings) return "; " + warnings.error().message;
+  return warnings->empty() ? "" : "; " + warnings->front().message;
+}
+
 /// Refuses seeds that are on no bone.
 void check_on_bone(const volume::Volume& ct, Parts& parts, std::span<const Seed> seeds, double neck) {
   for (const Seed& seed : seeds) {
@@ -127,9 +135,9 @@ void check_on_bone(const volume::Volume& ct, Parts& parts, std::span<const Seed>
     const std::string nearest = nearest_bone(ct, parts, seed.point, figures);
     throw BadInput({Reason::seed_off_bone,
                     fmt::format("{}: the seed {} has {:.0f} HU, bone begins at {:g}; {}: click on the bone, "
-                                "or lower the threshold{}",
+                                "or lower the threshold{}{}",
                                 seed.name, text_of(seed.point), hu, parts.threshold, nearest,
-                                is_ras ? "; as R, A, S the seed lies on bone" : ""),
+                                is_ras ? "; as R, A, S the seed lies on bone" : "", other_unit(ct)),
                     {},
                     std::move(figures)});
   }
@@ -141,13 +149,13 @@ void check_sizes(const volume::Volume& ct, Parts& parts, const Segmentation& mad
     if (bone.voxels >= least_voxels) continue;
     std::map<std::string, double> figures{{"voxels", double(bone.voxels)}, {"threshold_hu", parts.threshold}};
     const std::string nearest = nearest_bone(ct, parts, *bone.seed, figures);
-    throw BadInput(
-        {Reason::seed_off_bone,
-         fmt::format("{}: the seed {} lies on a speck of {} voxels, a bone has {} or more; {}: "
-                     "click on the bone, or lower the threshold ({:g} HU)",
-                     bone.name, text_of(*bone.seed), bone.voxels, least_voxels, nearest, parts.threshold),
-         {},
-         std::move(figures)});
+    throw BadInput({Reason::seed_off_bone,
+                    fmt::format("{}: the seed {} lies on a speck of {} voxels, a bone has {} or more; {}: "
+                                "click on the bone, or lower the threshold ({:g} HU){}",
+                                bone.name, text_of(*bone.seed), bone.voxels, least_voxels, nearest,
+                                parts.threshold, other_unit(ct)),
+                    {},
+                    std::move(figures)});
   }
 }
 

@@ -23,7 +23,8 @@ struct Seed {
 struct SegmentOptions {
   std::optional<double> threshold_hu = {};  ///< nothing: `usual_threshold`
   double gap_mm = 1;                        ///< half the width of gaps in the cortex that are closed
-  /// Parts are one bone where the neck between them has this share of the smaller one's radius near it
+  /// Parts are one bone where the neck between them has this share of the smaller one's radius near it, or
+  /// two thirds of that where the neck has a length, as a femur's has
   double neck = 0.6;
 };
 
@@ -44,8 +45,10 @@ inline constexpr std::array<Field<SegmentOptions>, 3> segment_fields{
         {.name = "neck",
          .flag = "--neck",
          .range = {0.05, 0.75},
-         .help = "Parts are one bone where the neck between them has at least this share of the smaller "
-                 "part's radius within four times the neck's own"})};
+         .help =
+             "Parts are one bone where the neck between them has at least this share of the smaller "
+             "part's radius within four times the neck's own; two thirds of that if the neck is long, as a "
+             "femur's"})};
 
 /// Where a bone meets another one.
 struct Contact {

@@ -14,7 +14,7 @@ namespace helicarm::segmentation {
 namespace {
 
 using Eigen::Vector3d;
-using testing::ElementsAre, testing::HasSubstr, testing::IsEmpty;
+using testing::ElementsAre, testing::HasSubstr, testing::IsEmpty, testing::Not;
 
 const Seed on_upper{"upper", {0, 0, 46}}, on_lower{"lower", {1, 0, -45}};
 
@@ -70,6 +70,37 @@ TEST(Segment, TheWaistOfAShaftIsNoJoint) {
   EXPECT_EQ(made->bones[0].left_out_cm3, 0);
   EXPECT_THAT(made->warnings, IsEmpty());
   EXPECT_EQ(refusal_of(ct, {{"ulna", {0, 0, 47}}, {"again", {0, 0, -47}}}).reason, Reason::seeds_in_one_bone);
+}
+
+/// A ball on a neck on a shaft, as a femur's head, in the socket of another bone that it touches.
+std::vector<TestBone> femoral_head(double neck_mm) {
+  constexpr double head_mm = 16, middle = 30;
+  std::vector<TestBone> solids{{{0, 0, middle}, Vector3d::Constant(head_mm)}};
+  const double end = middle - std::sqrt(head_mm * head_mm - neck_mm * neck_mm);
+  for (double z = end - 1.6 * neck_mm; z < end + 2; z += 2)
+    solids.push_back({{0, 0, z}, Vector3d::Constant(neck_mm)});
+  solids.push_back({{0, 0, -18}, {13, 17, 24}});
+  return solids;
+}
+
+TEST(Segment, AHeadOnItsNeckIsOneBone) {
+  for (const double neck_mm : {7.0, 8.0, 10.0}) {
+    const TestCt ct = ct_of(femoral_head(neck_mm), {1, 1, 1}, Eigen::Matrix3d::Identity(), {20, 20, 50});
+    for (const double z : {44.0, -38.0}) {
+      const auto made = segment(ct.volume, std::vector<Seed>{{"femur", {0, 0, z}}}, {});
+      ASSERT_TRUE(made) << made.error().message;
+      EXPECT_EQ(made->bones[0].left_out_cm3, 0) << neck_mm;
+    }
+  }
+}
+
+TEST(Segment, AHeadThatTouchesItsSocketIsApartFromIt) {
+  std::vector<TestBone> bones = femoral_head(8);
+  bones.push_back({{0, 0, 60}, {18, 18, 16}});
+  const TestCt ct = ct_of(bones, {1, 1, 1}, Eigen::Matrix3d::Identity(), {22, 22, 78});
+  const auto made = segment(ct.volume, std::vector<Seed>{{"femur", {0, 0, 30}}}, {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_NEAR(made->bones[0].left_out_cm3, bones.back().volume_cm3(), 0.1 * bones.back().volume_cm3());
 }
 
 TEST(Segment, AirInTheMarrowWhereTheVolumeCutsABone) {
@@ -182,6 +213,15 @@ TEST(Segment, AClickOnASpeckIsRefused) {
 TEST(Segment, AClickInRasIsRecognised) {
   const TestCt ct = ct_of({{{12, 0, 0}, {6, 6, 6}}}, {1, 1, 1}, Eigen::Matrix3d::Identity(), {24, 10, 10});
   EXPECT_THAT(refusal_of(ct, {{"bone", {-12, 0, 0}}}).message, HasSubstr("as R, A, S the seed lies on bone"));
+}
+
+TEST(Segment, AClickOffTheBoneOfAnImageThatIsNoCtSaysSo) {
+  EXPECT_THAT(refusal_of(plain_ct(), {{"upper", {22, 0, 25}}}).message,
+              HasSubstr("values of 40 to 1200 are hardly Hounsfield units"));
+  TestCt ct = plain_ct();
+  for (std::size_t i = 0; i < ct.truth.size(); ++i)
+    if (ct.truth[i] == 0) ct.volume.voxels[i] = -100;
+  EXPECT_THAT(refusal_of(ct, {{"upper", {22, 0, 25}}}).message, Not(HasSubstr("Hounsfield")));
 }
 
 TEST(Segment, AClickOutsideTheVolumeIsRefusedWithItsExtent) {

@@ -77,9 +77,9 @@ double Watershed::width(const Neck& neck) {
   return double(neck.depth) / double(std::min(depths[root(neck.a)], depths[root(neck.b)]));
 }
 
-double Watershed::local_width(const Neck& neck, const DepthMap& depth) {
+double Watershed::local_width(const Neck& neck, const DepthMap& depth, double reach_in_radii) {
   constexpr double samples = 8;  // of a neck's radius
-  const double reach = flare_reach * neck.depth;
+  const double reach = reach_in_radii * neck.depth;
   const Eigen::Vector3d spacing = depth.spacing;
   const Vector3i stride = (neck.depth / samples / spacing.array()).cast<int>().max(1);
   const Vector3i steps = (reach / spacing.array()).cast<int>() / stride.array();

@@ -24,6 +24,8 @@ struct Neck {
   std::uint32_t at = 0;        ///< voxel
 };
 
+inline constexpr double flare_reach = 4;
+
 /// Regions around the deepest points of bones. Regions that are one for certain are joined at once.
 struct Watershed {
   std::vector<std::uint32_t> labels;  ///< for each voxel: 0 outside, else a region's number plus 1
@@ -37,12 +39,10 @@ struct Watershed {
   std::uint32_t join(std::uint32_t a, std::uint32_t b);
   /// Radius of a neck relative to that of the smaller of its two regions.
   double width(const Neck& neck);
-  /// The same, of the regions' parts within `flare_reach` radii of the neck: a joint flares out at once, the
+  /// The same, of the regions' parts within so many of the neck's radii: a joint flares out at once, the
   /// waist of a shaft slowly. At least `width`.
-  double local_width(const Neck& neck, const DepthMap& depth);
+  double local_width(const Neck& neck, const DepthMap& depth, double reach_in_radii = flare_reach);
 };
-
-inline constexpr double flare_reach = 4;
 
 /// From this width on two regions are one: two seeds in them are on one bone.
 inline constexpr double surely_one = 0.75;
