@@ -146,6 +146,10 @@ class Frames(unittest.TestCase):
         self.assertIn("another sequence", done.stderr)
         self.assertIn("--frames", self.register(self.case, "--resume").stderr)
 
+        (out / "sequence.json").unlink()
+        anew = self.register(self.case, "--frames", "0-0", "--search-mm", 4, "--search-deg", 4)
+        self.assertIn("3 frames that an interrupted sequence left", anew.stderr)
+
     def test_a_view_may_start_at_another_number(self):
         for frame in range(3):
             (self.root / f"later_{frame + 5}.png").write_bytes((self.root / f"B_{frame:02d}.png").read_bytes())

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <filesystem>
 #include <sstream>
 #include <string>
@@ -9,6 +10,7 @@
 #include "findings.h"
 #include "helicarm/case_registration/register_fields.h"
 #include "helicarm/case_registration/registration_tables.h"
+#include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -102,6 +104,20 @@ void follow(const RegisterArguments& arguments, const case_registration::Registe
   if (const auto refusal = sequence.refusal()) throw BadInput(*refusal);
 }
 
+/// Says which frames of an interrupted sequence a new one replaces.
+void name_replaced_frames(const RegisterArguments& arguments, Console& console) {
+  std::error_code ignored;
+  const std::filesystem::path& out = arguments.run.out;
+  if (arguments.resume || std::filesystem::exists(out / "sequence.json", ignored)) return;
+  constexpr std::uintmax_t most_bytes = std::uintmax_t(1) << 30;
+  const auto lines = read_file(out / "frames.jsonl", most_bytes);
+  const auto frames = lines ? std::ranges::count(*lines, '\n') - 1 : 0;  // the first line names the sequence
+  if (frames > 0)
+    noted(console)(fmt::format(
+        "{} frames that an interrupted sequence left in {} are replaced; --resume goes on behind them",
+        frames, out.string()));
+}
+
 }  // namespace
 
 std::string summary_of(const case_registration::CaseRegistration& registration) {
@@ -114,6 +130,7 @@ CommandResult register_command(const RegisterArguments& arguments, Console& cons
   return guarded([&] {
     if (arguments.resume && arguments.frames.empty())
       throw BadInput(Reason::usage, "--resume is for a sequence: give --frames A-B as well");
+    name_replaced_frames(arguments, console);
     if (!arguments.resume) report::forget_registration(arguments.run.out);
     const case_registration::RegisterOptions options = value_or_throw(options_of(arguments.run, console));
     case_registration::Progress progress;

@@ -154,17 +154,18 @@ void check_chi_square(const Model& model, const RegistrationOptions& options, co
 
 /// The agreement of a few edges is chance.
 template <class Refuse>
-void check_determined(const Model& model, Registration& result, const Refuse& refuse) {
+void check_determined(const Model& model, bool has_start, Registration& result, const Refuse& refuse) {
   const int least = model.surface ? least_contour_points : least_patches;
   for (const RegisteredView& view : result.views)
     if (view.comparisons < least)
-      refuse(
-          Reason::wrong_model,
-          fmt::format("{}: {} of its edges can be compared with {}, at least {} are required: its start is "
-                      "outside the image, it is hidden or smaller than its file says (unit), or the "
-                      "volume's values are no Hounsfield units",
-                      model.name, view.comparisons, view.name, least),
-          {{"comparisons", double(view.comparisons)}, {"limit", double(least)}});
+      refuse(Reason::wrong_model,
+             fmt::format(
+                 "{}: {} of its edges can be compared with {}, at least {} are required: {}it is hidden or "
+                 "smaller than its file says (unit){}",
+                 model.name, view.comparisons, view.name, least,
+                 has_start ? "its start is outside the image, " : "",
+                 model.surface ? "" : ", or the volume's values are no Hounsfield units"),
+             {{"comparisons", double(view.comparisons)}, {"limit", double(least)}});
   if (result.is_determined() && geometry::whitening(result.covariance)) return;
   result.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
   refuse(Reason::uncertain, model.name + ": the images do not determine its pose", {});
@@ -196,7 +197,7 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
   const auto warn = [&](Reason reason, const std::string& message, std::map<std::string, double> figures) {
     result.warnings.push_back({reason, message, {}, std::move(figures)});
   };
-  check_determined(model, result, refuse);
+  check_determined(model, !starts.empty(), result, refuse);
   double nearest = 1e9;
   for (const geometry::RigidTransform& start : starts)
     nearest = std::min(nearest, separation(model, start, result.world_from_model));

@@ -39,6 +39,7 @@ class ObjReader {
 
   SurfaceFile read() {
     const bool ended = rest_.ends_with('\n') || rest_.ends_with('\r');
+    ends_within_line_ = !ended;
     std::string joined;
     while (!rest_.empty()) {
       std::string_view line = take_obj_line(rest_);
@@ -108,6 +109,8 @@ class ObjReader {
     polygon_.clear();
     for (std::string_view word = words.next(); !word.empty() && !word.starts_with('#'); word = words.next())
       polygon_.push_back(corner(word));
+    if (polygon_.size() < 3 && ends_within_line_ && rest_.empty())
+      refuse(Reason::truncated, "the file ends within a face", line_);
     if (polygon_.size() < 3)
       refuse(Reason::bad_value, fmt::format("the face has {} corners, must be at least 3", polygon_.size()),
              line_);
@@ -136,6 +139,7 @@ class ObjReader {
 
   std::string_view rest_;
   const std::string& origin_;
+  bool ends_within_line_ = false;
   std::size_t line_ = 0, highest_ = 0, highest_line_ = 0;
   std::vector<std::uint32_t> polygon_;
   SurfaceFile file_;

@@ -92,6 +92,7 @@ TEST(Obj, WhatIsWrongIsNamedByItsLine) {
   expect(vertices + "f 1 2 99999999999999999999\n", Reason::bad_value, "names vertex 99999999999999999999");
   expect(vertices + "f 1 2 999999999\n", Reason::bad_value, "names vertex 999999999");
   expect(vertices + "f 1 2\n", Reason::bad_value, "line 5: the face has 2 corners, must be at least 3");
+  expect(vertices + "f 1 2", Reason::truncated, "line 5: the file ends within a face");
   expect(vertices + "f 1 2 x\n", Reason::bad_value, "\"x\" is not a vertex number");
   expect("v 0 0\n" + faces, Reason::truncated, "line 1: ends within a number list");
   expect("v 0 0 0,5\n" + faces, Reason::bad_value, "line 1: \"0,5\" is not a number");
