@@ -19,6 +19,9 @@ struct TrackArguments {
   std::filesystem::path folder;  ///< holds case.json
   std::filesystem::path out = "helicarm-track";
   std::string frames;  ///< A-B[:STEP]
+  std::filesystem::path axes;
+  std::optional<double> butterworth_hz;
+  int butterworth_order = track::Butterworth{}.order;
   bool resume = false;
 };
 namespace {
@@ -61,8 +64,13 @@ CommandResult track_command(const TrackArguments& arguments, Console& console) {
       }
       throw BadInput(failure);
     };
-    const auto the_case = track::read_track_case(arguments.folder, range);
+    auto the_case = track::read_track_case(arguments.folder, range);
     if (!the_case) refuse(the_case.error());
+    if (!arguments.axes.empty())
+      the_case->axes = value_or_throw(track::read_body_axes(arguments.axes, *the_case));
+    if (arguments.butterworth_hz)
+      the_case->butterworth = track::Butterworth{*arguments.butterworth_hz, arguments.butterworth_order};
+    track::check_butterworth(*the_case, range.step);
     ProgressLine progress(console);
     Interruption interruption;
     int followed = 0;
@@ -133,6 +141,16 @@ void add_track(CLI::App& app, Action& action) {
   command->add_option("--frames", a.frames, "Frames A-B[:STEP]; the markers are picked in frame A")
       ->required();
   command->add_option("--out", a.out, "Folder for the tables, track.json and report.html")
+      ->capture_default_str();
+  command->add_option(
+      "--axes", a.axes,
+      "CSV body,axis,x,y,z: unit vectors x, y, z of two bodies or more in the first frame's world: "
+      "angles.csv then has joint angles (Grood and Suntay)");
+  command->add_option(
+      "--butterworth", a.butterworth_hz,
+      "Cut-off in Hz: butterworth.csv then has the places of markers.csv filtered forwards and "
+      "backwards, for comparison; the case states frame_rate_hz");
+  command->add_option("--butterworth-order", a.butterworth_order, "Of both passes together: 2 or 4")
       ->capture_default_str();
   command->add_flag("--resume", a.resume, "Go on after the frames that an interrupted run left in --out");
 }

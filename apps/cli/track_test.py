@@ -260,6 +260,44 @@ class Track(unittest.TestCase):
         self.assertEqual(done.returncode, 2, done.stderr)
         self.assertIn('"M8", "M9" are not among the 6 markers found in the first frame, M1 to M6: pick them', done.stderr)
 
+    def test_joint_angles_are_those_of_the_drawing(self):
+        axes = self.root / "axes.csv"
+        axes.write_text("body,axis,x,y,z\n" + "".join(
+            f"{body},{axis},{x},{y},{z}\n" for body in ("skull", "jaw")
+            for axis, x, y, z in (("x", 1, 0, 0), ("y", 0, 1, 0), ("z", 0, 0, 1))))
+        done = self.track(self.root / "case", "angles", f"1-{FRAMES}", "--axes", axes)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = table(self.root / "angles" / "angles.csv")
+        self.assertEqual([(row["body"], row["reference"]) for row in rows], [("jaw", "skull")] * FRAMES)
+        for row in rows[1:]:
+            turned = math.degrees(-0.02 * (int(row["frame"]) - 1))
+            for name, expected in (("flexion", 0), ("adduction", turned), ("rotation", 0)):
+                sigma = float(row[f"sigma_{name}_deg"])
+                self.assertLess(sigma, 0.5)
+                self.assertLess(abs(float(row[f"{name}_deg"]) - expected), 4 * sigma + 0.02, row)
+        self.assertIn("Joint of skull and jaw", (self.root / "angles" / "report.html").read_text())
+        axes.write_text("body,axis,x,y,z\nhip,x,1,0,0\n")
+        done = self.track(self.root / "case", "no-angles", f"1-{FRAMES}", "--axes", axes)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn('axes.csv: "hip" is no body of the case', done.stderr)
+
+    def test_butterworth_filter_stays_near_the_places(self):
+        def rated(case, folder):
+            case["frame_rate_hz"] = 50
+        folder = self.changed("rated", rated)
+        done = self.track(folder, "filtered", f"1-{FRAMES}", "--butterworth", "8", "--butterworth-order", "2")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("butterworth.csv", [path.name for path in (self.root / "out").iterdir()])
+        places = table(self.root / "filtered" / "markers.csv")
+        for row, place_of in zip(table(self.root / "filtered" / "butterworth.csv"), places, strict=True):
+            self.assertEqual((row["frame"], row["name"]), (place_of["frame"], place_of["name"]))
+            self.assertLess(math.dist(*([float(each[f"{axis}_mm"]) for axis in "xyz"] for each in (row, place_of))), 0.3)
+        for case, cut_off, word in ((self.root / "case", "8", '"frame_rate_hz" is not stated'),
+                                    (folder, "25", "half the frame rate, 25 Hz")):
+            done = self.track(case, "refused", f"1-{FRAMES}", "--butterworth", cut_off)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(word, done.stderr)
+
     def test_swap_in_mid_sequence_is_repaired_and_named(self):
         out = self.root / "swapped"
         shutil.copytree(self.root / "out", out)

@@ -24,6 +24,8 @@ struct Tracked {
 
 std::unique_ptr<Tracked> tracked(const std::filesystem::path& folder, const std::string& frames,
                                  const std::optional<std::filesystem::path>& out, bool resume,
+                                 const std::optional<std::filesystem::path>& axes,
+                                 std::optional<double> butterworth_hz, int butterworth_order,
                                  const py::object& progress) {
   const py::object nothing = py::none();
   const RunHooks hooks = run_hooks(nothing);
@@ -33,6 +35,9 @@ std::unique_ptr<Tracked> tracked(const std::filesystem::path& folder, const std:
       const auto range = value_or_throw(case_registration::frame_range_from(frames));
       auto made = std::make_unique<Tracked>();
       made->the_case = value_or_throw(track::read_track_case(folder, range));
+      if (butterworth_hz) made->the_case.butterworth = track::Butterworth{*butterworth_hz, butterworth_order};
+      track::check_butterworth(made->the_case, range.step);
+      if (axes) made->the_case.axes = value_or_throw(track::read_body_axes(*axes, made->the_case));
       made->sequence = value_or_throw(
           track::run_track(made->the_case, range, {.out = out, .resume = resume}, [&](int done) {
             hooks.on_view();
@@ -55,7 +60,8 @@ std::unique_ptr<Tracked> tracked_images(
     const std::vector<std::tuple<std::size_t, std::size_t, double, double>>& picks,
     const std::vector<std::tuple<std::string, std::vector<std::size_t>, std::optional<Doubles>>>& bodies,
     double diameter_mm, std::optional<double> frame_rate_hz, const std::optional<std::filesystem::path>& out,
-    const py::object& progress) {
+    const std::vector<std::pair<std::size_t, Doubles>>& axes, std::optional<double> butterworth_hz,
+    int butterworth_order, const py::object& progress) {
   auto made = std::make_unique<Tracked>();
   track::TrackCase& the_case = made->the_case;
   for (const auto& [name, images, camera, map] : views) {
@@ -80,6 +86,12 @@ std::unique_ptr<Tracked> tracked_images(
   for (const auto& [name, of, geometry] : bodies)
     the_case.bodies.push_back(
         {name, of, geometry ? rows_of<3>(*geometry, "bodies: " + name) : std::vector<Eigen::Vector3d>{}});
+  for (const auto& [body, matrix] : axes)
+    the_case.axes.push_back({body, matrix_of(matrix, 3, 3, "axes: " + the_case.bodies[body].name)});
+  if (butterworth_hz) the_case.butterworth = track::Butterworth{*butterworth_hz, butterworth_order};
+  value_or_raise(guarded([&] { track::check_butterworth(the_case, 1); }));
+  if (!axes.empty())
+    value_or_raise(guarded([&] { track::check_body_axes(the_case.axes, the_case, "axes"); }));
   const case_registration::FrameRange range{1, int(std::get<1>(views.front()).size()), 1};
   const RunHooks hooks = run_hooks(py::none());
   value_or_raise(without_gil([&] {
@@ -135,6 +147,26 @@ py::dict bodies_dict(const Tracked& t, std::vector<track::TrackedBody> track::Bo
       at += size * size;
     }
     dict[py::str(t.the_case.bodies[b].name)] = read_only(array);
+  }
+  return dict;
+}
+
+/// (n, 3) or (n, 3, 3) of each joint by its body's name, NaN where it has no angles.
+template <class Write>
+py::dict joints_dict(const Tracked& t, std::vector<py::ssize_t> rest, Write write) {
+  py::dict dict;
+  for (const track::Joint& joint : t.sequence.joints) {
+    std::vector<py::ssize_t> shape{py::ssize_t(joint.frames.size())};
+    py::ssize_t each = 1;
+    for (const py::ssize_t size : rest) shape.push_back(size), each *= size;
+    py::array_t<double> array(shape);
+    double* at = array.mutable_data();
+    for (const auto& frame : joint.frames) {
+      std::fill(at, at + each, unplaced);
+      if (frame) write(*frame, at);
+      at += each;
+    }
+    dict[py::str(t.the_case.bodies[joint.body].name)] = read_only(array);
   }
   return dict;
 }
@@ -196,6 +228,42 @@ void add_track(py::module_& module) {
           "smoothed_covariances",
           [](const Tracked& t) { return bodies_dict(t, &track::BodySequence::smoothed, 6, pose_covariance); },
           "{name: (n, 6, 6)}.")
+      .def_property_readonly(
+          "butterworth",
+          [](const Tracked& t) -> py::object {
+            const auto places = track::butterworth_places(t.sequence, t.the_case);
+            if (places.empty()) return py::none();
+            const auto frames = py::ssize_t(t.sequence.frames.size());
+            py::array_t<double> array({frames, py::ssize_t(places.size()), py::ssize_t(3)});
+            auto at = array.mutable_unchecked<3>();
+            for (py::ssize_t f = 0; f < frames; ++f)
+              for (py::ssize_t m = 0; m < py::ssize_t(places.size()); ++m)
+                for (py::ssize_t k = 0; k < 3; ++k) {
+                  const auto& place = places[std::size_t(m)][std::size_t(f)];
+                  at(f, m, k) = place ? (*place)[k] : unplaced;
+                }
+            return read_only(array);
+          },
+          "(n, m, 3): places filtered forwards and backwards, mm, NaN where lost; None without "
+          "butterworth_hz.")
+      .def_property_readonly(
+          "joint_angles",
+          [](const Tracked& t) {
+            return joints_dict(t, {3}, [](const track::JointAngles& angles, double* at) {
+              Eigen::Map<Eigen::Vector3d>{at} = angles.angles;
+            });
+          },
+          "{name: (n, 3)}: flexion, adduction and external rotation against the first body of `axes` (Grood "
+          "and "
+          "Suntay), rad, by the smoothed poses; NaN where a pose is missing. Empty without axes.")
+      .def_property_readonly(
+          "joint_covariances",
+          [](const Tracked& t) {
+            return joints_dict(t, {3, 3}, [](const track::JointAngles& angles, double* at) {
+              Eigen::Map<Eigen::Matrix3d>{at} = angles.covariance;
+            });
+          },
+          "{name: (n, 3, 3)}: rad^2; the axes are taken as exact.")
       .def_property_readonly("warnings", [](const Tracked& t) { return warning_list(t.sequence.warnings); })
       .def(
           "to_dict", [](const Tracked& t) { return python_from(track::to_json(t.sequence, t.the_case)); },
@@ -213,14 +281,20 @@ void add_track(py::module_& module) {
   module.def("_track_images", &tracked_images, py::arg("views"), py::arg("camera_covariance"),
              py::arg("markers"), py::arg("picks"), py::arg("bodies"), py::kw_only(), py::arg("diameter_mm"),
              py::arg("frame_rate_hz") = py::none(), py::arg("out") = py::none(),
-             py::arg("progress") = py::none());
+             py::arg("axes") = std::vector<std::pair<std::size_t, Doubles>>{},
+             py::arg("butterworth_hz") = py::none(),
+             py::arg("butterworth_order") = track::Butterworth{}.order, py::arg("progress") = py::none());
   const track::TrackOptions usual;
   module.def("track", &tracked, py::arg("case"), py::kw_only(), py::arg("frames"),
-             py::arg("out") = py::none(), py::arg("resume") = usual.resume, py::arg("progress") = py::none(),
+             py::arg("out") = py::none(), py::arg("resume") = usual.resume, py::arg("axes") = py::none(),
+             py::arg("butterworth_hz") = py::none(),
+             py::arg("butterworth_order") = track::Butterworth{}.order, py::arg("progress") = py::none(),
              R"(Follows markers and bodies through a sequence, as `helicarm track` does.
 
 case: folder that holds case.json. frames: "A-B" or "A-B:STEP"; the markers are picked in frame A. out: folder for all
 files, whose rows are written as they are computed. resume: go on after the frames of an interrupted run in `out`.
+axes: CSV body,axis,x,y,z of two bodies or more: joint angles against the first one. butterworth_hz, butterworth_order
+(2 or 4, of both passes): cut-off of the filtered places; the case states frame_rate_hz.
 progress: called with the share of the frames that are done; an exception from it ends the run, and Ctrl-C does.
 Releases the GIL. Returns a Track.
 Raises InputError; RefusedError if the picks contradict each other or the geometry given.)");

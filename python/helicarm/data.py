@@ -201,10 +201,10 @@ def _loaded(given, kind, built_in):
 
 
 def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, bodies=None, frame_rate_hz=None,
-          camera_covariance=None, **options):
+          camera_covariance=None, axes=None, **options):
     """Follows markers and bodies through a sequence: of a case, or of arrays.
 
-    track(case, *, frames="A-B[:STEP]", out=None, resume=False, progress=None): case: folder that holds case.json; the markers
+    track(case, *, frames="A-B[:STEP]", out=None, resume=False, axes=None, butterworth_hz=None, progress=None): case: folder that holds case.json; the markers
     are picked in frame A. out: folder for all files, whose rows are written as they are computed. resume: go on after the
     frames of an interrupted run in `out`.
 
@@ -213,6 +213,10 @@ def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, b
         metal dark; frame i of all views is one moment. camera: as register takes it.
       picks: raw pixels in the first frame, each marker in one view or more. diameter_mm: of the markers, 0.1 to 30.
       bodies: {name: [markers]}, or {name: {marker: (x, y, z)}} where the body's geometry is known, mm.
+      axes: {body: 3 x 3} of two bodies or more, columns x (right), y (anterior), z (proximal) in the first frame's
+        world: joint angles against the first one. Of a case: the path of a CSV body,axis,x,y,z.
+      butterworth_hz, butterworth_order=4: cut-off and order (2 or 4, of both passes) of places filtered as motion
+        laboratories do, for comparison; frame_rate_hz is then required.
       frame_rate_hz, out, progress: as of a case; camera_covariance: as register takes it.
 
     progress: called with the share of the frames that are done; an exception from it ends the run, and Ctrl-C does.
@@ -224,7 +228,7 @@ def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, b
     if case is not None:
         if frames is None:
             raise InputError("usage", "track: frames is missing, such as frames=\"1-100\"")
-        return _c.track(case, frames=frames, **options)
+        return _c.track(case, frames=frames, axes=axes, **options)
     if views is None or not picks or diameter_mm is None or frames is not None:
         raise InputError("usage", "track: views, picks and diameter_mm are required; frames is for a case")
     triples = _views_of(views)
@@ -244,7 +248,11 @@ def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, b
                 raise InputError("bad_value", f'picks: "{marker}": there is no view "{view}"')
             u, v = map(float, uv)
             flat.append((markers.index(marker), names.index(view), u, v))
-    return _c._track_images(held, covariance, markers, flat, _bodies_of(bodies or {}, markers),
+    for name in axes or {}:
+        if name not in (bodies or {}):
+            raise InputError("bad_value", f'axes: "{name}" is no body')
+    held_axes = [(list(bodies).index(name), np.array(matrix, float)) for name, matrix in (axes or {}).items()]
+    return _c._track_images(held, covariance, markers, flat, _bodies_of(bodies or {}, markers), axes=held_axes,
                             diameter_mm=diameter_mm, frame_rate_hz=frame_rate_hz, **options)
 
 

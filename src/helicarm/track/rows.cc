@@ -80,6 +80,25 @@ std::string body_row(int frame, const std::string& names, const TrackedBody& bod
   return row + "," + (body.reason ? std::string(code(*body.reason)) : "") + "\n";
 }
 
+std::string angles_table(const std::vector<int>& frames, const std::vector<std::string>& names,
+                         const std::vector<Joint>& joints) {
+  std::string table =
+      "frame,body,reference,flexion_deg,adduction_deg,rotation_deg,sigma_flexion_deg,sigma_adduction_deg,"
+      "sigma_rotation_deg\n";
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    for (const Joint& joint : joints) {
+      table +=
+          fmt::format("{},{},{}", frames[f], csv_field(names[joint.body]), csv_field(names[joint.reference]));
+      const auto& at = joint.frames[f];
+      for (int i = 0; i < 3; ++i) table += at ? fmt::format(",{:.9g}", degrees_of_rad * at->angles[i]) : ",";
+      for (int i = 0; i < 3; ++i)
+        table += at ? fmt::format(",{:.6g}", degrees_of_rad * std::sqrt(std::max(0.0, at->covariance(i, i))))
+                    : ",";
+      table += "\n";
+    }
+  return table;
+}
+
 std::string sights_header() {
   return "frame,marker,view,u_raw,v_raw,sigma_px,radius_px,contrast,background,repaired\n";
 }

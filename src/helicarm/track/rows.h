@@ -23,6 +23,10 @@ std::string bodies_table(const std::vector<int>& frames, const std::vector<std::
 std::string relative_table(const std::vector<int>& frames, const std::vector<std::string>& names,
                            const std::vector<std::vector<TrackedBody>>& relative);
 
+/// angles.csv: joint angles and their standard deviations.
+std::string angles_table(const std::vector<int>& frames, const std::vector<std::string>& names,
+                         const std::vector<Joint>& joints);
+
 /// sights.csv: where each marker is seen in each view of a frame, to the last bit.
 std::string sights_header();
 std::string sights_rows(const FrameSights& sights, const TrackCase& the_case);

@@ -245,6 +245,18 @@ void warn_of_bodies_that_are_not_rigid(const SequenceData& work, Sequence& seque
   }
 }
 
+std::vector<Joint> joints_of(const TrackCase& the_case, const std::vector<BodySequence>& bodies) {
+  std::vector<Joint> joints;
+  for (std::size_t i = 1; i < the_case.axes.size(); ++i) {
+    const BodyAxes &reference = the_case.axes[0], &body = the_case.axes[i];
+    Joint& joint = joints.emplace_back(Joint{reference.body, body.body, {}});
+    for (std::size_t f = 0; f < bodies[body.body].smoothed.size(); ++f)
+      joint.frames.push_back(joint_angles(bodies[reference.body].smoothed[f], reference.axes,
+                                          bodies[body.body].smoothed[f], body.axes));
+  }
+  return joints;
+}
+
 /// Where no body has a pose in any frame, or without bodies most places are lost.
 std::optional<Failure> nothing_followed(const SequenceData& work, const Sequence& sequence) {
   constexpr double most_lost = 0.5;
@@ -293,6 +305,7 @@ Sequence estimate_sequence(const TrackCase& the_case, const std::vector<FrameSig
   warn_of_lost_markers(work, sequence);
   warn_of_bodies_that_are_not_rigid(work, sequence);
   sequence.relative = relative_motions(sequence.bodies);
+  sequence.joints = joints_of(the_case, sequence.bodies);
   sequence.failure = nothing_followed(work, sequence);
   return sequence;
 }

@@ -48,6 +48,7 @@ struct Sequence {
   std::vector<std::vector<std::optional<MarkerImage>>> images;  ///< [frame][marker * views + view]
   std::vector<BodySequence> bodies;
   std::vector<std::vector<TrackedBody>> relative;  ///< [body - 1][frame], to the first body
+  std::vector<Joint> joints;                       ///< of the case's axes, by the smoothed poses
   std::vector<ViewDelay> delays;                   ///< per view
   double correlation = 0;                          ///< of the images' errors between neighbouring frames
   double lasting = 0;                              ///< part of their variance that lasts over the sequence

@@ -36,6 +36,12 @@ std::string markers_csv(const Sequence& sequence, const TrackCase& the_case);
 std::string bodies_csv(const Sequence& sequence, const TrackCase& the_case);
 std::string smoothed_csv(const Sequence& sequence, const TrackCase& the_case);
 std::string relative_csv(const Sequence& sequence, const TrackCase& the_case);
+/// The filtered places of each marker, [marker][frame]; empty without `butterworth`.
+std::vector<std::vector<std::optional<Eigen::Vector3d>>> butterworth_places(const Sequence& sequence,
+                                                                            const TrackCase& the_case);
+/// butterworth.csv: `frame,name,x_mm,y_mm,z_mm`.
+std::string butterworth_csv(const Sequence& sequence, const TrackCase& the_case);
+std::string angles_csv(const Sequence& sequence, const TrackCase& the_case);
 
 /// XMALab's 2-D points: a row per frame, MARKER_CAM_X and MARKER_CAM_Y of each marker and view, raw
 /// (distorted) pixels from 0 with y downwards, NaN where not seen; its defaults on import.

@@ -162,6 +162,23 @@ void read_bodies(TrackCase& read, const std::vector<pipeline::CaseBody>& bodies,
 
 }  // namespace
 
+void check_butterworth(const TrackCase& the_case, int step) {
+  if (!the_case.butterworth) return;
+  const Butterworth& filter = *the_case.butterworth;
+  if (!the_case.frame_rate_hz)
+    throw BadInput(Reason::bad_value,
+                   "butterworth: its cut-off is in Hz, and \"frame_rate_hz\" is not stated");
+  const double limit = *the_case.frame_rate_hz / step / 2;
+  if (!(filter.cut_off_hz > 0 && filter.cut_off_hz < limit))
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("butterworth: the cut-off of {:g} Hz is not between 0 and half the frame rate, {:g} Hz",
+                    filter.cut_off_hz, limit));
+  if (filter.order != 2 && filter.order != 4)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("butterworth: the order is {}, it is 2 or 4", filter.order));
+}
+
 Expected<TrackCase> read_track_case(const fs::path& path, const case_registration::FrameRange& frames) {
   return guarded([&] {
     const std::string origin = pipeline::case_file(path).filename().string();

@@ -11,6 +11,8 @@
 #include "helicarm/geometry/view.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/rectification/distortion_map.h"
+#include "helicarm/track/butterworth.h"
+#include "helicarm/track/joint_angles.h"
 #include "helicarm/track/sequence_images.h"
 
 namespace helicarm::track {
@@ -45,8 +47,14 @@ struct TrackCase {
   std::vector<std::string> markers;
   std::vector<MarkerPick> picks;  ///< of the first frame
   std::vector<BodyPlan> bodies;
+  std::optional<Butterworth> butterworth;  ///< places filtered as laboratories do, for comparison
+  std::vector<BodyAxes> axes;  ///< the first body is the reference of the others; empty: no joint angles
   std::vector<Warning> warnings;
 };
+
+/// Refuses a filter without a frame rate, of another order than 2 or 4, or with a cut-off that is not below
+/// half the rate of every `step`-th frame.
+void check_butterworth(const TrackCase& the_case, int step);
 
 /// Reads a case with "markers", picks of the range's first frame and "bodies". Views have "camera" or
 /// "calibration", or are calibrated by the case's calibrator in their first image. No later image is read.

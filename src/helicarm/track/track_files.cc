@@ -74,9 +74,10 @@ std::vector<std::string> names_of(const TrackCase& the_case) {
   return bodies;
 }
 
-constexpr std::array file_names{"markers.csv", "bodies.csv",   "smoothed.csv", "relative.csv",
-                                "track.json",  "points2d.csv", "points3d.csv", "report.html",
-                                "sights.csv",  "sights.id",    "images.csv"};
+constexpr std::array file_names{"markers.csv",    "bodies.csv",   "smoothed.csv", "relative.csv",
+                                "track.json",     "points2d.csv", "points3d.csv", "report.html",
+                                "sights.csv",     "sights.id",    "images.csv",   "angles.csv",
+                                "butterworth.csv"};
 
 }  // namespace
 
@@ -160,6 +161,37 @@ std::string relative_csv(const Sequence& sequence, const TrackCase& the_case) {
   return relative_table(sequence.frames, names_of(the_case), sequence.relative);
 }
 
+std::vector<std::vector<std::optional<Eigen::Vector3d>>> butterworth_places(const Sequence& sequence,
+                                                                            const TrackCase& the_case) {
+  std::vector<std::vector<std::optional<Eigen::Vector3d>>> made;
+  if (!the_case.butterworth || !the_case.frame_rate_hz) return made;
+  const std::size_t frames = sequence.frames.size();
+  const int step = frames > 1 ? sequence.frames[1] - sequence.frames[0] : 1;
+  for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
+    std::vector<std::optional<Eigen::Vector3d>> places(frames);
+    for (std::size_t f = 0; f < frames; ++f)
+      if (const auto& place = sequence.markers[f][m].place) places[f] = place->place;
+    made.push_back(butterworth_filtered(places, *the_case.frame_rate_hz / step, *the_case.butterworth));
+  }
+  return made;
+}
+
+std::string butterworth_csv(const Sequence& sequence, const TrackCase& the_case) {
+  const auto places = butterworth_places(sequence, the_case);
+  std::string csv = "frame,name,x_mm,y_mm,z_mm\n";
+  for (std::size_t f = 0; f < sequence.frames.size(); ++f)
+    for (std::size_t m = 0; m < places.size(); ++m) {
+      csv += fmt::format("{},{}", sequence.frames[f], csv_field(the_case.markers[m]));
+      const auto& place = places[m][f];
+      csv += place ? fmt::format(",{:.9g},{:.9g},{:.9g}\n", place->x(), place->y(), place->z()) : ",,,\n";
+    }
+  return csv;
+}
+
+std::string angles_csv(const Sequence& sequence, const TrackCase& the_case) {
+  return angles_table(sequence.frames, names_of(the_case), sequence.joints);
+}
+
 std::string points2d_csv(const Sequence& sequence, const TrackCase& the_case) {
   std::string csv;
   for (const std::string& marker : the_case.markers)
@@ -232,6 +264,8 @@ Expected<void> write_track(const Sequence& sequence, const TrackCase& the_case,
     write("bodies.csv", bodies_csv(sequence, the_case));
     write("smoothed.csv", smoothed_csv(sequence, the_case));
     write("relative.csv", relative_csv(sequence, the_case));
+    if (the_case.butterworth) write("butterworth.csv", butterworth_csv(sequence, the_case));
+    if (!the_case.axes.empty()) write("angles.csv", angles_csv(sequence, the_case));
     write("points2d.csv", points2d_csv(sequence, the_case));
     write("points3d.csv", points3d_csv(sequence, the_case));
     for (std::size_t b = 0; b < the_case.bodies.size(); ++b)

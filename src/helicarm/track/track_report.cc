@@ -33,6 +33,33 @@ std::string body_charts(const Sequence& sequence, const TrackCase& the_case) {
   return motion_charts(sequence.frames, names, sequence.bodies, sequence.relative, residuals);
 }
 
+std::string joint_charts(const Sequence& sequence, const TrackCase& the_case) {
+  constexpr double to_degrees = 180 / EIGEN_PI, bar_sigmas = 1.959964;
+  constexpr std::array names{"flexion", "adduction", "external rotation"};
+  std::string html;
+  for (const Joint& joint : sequence.joints) {
+    report::Chart chart{"Joint angles (Grood and Suntay)", "frame", "degrees"};
+    for (int i = 0; i < 3; ++i) {
+      report::ChartSeries curve{names[std::size_t(i)]};
+      curve.joined = true;
+      for (std::size_t f = 0; f < sequence.frames.size(); ++f) {
+        const auto& at = joint.frames[f];
+        const double value = at ? to_degrees * at->angles[i] : no_value;
+        const double width = at ? bar_sigmas * to_degrees * std::sqrt(at->covariance(i, i)) : no_value;
+        curve.points.push_back({double(sequence.frames[f]), value});
+        curve.ranges.push_back({value - width, value + width});
+      }
+      chart.series.push_back(std::move(curve));
+    }
+    html += fmt::format(
+        "<h2>Joint of {} and {}</h2>\n<figure class=\"plain\">{}<figcaption>Smoothed; bars: 95 %, of "
+        "the poses.</figcaption></figure>\n",
+        report::escaped(the_case.bodies[joint.reference].name),
+        report::escaped(the_case.bodies[joint.body].name), report::chart_svg({&chart, 1}));
+  }
+  return html;
+}
+
 std::string gap_chart(const Sequence& sequence, const TrackCase& the_case) {
   report::Chart chart{"Ray gaps", "frame", "mm"};
   chart.y_from_zero = true;
@@ -123,9 +150,9 @@ std::string track_report(const Sequence& sequence, const TrackCase& the_case) {
                            "delay of " + report::escaped(the_case.views[k].images.name));
   return report::page_html("helicarm track", "Markers and bodies through a sequence",
                            cards + "</div>\n" + warnings_list(sequence.warnings) +
-                               body_charts(sequence, the_case) + "<h2>Markers</h2>\n" +
-                               gap_chart(sequence, the_case) + marker_table(sequence, the_case) +
-                               distance_table(sequence, the_case),
+                               body_charts(sequence, the_case) + joint_charts(sequence, the_case) +
+                               "<h2>Markers</h2>\n" + gap_chart(sequence, the_case) +
+                               marker_table(sequence, the_case) + distance_table(sequence, the_case),
                            ". Millimetres, degrees and pixels.");
 }
 
