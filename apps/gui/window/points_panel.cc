@@ -101,8 +101,13 @@ void PointsPanel::show_state(const ApplicationState& state) {
   }
   setColumnCount(int(titles.size()));
   setHorizontalHeaderLabels(titles);
-  horizontalHeader()->setToolTip(
-      tr("Raw pixel of the pick, and distance of the located point's image from it in rectified px"));
+  for (int column = 0; column < columnCount(); ++column)
+    horizontalHeaderItem(column)->setToolTip(
+        column == 0 ? tr("Name of the point that is to be picked")
+        : column == 1
+            ? tr("95 % of the errors of the located point are smaller, mm")
+            : tr("Raw pixel of the pick in this view, and the distance of the located point's image "
+                 "from it in rectified px"));
   setRowCount(int(points.size()));
   for (int row = 0; row < rowCount(); ++row) {
     const std::string& point = points[std::size_t(row)];

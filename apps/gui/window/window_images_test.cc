@@ -8,7 +8,9 @@
 #include <iostream>
 
 #include "gui/controller/case_with_model_test.h"
+#include "gui/window/bones_window.h"
 #include "gui/window/legibility_test.h"
+#include "gui/window/sequence_window.h"
 #include "gui/window/style.h"
 #include "gui/window/window_test.h"
 
@@ -245,7 +247,7 @@ TEST_F(WindowImages, Panels) {
   }
 }
 
-/// Folders of cases, or of images, in HELICARM_CASES, with colons between.
+/// Folders of cases, of sequences or of images, or files of CTs, in HELICARM_CASES, with colons between.
 TEST_F(WindowImages, GivenCases) {
   const QStringList folders = qEnvironmentVariable("HELICARM_CASES").split(':', Qt::SkipEmptyParts);
   if (folders.isEmpty()) GTEST_SKIP() << "HELICARM_CASES names no folders";
@@ -254,6 +256,20 @@ TEST_F(WindowImages, GivenCases) {
     SCOPED_TRACE(name);
     window_->open_paths({folder.toStdString()});
     ASSERT_TRUE(wait("it is read", [&] { return !state().busy; }));
+    if (auto* bones = window_->findChild<BonesWindow*>("bones")) {
+      ASSERT_TRUE(wait("the CT is read", [&] { return !bones->is_busy(); }));
+      inspect_dialog((name + "-ct").c_str(), *bones);
+      delete bones;
+      continue;
+    }
+    if (auto* sequence = window_->findChild<SequenceWindow*>("sequence")) {
+      ASSERT_TRUE(wait("the sequence is read", [&] { return !sequence->is_busy(); }));
+      QTest::mouseClick(sequence->findChild<QPushButton*>("sequenceFollow"), Qt::LeftButton);
+      ASSERT_TRUE(wait("the markers are followed", [&] { return !sequence->is_busy(); }));
+      inspect_dialog((name + "-sequence").c_str(), *sequence);
+      delete sequence;
+      continue;
+    }
     if (window_->new_case() != nullptr) {
       ASSERT_TRUE(wait("the images are looked at", [&] { return !window_->new_case()->is_checking(); }));
       inspect_dialog((name + "-new-case").c_str(), *window_->new_case());
