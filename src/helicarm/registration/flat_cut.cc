@@ -19,7 +19,7 @@ constexpr double least_flat_share =
 // large there as in a disc. A round end that is flat by its voxels flares out, to 2.9 times.
 constexpr double most_flare = 2, wall_from_mm = 1.5, wall_to_mm = 2.5;
 constexpr double flat_mm = 0.05, flat_cosine = 0.9998;  // 1 degree
-constexpr double direction_step = 0.02, apart_mm = 1;
+constexpr double direction_step = 0.02, cell_mm = 1;
 constexpr std::size_t most_planes = 6;
 
 struct Plane {
@@ -113,8 +113,8 @@ std::vector<Vector3d> flat_cut(const Surface& surface) {
       continue;
     for (const Vector3d& at : in_plane)
       if (taken
-              .insert({int(std::floor(at.x() / apart_mm)), int(std::floor(at.y() / apart_mm)),
-                       int(std::floor(at.z() / apart_mm))})
+              .insert({int(std::floor(at.x() / cell_mm)), int(std::floor(at.y() / cell_mm)),
+                       int(std::floor(at.z() / cell_mm))})
               .second)
         points.push_back(at);
   }
