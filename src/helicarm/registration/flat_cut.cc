@@ -18,6 +18,9 @@ constexpr double least_flat_share =
 // Beside a cut the body's wall goes straight on: the rms distance from the middle of the cut is 1.4 times as
 // large there as in a disc. A round end that is flat by its voxels flares out, to 2.9 times.
 constexpr double most_flare = 2, wall_from_mm = 1.5, wall_to_mm = 2.5;
+// Of the disc with the same rms distance from its middle: a ring of cortex fills a third, a strip along a
+// shaft 2 %.
+constexpr double least_filled = 0.1;
 constexpr double flat_mm = 0.05, flat_cosine = 0.9998;  // 1 degree
 constexpr double direction_step = 0.02, cell_mm = 1;
 constexpr std::size_t most_planes = 6;
@@ -53,8 +56,8 @@ double spread_about(const std::vector<Vector3d>& points, const Vector3d& place, 
   return std::sqrt(sum / double(points.size()));
 }
 
-/// Whether the body's wall goes on straight behind the plane's points.
-bool is_cut(const Surface& surface, const Plane& plane, const std::vector<Vector3d>& in_plane) {
+/// Whether the plane's points are compact, and the body's wall goes on straight behind them.
+bool is_cut(const Surface& surface, const Plane& plane, const std::vector<Vector3d>& in_plane, double area) {
   std::vector<Vector3d> wall;
   for (const Vector3d& corner : surface.mesh.corners)
     if (const double depth = plane.offset - plane.normal.dot(corner);
@@ -62,8 +65,9 @@ bool is_cut(const Surface& surface, const Plane& plane, const std::vector<Vector
       wall.push_back(corner);
   Vector3d middle = Vector3d::Zero();
   for (const Vector3d& point : in_plane) middle += point / double(in_plane.size());
-  return !wall.empty() &&
-         spread_about(wall, middle, plane.normal) < most_flare * spread_about(in_plane, middle, plane.normal);
+  const double spread = spread_about(in_plane, middle, plane.normal);
+  return !wall.empty() && area > least_filled * 2 * EIGEN_PI * spread * spread &&
+         spread_about(wall, middle, plane.normal) < most_flare * spread;
 }
 
 }  // namespace
@@ -109,7 +113,8 @@ std::vector<Vector3d> flat_cut(const Surface& surface) {
       area += areas[i];
       in_plane.push_back(at);
     }
-    if (area < least_flat_share * whole || !is_extreme(surface, plane) || !is_cut(surface, plane, in_plane))
+    if (area < least_flat_share * whole || !is_extreme(surface, plane) ||
+        !is_cut(surface, plane, in_plane, area))
       continue;
     for (const Vector3d& at : in_plane)
       if (taken
