@@ -25,8 +25,15 @@ Eigen::Vector3d spacing_of(const volume::Volume& ct) {
   return ct.patient_from_voxel.linear().colwise().norm().transpose();
 }
 
-/// Up in the image is superior.
-bool is_upwards(int axis) { return axis != 2; }
+/// Whether a voxel axis is drawn against its direction: left is to the right, posterior and inferior are
+/// downwards.
+bool is_flipped(const volume::Volume& ct, int axis, bool is_down) {
+  const Eigen::Vector3d way = ct.patient_from_voxel.linear().col(axis);
+  Eigen::Index main = 0;
+  way.cwiseAbs().maxCoeff(&main);
+  const bool is_negative = way[main] < 0;
+  return is_down && main == 2 ? !is_negative : is_negative;
+}
 
 }  // namespace
 
@@ -36,6 +43,7 @@ QImage slice_image(const CtScene& scene, int axis) {
   const int width = ct.size[right], height = ct.size[down];
   const int at = std::clamp(int(std::lround(scene.cursor[axis])), 0, ct.size[axis] - 1);
   QImage image(width, height, QImage::Format_RGB32);
+  const bool is_flipped_across = is_flipped(ct, right, false), is_flipped_down = is_flipped(ct, down, true);
   const double range = std::max(1.0, scene.high_hu - scene.low_hu);
   for (int v = 0; v < height; ++v)
     for (int u = 0; u < width; ++u) {
@@ -53,7 +61,7 @@ QImage slice_image(const CtScene& scene, int axis) {
         const QColor ink = ink::of_model(std::size_t((*scene.labels)[i] - 1));
         colour = qRgb((grey + ink.red()) / 2, (grey + ink.green()) / 2, (grey + ink.blue()) / 2);
       }
-      image.setPixel(u, is_upwards(axis) ? height - 1 - v : v, colour);
+      image.setPixel(is_flipped_across ? width - 1 - u : u, is_flipped_down ? height - 1 - v : v, colour);
     }
   return image;
 }
@@ -86,8 +94,9 @@ SliceView::Frame SliceView::frame() const {
 QPointF SliceView::place_of(const Eigen::Vector3d& voxel) const {
   const auto [right, down] = axes_of(axis_);
   const Frame at = frame();
-  const double v = is_upwards(axis_) ? drawn_.height() - 1 - voxel[down] : voxel[down];
-  return at.origin + QPointF((voxel[right] + 0.5) * at.across, (v + 0.5) * at.down);
+  const double u = is_flipped(*scene_.ct, right, false) ? drawn_.width() - 1 - voxel[right] : voxel[right];
+  const double v = is_flipped(*scene_.ct, down, true) ? drawn_.height() - 1 - voxel[down] : voxel[down];
+  return at.origin + QPointF((u + 0.5) * at.across, (v + 0.5) * at.down);
 }
 
 void SliceView::place(const QPointF& at) {
@@ -96,9 +105,9 @@ void SliceView::place(const QPointF& at) {
   const Frame drawn = frame();
   const QPointF off = at - drawn.origin;
   Eigen::Vector3d voxel = scene_.cursor;
-  voxel[right] = off.x() / drawn.across - 0.5;
-  const double v = off.y() / drawn.down - 0.5;
-  voxel[down] = is_upwards(axis_) ? drawn_.height() - 1 - v : v;
+  const double u = off.x() / drawn.across - 0.5, v = off.y() / drawn.down - 0.5;
+  voxel[right] = is_flipped(*scene_.ct, right, false) ? drawn_.width() - 1 - u : u;
+  voxel[down] = is_flipped(*scene_.ct, down, true) ? drawn_.height() - 1 - v : v;
   emit placed(voxel.cwiseMax(0).cwiseMin((scene_.ct->size.array() - 1).matrix().cast<double>()));
 }
 

@@ -59,6 +59,7 @@ MeasuresPanel::MeasuresPanel(MeasureTool& tool, QWidget* parent) : QWidget(paren
   column->addLayout(top);
   hint_ = new QLabel;
   hint_->setObjectName("measureHint");
+  hint_->setWordWrap(true);
   column->addWidget(hint_);
   auto* bottom = new QHBoxLayout;
   table_ = result_table();
