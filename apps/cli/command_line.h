@@ -81,8 +81,8 @@ CLI::Option* add_field(CLI::App* command, const Field<Options>& field, Take take
   };
   return command
       ->add_option_function<std::string>(
-          std::string(field.flag),
-          [&field, take](const std::string& word) { take(number_for(field, word)); }, help)
+          std::string(field.flag), [&field, take](const std::string& word) { take(number_for(field, word)); },
+          help)
       ->type_name(field.words.empty() ? "NUMBER" : "WORD")
       ->check(CLI::Validator(check, limits_of(field)));
 }

@@ -33,7 +33,8 @@ CalibratedView view_from(JsonReader& reader) {
   view.dlt = geometry::factors_from_projection(projection);
   view.reprojection_rms_px = reader.optional_number("reprojection_rms_px", any_number).value_or(0);
   view.dof = int(reader.optional_number("dof", {0, 1e6}).value_or(0));
-  view.by_paper = reader.has("method") && reader.choice("method", {rectification::method_words[0], rectification::method_words[1]}) == 1;
+  view.by_paper = reader.has("method") && reader.choice("method", {rectification::method_words[0],
+                                                                   rectification::method_words[1]}) == 1;
   return view;
 }
 

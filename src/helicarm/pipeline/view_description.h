@@ -179,8 +179,10 @@ void describe_calibrated(Output& output, const ViewResult& view) {
                "as in [method.md](method.md#6-calibration-22)");
   output.word("method",
               helicarm::output::if_set(
-                  calibrated, [](const CalibratedView& of) { return rectification::method_words[of.by_paper ? 1 : 0]; }),
-              rectification::method_words, "by which the view was calibrated; points of views by `paper` follow from Eq. 8");
+                  calibrated,
+                  [](const CalibratedView& of) { return rectification::method_words[of.by_paper ? 1 : 0]; }),
+              rectification::method_words,
+              "by which the view was calibrated; points of views by `paper` follow from Eq. 8");
   describe_parameters(output, calibrated, "`null` with `--method paper`");
 }
 

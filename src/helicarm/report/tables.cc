@@ -197,9 +197,7 @@ Table points_table(const std::vector<pipeline::PointResult>& points) {
           "Points in the calibrator's frame",
           {{words("Point", "Name of the point"), [](const Point& p) { return Cell{p.name}; }},
            {words("Kind", "pick: marked by a person; target: a ball or wire that the program finds"),
-            [](const Point& p) {
-              return Cell{std::string(word(p.source))};
-            }}},
+            [](const Point& p) { return Cell{std::string(word(p.source))}; }}},
           points),
       positions_table(points));
 }
