@@ -162,8 +162,8 @@ void predict_edges(std::vector<VisiblePoint>& points, const Thickness& thickness
   });
 }
 
-/// The offset that most residuals have in common: weighted means from their median on. With the predicted
-/// places it lies inwards.
+/// The offset that most residuals have in common: weighted means from their median on. It lies inwards of the
+/// predicted places, as a mask may be grown, and outwards no farther than the contour.
 double common_offset(const std::vector<VisiblePoint>& points, const ContourOptions& options) {
   std::vector<double> residuals, predicted;
   for (const VisiblePoint& point : points)
@@ -180,8 +180,7 @@ double common_offset(const std::vector<VisiblePoint>& points, const ContourOptio
     }
     offset = sum / weights;
   }
-  const double place = median(std::move(predicted));
-  return std::clamp(offset, -options.inward_px - place, -place);
+  return std::clamp(offset, -options.inward_px, std::max(0.0, -median(std::move(predicted))));
 }
 
 }  // namespace
