@@ -53,14 +53,14 @@ QTableWidget* result_table() {
 MeasuresPanel::MeasuresPanel(MeasureTool& tool, QWidget* parent) : QWidget(parent), tool_(tool) {
   auto* column = new QVBoxLayout(this);
   column->setContentsMargins(6, 2, 6, 4);
-  auto* top = new QHBoxLayout;
-  top->addWidget(build_palette(), 1);
-  top->addWidget(build_plane());
-  column->addLayout(top);
+  column->addWidget(build_palette());
+  auto* middle = new QHBoxLayout;
   hint_ = new QLabel;
   hint_->setObjectName("measureHint");
   hint_->setWordWrap(true);
-  column->addWidget(hint_);
+  middle->addWidget(hint_, 1);
+  middle->addWidget(build_plane());
+  column->addLayout(middle);
   auto* bottom = new QHBoxLayout;
   table_ = result_table();
   bottom->addWidget(table_, 1);
