@@ -180,7 +180,7 @@ double common_offset(const std::vector<VisiblePoint>& points, const ContourOptio
     }
     offset = sum / weights;
   }
-  return std::clamp(offset, -options.inward_px, std::max(0.0, -median(std::move(predicted))));
+  return std::clamp(offset, -options.inward_px / 2, std::max(0.0, -median(std::move(predicted))));
 }
 
 }  // namespace
