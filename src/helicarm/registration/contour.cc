@@ -73,6 +73,8 @@ constexpr double sample_step = 0.5;  // of the profile, raster pixels
 // From the contour, raster pixels: an edge that is predicted farther away is that of another line of it.
 constexpr double farthest_edge = 2;
 
+constexpr double cut_reach_mm = 2;  // beside a cut there is its own edge, which the image does not show
+
 /// Attenuation between pixels; nothing where it is not valid.
 std::optional<double> attenuation_at(const Raster& raster, const Vector2d& at) {
   const int u = int(std::floor(at.x())), v = int(std::floor(at.y()));
@@ -124,6 +126,11 @@ std::optional<double> steepest_fall(const std::vector<double>& profile, double a
     if (rank > best_rank) best_rank = rank, best = offset;
   }
   return best;
+}
+
+bool is_at_cut(const Vector3d& in_model, const std::vector<Vector3d>& cuts) {
+  return std::ranges::any_of(cuts,
+                             [&](const Vector3d& cut) { return (cut - in_model).norm() < cut_reach_mm; });
 }
 
 /// A point of the contour that the image shows.
@@ -225,9 +232,13 @@ std::vector<ContourPoint> apparent_contour(const Surface& surface, const geometr
 
 ViewObservation compare_contour(const Raster& raster, const geometry::View& view, const Surface& surface,
                                 const geometry::RigidTransform& world_from_model, const Vector3d& centre,
-                                const ContourOptions& options) {
+                                const ContourOptions& options, const std::vector<Vector3d>& cuts) {
   ViewObservation observation;
-  const auto contour = apparent_contour(surface, view, world_from_model, contour_spacing * raster.factor);
+  auto contour = apparent_contour(surface, view, world_from_model, contour_spacing * raster.factor);
+  if (!cuts.empty())
+    std::erase_if(contour, [&, model_from_world = world_from_model.inverse()](const ContourPoint& point) {
+      return is_at_cut(model_from_world * point.in_world, cuts);
+    });
   const auto value_at = [&](const Vector2d& at) { return attenuation_at(raster, at); };
   std::vector<VisiblePoint> points;
   for (const ContourPoint& point : contour)

@@ -34,8 +34,10 @@ struct ContourOptions {
 
 /// Compares the contour with the image's edges along its normals, after the offset that they have in common.
 /// Agreement: the robust weight of an edge, 0 without one. Points whose edge is another line's are left out.
+/// `cuts`: where the body goes on, model coordinates; its contour beside them does not count.
 ViewObservation compare_contour(const Raster& raster, const geometry::View& view, const Surface& surface,
                                 const geometry::RigidTransform& world_from_model,
-                                const Eigen::Vector3d& centre, const ContourOptions& options);
+                                const Eigen::Vector3d& centre, const ContourOptions& options,
+                                const std::vector<Eigen::Vector3d>& cuts = {});
 
 }  // namespace helicarm::registration

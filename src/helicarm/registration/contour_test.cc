@@ -103,5 +103,17 @@ TEST(CompareContour, LinesBesideEachOtherAreExpectedWhereTheBodyThickens) {
   EXPECT_LT(mean_square(1), 0.7 * mean_square(0));
 }
 
+TEST(CompareContour, BesideACutTheContourDoesNotCount) {
+  const Raster raster = raster_of_ball(0);
+  const Surface ball = ball_of(drawn_mm);
+  const std::vector<Vector3d> cuts = {{0, 0, drawn_mm}};
+  const auto whole = compare_contour(raster, view_from(0), ball, {}, Vector3d::Zero(), {5, 1, 0});
+  const auto part = compare_contour(raster, view_from(0), ball, {}, Vector3d::Zero(), {5, 1, 0}, cuts);
+  EXPECT_LT(part.comparisons.size(), whole.comparisons.size());
+  EXPECT_NEAR(part.score, whole.score, 0.05);
+  const Eigen::Vector2d cut = view_from(0).project(cuts[0]);
+  for (const Comparison& each : part.comparisons) EXPECT_GT((each.pixel - cut).norm(), 3.5);
+}
+
 }  // namespace
 }  // namespace helicarm::registration

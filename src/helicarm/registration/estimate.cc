@@ -96,7 +96,8 @@ Observation RegistrationProblem::observe(const Level& level, const geometry::Rig
     const geometry::View& view = (*views_)[i].view;
     observation.views.push_back(
         level.contour ? compare_contour(made.rasters[i], view, *model_->surface, pose, centre,
-                                        {level.reach, level.sigma_px, inward_px(*model_, made.rasters[i])})
+                                        {level.reach, level.sigma_px, inward_px(*model_, made.rasters[i])},
+                                        model_->cuts)
                       : compare_patches(made.rasters[i], view, made.density, model_->cuts, pose, centre,
                                         derivatives, threads));
   }

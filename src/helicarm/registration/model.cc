@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "helicarm/registration/flat_cut.h"
 #include "helicarm/registration/voxel_surface.h"
 
 namespace helicarm::registration {
@@ -213,7 +214,10 @@ Expected<Model> model_from(const std::string& name, phantom::TriangleMesh mesh) 
     Model model;
     model.name = name;
     model.voxel_mm = voxel_size_mm(surface);
-    if (model.voxel_mm > 0) smooth_steps(surface, model.voxel_mm);
+    if (model.voxel_mm > 0) {
+      model.cuts = flat_cut(surface);
+      smooth_steps(surface, model.voxel_mm);
+    }
     Vector3d low = surface.mesh.corners.front(), high = low;
     for (const Vector3d& corner : surface.mesh.corners)
       low = low.cwiseMin(corner), high = high.cwiseMax(corner);
