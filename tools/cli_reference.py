@@ -100,7 +100,7 @@ def completion(pages):
 
 
 def markdown(pages):
-    lines = ["# Commands", "", "Made from the program's own `--help` by `tools/cli_reference.py`.", ""]
+    lines = ["# Options of each command", "", "Made from the program's own `--help` by `tools/cli_reference.py`.", ""]
     for words, page in pages:
         lines += [f"## `{' '.join(['helicarm', *words])}`", "", *page["about"], "", "```", page["usage"], "```", ""]
         for heading in ("Positionals", "Options", "Subcommands"):

@@ -13,7 +13,7 @@ cp CONTRIBUTING.md CHANGELOG.md SECURITY.md build/docs
 cp README.md build/docs/overview.md
 # Beside each other here, one above the other in the repository.
 sed -i 's#(\(\.\./\)\?README\.md#(overview.md#g; s#(\.\./#(#g; s#(docs/#(#g' build/docs/*.md
-tools/cli_reference.py build/bin/helicarm markdown build/docs/commands.md
+tools/cli_reference.py build/bin/helicarm markdown build/docs/options.md
 PYTHONPATH=build/python /usr/bin/python3 tools/api_reference.py python build/docs/python_api.md
 /usr/bin/python3 tools/api_reference.py cpp build/docs/cpp_api.md
 /usr/bin/mkdocs build --quiet --strict
