@@ -2,7 +2,10 @@
 #include "helicarm/rectification/models/kriging.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
+#include <optional>
 
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/rectification/models/monomials.h"
@@ -122,14 +125,33 @@ Roughness roughness_of(const PlateDots& data, const MatrixXd& rows, const Matrix
   return best;
 }
 
-/// Universal kriging. Length, strength and dot noise maximise the restricted likelihood.
-ModelFit fit_order(const PlateDots& dots, int order, const MatrixX2d& knots) {
-  Roughness best;
-  for (const double length : {0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.1, 1.6, 2.2}) {
-    const Roughness roughness =
-        roughness_of(dots, rows_of_dots(dots, order, knots, length), gram_of(knots, length), length);
-    if (roughness.misfit < best.misfit) best = roughness;
+constexpr std::array lengths = {0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.1, 1.6, 2.2};
+
+/// Likelier than both neighbours in `lengths`, by descent of the misfit from `start`, which becomes its
+/// index.
+Roughness likeliest_near(std::size_t& start, const std::function<Roughness(double)>& roughness_at) {
+  std::array<std::optional<Roughness>, lengths.size()> known;
+  const auto at = [&](std::size_t i) -> const Roughness& {
+    if (!known[i]) known[i] = roughness_at(lengths[i]);
+    return *known[i];
+  };
+  // Where the kernels of a length look alike, shorter ones can.
+  while (start > 0 && !std::isfinite(at(start).misfit)) --start;
+  for (;;) {
+    std::size_t best = start;
+    if (start > 0 && at(start - 1).misfit < at(best).misfit) best = start - 1;
+    if (start + 1 < lengths.size() && at(start + 1).misfit < at(best).misfit) best = start + 1;
+    if (best == start) return at(start);
+    start = best;
   }
+}
+
+/// Universal kriging. Length, strength and dot noise maximise the restricted likelihood, whose search begins
+/// at the length of index `nearest`, and leaves there the index that it found.
+ModelFit fit_order(const PlateDots& dots, int order, const MatrixX2d& knots, std::size_t& nearest) {
+  const Roughness best = likeliest_near(nearest, [&](double length) {
+    return roughness_of(dots, rows_of_dots(dots, order, knots, length), gram_of(knots, length), length);
+  });
   if (!(best.length > 0)) return {};
   const MatrixXd gram = gram_of(knots, best.length);
   const LinearFit fit = fit_linear(dots, rows_of_dots(dots, order, knots, best.length), gram / best.gain);
@@ -153,8 +175,9 @@ ModelFit kriging_fit(const PlateDots& dots, std::optional<int> order) {
   const int highest = n > 200 ? std::min(highest_order(n), 5) : cubic;
   if (highest_order(n) < order.value_or(cubic)) return {};
   const MatrixX2d knots = thinned(dots.points);
+  std::size_t nearest = lengths.size() / 2;
   return simplest_good(order.value_or(cubic), order.value_or(highest),
-                       [&](int o) { return fit_order(dots, o, knots); });
+                       [&](int o) { return fit_order(dots, o, knots, nearest); });
 }
 
 }  // namespace
