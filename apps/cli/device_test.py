@@ -47,6 +47,26 @@ class Tracker(unittest.TestCase):
         server.terminate()
         self.assertEqual(server.wait(timeout=5), 0)
 
+    def test_replay_as_an_ndi_tracker_is_watched_by_its_own_protocol(self):
+        server = subprocess.Popen([PROGRAM, "tracker", "replay", self.file, "--ndi"], text=True, stdout=subprocess.PIPE,
+                                  stderr=subprocess.PIPE)
+        self.addCleanup(server.communicate)
+        self.addCleanup(server.kill)
+        peer = server.stderr.readline().split()[-1]
+        self.assertTrue(peer.startswith("ndi:127.0.0.1:"), peer)
+        definition = self.file.with_name("tool.rom")
+        definition.write_text("ToolToTracker")
+        for options, name in (((), "ToolToTracker"), (("--definition", f"drill={definition}"), "drill")):
+            done = run("tracker", "watch", peer, "--seconds", 1, "--json", *options)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            seen = json.loads(done.stdout)
+            self.assertEqual([tool["name"] for tool in seen["tools"]], [name])
+            self.assertGreater(seen["tools"][0]["accepted"], 10)
+        for wrong, why in (("drill", "NAME=FILE"), ("drill=/nowhere.rom", "missing_file")):
+            done = run("tracker", "watch", peer, "--seconds", 1, "--definition", wrong)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(why, done.stderr)
+
     def test_recording_is_watched_without_a_server(self):
         done = run("tracker", "watch", f"file:{self.file}", "--seconds", 0.5, "--json")
         self.assertEqual(done.returncode, 0, done.stderr)

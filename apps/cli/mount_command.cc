@@ -301,7 +301,9 @@ void add_calibrate_mount(CLI::App* tracker, Action& action) {
   auto* command = tracker->add_subcommand(
       "calibrate-mount", "Find the pose of your marker in the calibrator by touching its balls or divots");
   auto& a = arguments_of(command, action, calibrate_mount_command);
-  command->add_option("PEER", a.link.peer, "address:port of an OpenIGTLink server, for --touch");
+  command->add_option("PEER", a.link.peer,
+                      "address:port of an OpenIGTLink server, or ndi:ADDRESS[:PORT], for --touch");
+  add_definitions(command, a.link);
   command->add_option("--facet", a.facet, "Name of the calibrator's marker")->required();
   command->add_option("--pointer", a.pointer, "Name of the pointer's marker")->capture_default_str();
   command->add_option("--tip", a.tip, "The pointer's tip, as `tracker pivot --json` prints it");

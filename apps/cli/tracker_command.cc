@@ -13,6 +13,7 @@
 #include "command_line.h"
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
+#include "helicarm/devices/tracker/ndi_server.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/devices/tracker/sequence_stream.h"
 #include "helicarm/devices/tracker/tracker_registry.h"
@@ -77,14 +78,47 @@ Expected<void> check_tool(const std::vector<tracker::SequenceFrame>& frames,
                                      arguments.file.string(), fmt::join(names, ", "))));
 }
 
+CommandResult replay_as_ndi(const TrackerReplayArguments& arguments,
+                            const std::vector<tracker::SequenceFrame>& frames, Console& console) {
+  std::set<std::string> names;
+  for (const tracker::SequenceFrame& frame : frames)
+    for (const auto& [name, pose] : frame.poses) names.insert(name);
+  StopSignal interrupt;
+  const auto server = tracker::NdiServer::start(
+      {arguments.options.address, arguments.options.port, {names.begin(), names.end()}});
+  if (!server) return tl::unexpected(server.error());
+  if (!console.quiet)
+    console.progress << fmt::format("{} frames at ndi:{}:{}\n", frames.size(), arguments.options.address,
+                                    (*server)->port())
+                     << std::flush;
+  const std::jthread player([&](const std::stop_token& stop) {
+    tracker::replay(
+        frames, true, [&](const tracker::IgtlMessage& message) { (*server)->send(message); }, stop);
+  });
+  wait_telling(interrupt, arguments.seconds, [] {});
+  if (console.json) console.out << to_text({{"counters", (*server)->counters()}}) << '\n';
+  return {};
+}
+
 }  // namespace
 
 Expected<tracker::TrackerAddress> tracker_address(const TrackerLinkArguments& arguments) {
+  constexpr std::size_t ndi_prefix = 4;
+  constexpr std::uint16_t ndi_port = 8765;
   tracker::TrackerAddress tracker = arguments.tracker;
   const std::string& peer = arguments.peer;
+  const bool ndi = tracker::is_ndi(peer);
   tracker.address = peer;
+  if (ndi) tracker.port = ndi_port;
+  for (const std::string& definition : arguments.definitions) {
+    const auto equals = definition.find('=');
+    if (equals == 0 || equals == definition.npos || equals + 1 == definition.size())
+      return fail(Reason::usage, fmt::format("--definition: \"{}\" is not NAME=FILE",
+                                             without_control_characters(definition)));
+    tracker.definitions[definition.substr(0, equals)] = definition.substr(equals + 1);
+  }
   const auto colon = peer.rfind(':');
-  if (colon == peer.npos || tracker::is_recording(peer)) return tracker;
+  if (colon == peer.npos || tracker::is_recording(peer) || (ndi && colon < ndi_prefix)) return tracker;
   int port = 0;
   const auto [end, error] = std::from_chars(peer.data() + colon + 1, peer.data() + peer.size(), port);
   if (error != std::errc() || end != peer.data() + peer.size() || port < 1 || port > 65535)
@@ -153,6 +187,7 @@ CommandResult tracker_replay_command(const TrackerReplayArguments& arguments, Co
   const auto frames = tracker::read_sequence(arguments.file);
   if (!frames) return tl::unexpected(frames.error());
   StopSignal interrupt;
+  if (arguments.ndi) return replay_as_ndi(arguments, *frames, console);
   const auto server = tracker::IgtlServer::start(arguments.options);
   if (!server) return tl::unexpected(server.error());
   if (!console.quiet)
@@ -200,11 +235,23 @@ CommandResult tracker_pivot_command(const TrackerPivotArguments& arguments, Cons
   return {};
 }
 
+void add_definitions(CLI::App* command, TrackerLinkArguments& a) {
+  command->add_option(
+      "--definition", a.definitions,
+      "NAME=FILE.rom: definition of a passive tool of an NDI tracker, and the tool's name; repeated "
+      "for each");
+}
+
 namespace {
 
 void add_tracker_link(CLI::App* command, TrackerLinkArguments& a) {
-  command->add_option("PEER", a.peer, "address:port of an OpenIGTLink server, or file:PATH of a recording")
+  command
+      ->add_option(
+          "PEER", a.peer,
+          "address:port of an OpenIGTLink server, ndi:ADDRESS[:PORT] of an NDI tracker (port 8765), or "
+          "file:PATH of a recording")
       ->required();
+  add_definitions(command, a);
   command->add_option("--seconds", a.seconds, "End after this time, s; default: when interrupted")
       ->check(within(0, 1e6));
   command->add_option("--rate", a.tracker.rate_hz, "Rate to request, Hz; default: 60")
@@ -218,8 +265,10 @@ void add_tracker_link(CLI::App* command, TrackerLinkArguments& a) {
 void add_tracker(CLI::App& app, Action& action) {
   auto* tracker = add_command(
       app, group::operation, "tracker",
-      "Watch, record or play a tracker (OpenIGTLink); calibrate pointer and mount",
+      "Watch, record or play a tracker (OpenIGTLink, NDI); calibrate pointer and mount",
       "helicarm tracker watch 127.0.0.1:18944\n"
+      "  helicarm tracker watch ndi:192.168.1.10 --definition femur=8700339.rom --definition "
+      "tool=8700449.rom\n"
       "  helicarm tracker record 127.0.0.1:18944 poses.mha --seconds 20\n"
       "  helicarm tracker replay poses.mha --port 18944\n"
       "  helicarm tracker pivot poses.mha --tool PointerToTracker\n"
@@ -245,6 +294,7 @@ void add_tracker(CLI::App& app, Action& action) {
   replay->add_option("--seconds", replayed.seconds, "End after this time, s; default: when interrupted")
       ->check(within(0, 1e6));
   replay->add_flag("--tdata", replayed.as_tracking, "Send TDATA on request instead of TRANSFORM to all");
+  replay->add_flag("--ndi", replayed.ndi, "Play it as an NDI tracker in place of OpenIGTLink");
 
   auto* pivot = tracker->add_subcommand(
       "pivot", "Calibrate a pointer's tip from a recording of rotations about the tip");

@@ -4,16 +4,22 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "command.h"
 #include "helicarm/devices/tracker/igtl_server.h"
 #include "helicarm/devices/tracker/pivot_calibration.h"
 #include "helicarm/devices/tracker/tracker_source.h"
 
+namespace CLI {
+class App;
+}
+
 namespace helicarm::cli {
 
 struct TrackerLinkArguments {
-  std::string peer;  ///< address:port, or file:PATH
+  std::string peer;                      ///< address:port, ndi:address or ndi:address:port, or file:PATH
+  std::vector<std::string> definitions;  ///< NAME=FILE, of an NDI tracker's passive tools
   std::filesystem::path file;
   std::optional<double> seconds;  ///< empty: until interrupted
   tracker::TrackerAddress tracker;
@@ -23,6 +29,7 @@ struct TrackerReplayArguments {
   std::filesystem::path file;
   std::optional<double> seconds;
   bool as_tracking = false;  ///< TDATA instead of one TRANSFORM per tool
+  bool ndi = false;          ///< as an NDI tracker, all tools on cables
   tracker::IgtlServerOptions options;
 };
 
@@ -31,6 +38,8 @@ struct TrackerPivotArguments {
   std::string tool;
   tracker::PivotOptions options;
 };
+
+void add_definitions(CLI::App* command, TrackerLinkArguments& a);
 
 /// The tracker's address with that of PEER. Refuses usage.
 Expected<tracker::TrackerAddress> tracker_address(const TrackerLinkArguments& arguments);

@@ -183,8 +183,9 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
     }
     if (!console.quiet)
       console.progress << fmt::format(
-                              "tracker (OpenIGTLink) port {}\n{}\n"
+                              "tracker ({}) port {}\n{}\n"
                               "C-arm sends to {} {} port {}\ncommands: {}\n",
+                              virtual_or->tracker().speaks_ndi() ? "NDI" : "OpenIGTLink",
                               virtual_or->tracker().port(), ports_of(*virtual_or), arguments.receiver.title,
                               arguments.receiver.address, arguments.receiver.port, words())
                        << std::flush;
@@ -208,7 +209,9 @@ void add_virtual_or(CLI::App& app, Action& action) {
       "A person holds the drill; there is no robot, and the plan is one for freehand navigation");
   add_fields(command, a.virtual_or, virtual_devices::virtual_devices_fields);
   add_port(command, "--tracker-port", a.virtual_or.tracker_port,
-           "Port of the tracker (OpenIGTLink); 0: a free port, as for the ports below");
+           "Port of the tracker; 0: a free port, as for the ports below");
+  command->add_flag("--ndi", a.virtual_or.ndi_tracker,
+                    "The tracker speaks NDI's API (as a Polaris) in place of OpenIGTLink");
   add_port(command, "--rtde-port", a.virtual_or.rtde_port, "of the robot");
   add_port(command, "--dashboard-port", a.virtual_or.dashboard_port, "of the robot");
   add_port(command, "--script-port", a.virtual_or.script_port, "of the robot");

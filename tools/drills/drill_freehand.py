@@ -3,10 +3,11 @@
 """Drill: an operation with a hand-held drill, and the calibration of a mount, over the virtual devices.
 
 Runs `helicarm virtual-or --freehand`, `helicarm navigate --json` and `helicarm tracker calibrate-mount` (about two
-minutes). Not part of ./test.
+minutes; with --ndi the operation by a tracker on NDI's API alone). Not part of ./test.
 """
 
 import argparse
+import functools
 import json
 import pathlib
 import subprocess
@@ -29,8 +30,9 @@ def enter(devices):
     devices.navigation.process.stdin.flush()
 
 
-def drill_navigation(program, folder):
-    with VirtualDevices(program, folder / "freehand", "--json", virtual_or=["--freehand"]) as devices:
+def drill_navigation(program, folder, ndi=False):
+    words = ["--freehand", "--ndi"] if ndi else ["--freehand"]
+    with VirtualDevices(program, folder / "freehand", "--json", virtual_or=words) as devices:
         devices.acquire("AP", "waiting for LAT")
         devices.acquire("LAT", "^measure: ")
         devices.navigation.wait_for('^{"points"', 60)
@@ -58,7 +60,7 @@ def drill_navigation(program, folder):
         check("guidance begins again after the leg moved", True)
         enter(devices)
         verified(devices, "femur")
-        devices.command("drill tibia 30", "drilling tibia")
+        devices.command("drill tibia 42", "drilling tibia")
         guidance(devices, "on_target")
         time.sleep(4)
         enter(devices)
@@ -127,13 +129,16 @@ def calibrated(program, virtual, words, out):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default=ROOT / "build", type=pathlib.Path)
-    program = parser.parse_args().build / "bin" / "helicarm"
+    parser.add_argument("--ndi", action="store_true", help="the operation by a tracker on NDI's API")
+    options = parser.parse_args()
+    program = options.build / "bin" / "helicarm"
+    drills = [functools.partial(drill_navigation, ndi=True)] if options.ndi else [drill_navigation, drill_mount]
     with tempfile.TemporaryDirectory() as name:
-        for drill in drill_navigation, drill_mount:
+        for drill in drills:
             try:
                 drill(program, pathlib.Path(name))
             except TimeoutError as error:
-                check(f"{drill.__name__}: {error}", False)
+                check(f"{drill}: {error}", False)
     print(f"{len(failures)} failures")
     sys.exit(1 if failures else 0)
 

@@ -38,7 +38,8 @@ Connections::Connections(const OperationPlan& plan, std::unique_ptr<receiver::In
     : inbox_(std::move(inbox)), board_(board_options(limits)) {
   if (!plan.drill) robot_ = std::make_unique<robot::RobotLink>(config_of(plan.robot, limits));
   tracker_ = value_or_throw(tracker::open_tracker(
-      {plan.tracker.address, plan.tracker.port, plan.tracker.rate_hz}, tracker::onto(board_)));
+      {plan.tracker.address, plan.tracker.port, plan.tracker.rate_hz, true, plan.tracker.definitions},
+      tracker::onto(board_)));
 }
 
 robot::RobotLink& Connections::robot() {

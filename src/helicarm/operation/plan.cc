@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/text.h"
 #include "helicarm/devices/robot/robot_registry.h"
 #include "helicarm/devices/tracker/tracker_registry.h"
 #include "helicarm/operation/plan_description.h"
@@ -65,6 +66,31 @@ Json json_of_markers(const TrackerPlan& tracker) {
   for (const auto& [bone, marker] : tracker.markers) markers[bone] = marker;
   markers["tool"] = tracker.tool;
   return markers;
+}
+
+void read_definitions(JsonReader& reader, TrackerPlan& tracker) {
+  constexpr std::size_t most = 24;
+  if (!reader.has("definitions")) return;
+  if (!tracker::is_ndi(tracker.address))
+    reader.refuse(Reason::bad_value, "definitions",
+                  "belong to an NDI tracker: \"address\" must begin with \"ndi:\"");
+  constexpr std::size_t longest = 4096;
+  JsonReader files = reader.object("definitions");
+  for (const auto& [name, file] : reader.raw("definitions").items()) {
+    if (name.empty() || holds_control_character(name))
+      reader.refuse(Reason::bad_value, "definitions", "must have the markers' names as keys");
+    tracker.definitions[name] = files.text(name.c_str(), longest);
+  }
+  files.finish();
+  if (tracker.definitions.size() > most)
+    reader.refuse(Reason::bad_value, "definitions", fmt::format("must be at most {}", most));
+}
+
+std::optional<Json> json_of_definitions(const TrackerPlan& tracker) {
+  if (tracker.definitions.empty()) return std::nullopt;
+  Json files = Json::object();
+  for (const auto& [name, file] : tracker.definitions) files[name] = file.string();
+  return files;
 }
 
 void check_drill(const JsonReader& reader, const HandDrill& drill) {
@@ -128,6 +154,7 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin,
     plan.folder = folder.empty() ? std::filesystem::absolute(origin).parent_path() : folder;
     description::describe_plan(codec, plan, origin);
     reader.finish();
+    for (auto& [name, file] : plan.tracker.definitions) file = plan.folder / file;
     return plan;
   });
 }

@@ -41,6 +41,8 @@ struct TrackerPlan {
   std::map<guidance::Bone, std::string> markers = {{"femur", "femur"}, {"tibia", "tibia"}};  ///< of the bones
   std::string tool = "tool";
   std::vector<tracker::Facet> facets;  ///< of the calibrator; a single marker is one facet
+  /// Definitions (.rom) of the passive tools of an NDI tracker, by the markers' names.
+  std::map<std::string, std::filesystem::path> definitions = {};
   std::optional<Pointer> pointer;
   double sigma_mm = 0.12;  ///< error of a pose averaged over 1 s, per axis
   double sigma_deg = 0.05;

@@ -36,6 +36,8 @@ std::vector<std::string> views_from(JsonReader& reader);
 /// "markers", or of helicarm-plan/1 a key for each bone of the knee.
 void read_markers(JsonReader& reader, const std::vector<guidance::Bone>& bones, TrackerPlan& tracker);
 Json json_of_markers(const TrackerPlan& tracker);
+void read_definitions(JsonReader& reader, TrackerPlan& tracker);
+std::optional<Json> json_of_definitions(const TrackerPlan& tracker);
 /// The keys that exclude each other or need each other.
 void check_plan(const JsonReader& reader, const OperationPlan& plan);
 void check_drill(const JsonReader& reader, const HandDrill& drill);
@@ -45,11 +47,21 @@ void complete(const JsonReader& reader, OperationTunnel& tunnel, const Operation
 template <class Codec, class Tracker>
 void describe_tracker(Codec& codec, Tracker& tracker, const std::vector<guidance::Bone>& bones) {
   codec.text("address", tracker.address,
-             "numeric address of the OpenIGTLink server; or, with a `drill` only, `file:PATH`: a [sequence "
+             "numeric address of the OpenIGTLink server; `ndi:` and that of an [NDI "
+             "tracker](devices.md#ndi-trackers-directly); or, with a `drill` only, `file:PATH`: a [sequence "
              "file](devices.md#sequence-files) (relative to the working directory) is played repeatedly, for "
              "tests without a tracker",
              {1, 200});
-  codec.integer("port", tracker.port, 1, most_port, "of the server");
+  codec.integer("port", tracker.port, 1, most_port, "of the server; of NDI trackers 8765");
+  codec.custom(
+      "definitions", false, {{"type", "object"}},
+      "`{\"MARKER\": \"FILE.rom\", ...}`: definitions of the passive tools of an NDI tracker by the names of "
+      "the "
+      "markers, loaded at each connection; at most 24, relative to the plan's folder",
+      [&](JsonReader& reader) {
+        if constexpr (!std::is_const_v<Tracker>) read_definitions(reader, tracker);
+      },
+      [&] { return json_of_definitions(tracker); });
   codec.number_or_default("rate_hz", tracker.rate_hz, {1, 1000}, "rate requested from the tracker");
   codec.custom(
       "markers", false, {{"type", "object"}},

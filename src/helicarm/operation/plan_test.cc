@@ -122,6 +122,22 @@ TEST(Plan, RecordedPosesGuideNoRobot) {
   EXPECT_TRUE(plan_from(to_json(recorded), "plan.json"));
 }
 
+TEST(Plan, DefinitionsOfAnNdiTrackersToolsLieInThePlansFolder) {
+  OperationPlan by_ndi = plan();
+  by_ndi.tracker.address = "ndi:192.168.1.10";
+  by_ndi.tracker.definitions = {{"femur", "tools/femur.rom"}};
+  const OperationPlan read = plan_from(to_json(by_ndi), "/theatre/plan.json").value();
+  EXPECT_EQ(read.tracker.definitions.at("femur"), "/theatre/tools/femur.rom");
+}
+
+TEST(Plan, DefinitionsWithoutAnNdiTrackerAreRefused) {
+  OperationPlan other = plan();
+  other.tracker.definitions = {{"femur", "femur.rom"}};
+  const auto refused = plan_from(to_json(other), "plan.json");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::bad_value);
+}
+
 TEST(Plan, ErrorOfAMountIsAddedToThatOfTheReadings) {
   OperationPlan mounted = plan();
   mounted.tracker.sigma_mm = 0.12;

@@ -206,6 +206,7 @@ void conduct(operation::Operation& operation, const Work& work) {
 
 operation::OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t tracker_port) {
   operation::OperationPlan plan;
+  if (virtual_or.tracker().speaks_ndi()) plan.tracker.address = "ndi:" + plan.tracker.address;
   plan.tracker.port = tracker_port;
   plan.tracker.rate_hz = virtual_or.tracker().rate_hz();
   for (const virtual_devices::TrackedFacet& facet : virtual_devices::calibrator_facets())

@@ -73,6 +73,7 @@ Expected<std::unique_ptr<VirtualDevices>> VirtualDevices::open(const VirtualDevi
     tracker.server.on_notice = [notice = options.on_notice](const std::string& line) {
       notice("tracker: " + line);
     };
+    tracker.ndi = options.ndi_tracker;
     tracker.rate_hz = options.tracker_rate_hz;
     tracker.seed = options.seed;
     virtual_or->tracker_ = value_or_throw(VirtualTracker::start(tracker, std::move(bodies)));

@@ -24,6 +24,7 @@ struct VirtualDevicesOptions {
   std::function<void(const std::string&)> on_notice = [](const std::string&) {};
   bool freehand = false;  ///< a person holds the drill; there is no robot
   std::uint16_t primary_port = 0;
+  bool ndi_tracker = false;  ///< the tracker speaks NDI's API in place of OpenIGTLink
 };
 
 /// A simulated scene with a running tracker and a robot or a hand-held drill; the C-arm sends by `shoot`. All

@@ -37,16 +37,29 @@ void swap_with_calibrator(std::vector<tracker::IgtlTool>& tools) {
 
 Expected<std::unique_ptr<VirtualTracker>> VirtualTracker::start(const VirtualTrackerOptions& options,
                                                                 std::vector<FollowedBody> bodies) {
-  auto server = tracker::IgtlServer::start(options.server);
-  if (!server) return tl::unexpected<Failure>(server.error());
-  return std::unique_ptr<VirtualTracker>(new VirtualTracker(options, std::move(bodies), *std::move(server)));
+  return guarded([&] {
+    std::unique_ptr<tracker::IgtlServer> igtl;
+    std::unique_ptr<tracker::NdiServer> ndi;
+    if (options.ndi) {
+      std::vector<std::string> names;
+      for (const FollowedBody& followed : bodies) names.push_back(followed.name);
+      ndi = value_or_throw(
+          tracker::NdiServer::start({options.server.address, options.server.port, std::move(names)}));
+    } else {
+      igtl = value_or_throw(tracker::IgtlServer::start(options.server));
+    }
+    return std::unique_ptr<VirtualTracker>(
+        new VirtualTracker(options, std::move(bodies), std::move(igtl), std::move(ndi)));
+  });
 }
 
 VirtualTracker::VirtualTracker(const VirtualTrackerOptions& options, std::vector<FollowedBody> bodies,
-                               std::unique_ptr<tracker::IgtlServer> server)
+                               std::unique_ptr<tracker::IgtlServer> igtl,
+                               std::unique_ptr<tracker::NdiServer> ndi)
     : options_(options),
       bodies_(std::move(bodies)),
-      server_(std::move(server)),
+      igtl_(std::move(igtl)),
+      ndi_(std::move(ndi)),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 std::vector<std::string> VirtualTracker::bodies() const {
@@ -125,7 +138,7 @@ void VirtualTracker::notify(std::uint64_t number) {
     }
     last_.device = "virtual";
     last_.stamp = stamp_now(has(TrackerFault::time_jump) ? -hour_s : 0);
-    return server_->send(last_);
+    return igtl_ ? igtl_->send(last_) : ndi_->send(last_);
   }
 }
 

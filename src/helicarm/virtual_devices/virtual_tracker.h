@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "helicarm/devices/tracker/igtl_server.h"
+#include "helicarm/devices/tracker/ndi_server.h"
 #include "helicarm/simulation/navigation_truth.h"
 #include "helicarm/simulation/tracker_model.h"
 
@@ -25,6 +26,7 @@ struct FollowedBody {
 
 struct VirtualTrackerOptions {
   tracker::IgtlServerOptions server = {.port = 18944};
+  bool ndi = false;  ///< speaks NDI's API in place of OpenIGTLink, all tools on cables
   simulation::TrackerModel model = simulation::virtual_tracker();
   double rate_hz = 30;
   std::uint64_t seed = 1;
@@ -40,15 +42,16 @@ enum class TrackerFault {
   swapped_calibrator,  ///< exchanges the femur's marker and one of the calibrator's
 };
 
-/// An OpenIGTLink server that sends the bodies' poses (TDATA) with the noise of a real tracker; bodies that
-/// are not visible are absent.
+/// A tracker with the noise of a real one, as an OpenIGTLink server that sends the bodies' poses (TDATA), or
+/// as an NDI tracker; bodies that are not visible are absent, or missing.
 class VirtualTracker {
  public:
-  /// Refuses as IgtlServer.
+  /// Refuses as IgtlServer and NdiServer.
   static Expected<std::unique_ptr<VirtualTracker>> start(const VirtualTrackerOptions& options,
                                                          std::vector<FollowedBody> bodies);
 
-  std::uint16_t port() const { return server_->port(); }
+  std::uint16_t port() const { return igtl_ ? igtl_->port() : ndi_->port(); }
+  bool speaks_ndi() const { return ndi_ != nullptr; }
   double rate_hz() const { return options_.rate_hz; }
   /// Names of all tracked bodies.
   std::vector<std::string> bodies() const;
@@ -59,7 +62,7 @@ class VirtualTracker {
 
  private:
   VirtualTracker(const VirtualTrackerOptions& options, std::vector<FollowedBody> bodies,
-                 std::unique_ptr<tracker::IgtlServer> server);
+                 std::unique_ptr<tracker::IgtlServer> igtl, std::unique_ptr<tracker::NdiServer> ndi);
   void run(const std::stop_token& stop);
   struct Disturbance {
     std::set<std::string> hidden;
@@ -71,7 +74,8 @@ class VirtualTracker {
 
   VirtualTrackerOptions options_;
   std::vector<FollowedBody> bodies_;
-  std::unique_ptr<tracker::IgtlServer> server_;
+  std::unique_ptr<tracker::IgtlServer> igtl_;  ///< or
+  std::unique_ptr<tracker::NdiServer> ndi_;
   std::mutex mutex_;
   Disturbance disturbance_;
   tracker::IgtlMessage last_;

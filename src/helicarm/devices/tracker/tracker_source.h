@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -16,10 +18,13 @@ class PoseBoard;
 
 /// Where poses come from; the address decides on the source (`open_tracker`).
 struct TrackerAddress {
-  std::string address = "127.0.0.1";  ///< numeric, of an OpenIGTLink server, or "file:" and a sequence file
-  std::uint16_t port = 18944;         ///< of a server
-  double rate_hz = 60;                ///< requested
-  bool ask_for_tracking = true;       ///< some servers send nothing else, many need no request
+  /// Numeric, of an OpenIGTLink server; "ndi:" and that of an NDI tracker; or "file:" and a sequence file.
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 18944;    ///< of a server; of NDI trackers 8765
+  double rate_hz = 60;           ///< requested
+  bool ask_for_tracking = true;  ///< some OpenIGTLink servers send nothing else, many need no request
+  /// Definitions (.rom) of an NDI tracker's passive tools, by the tools' names.
+  std::map<std::string, std::filesystem::path> definitions = {};
 };
 
 enum class LinkState { connecting, connected, waiting };
