@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import shutil
+import subprocess
 import tarfile
 import unittest
 
@@ -144,6 +145,45 @@ class OwnFiles(SimulatedCase):
         self.assertIn("[2/2]", done.stderr)
         lines = (self.root / "dots.csv").read_text().splitlines()
         self.assertEqual(len(lines), 1 + sum(len(one["dots"]) for one in images))
+
+
+class SeveralProcesses(SimulatedCase):
+    """Cases measured by processes that share a word, or that mpirun started."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.cases = [cls.root / f"case{i}" for i in range(4)]
+        for case in cls.cases:
+            shutil.copytree(cls.root / "case", case)
+        (cls.cases[2] / "case.json").write_text("{")
+        cls.words = ("--no-report", "--threads", 1, "--quiet")
+        cls.alone = cls.root / "alone"
+        run("run", *cls.cases, "--out", cls.alone, *cls.words)
+
+    def expect_as_alone(self, out):
+        self.assertEqual((out / "summary.csv").read_text(), (self.alone / "summary.csv").read_text())
+        self.assertEqual(sorted(path.name for path in out.iterdir()), ["case0", "case1", "case3", "summary.csv"])
+
+    def test_processes_of_one_word_measure_each_case_once_and_one_reports(self):
+        out = self.root / "word"
+        words = [PROGRAM, "run", *map(str, self.cases), "--out", str(out), "--share", "night", *map(str, self.words)]
+        both = [subprocess.Popen(words, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+        failures = [process.communicate()[1] for process in both]
+        self.expect_as_alone(out)
+        self.assertIn(2, [process.returncode for process in both])
+        self.assertIn("1 of 4 cases", "".join(failures))
+
+    @unittest.skipUnless(os.environ.get("HELICARM_MPIRUN"), "built without MPI")
+    def test_ranks_share_the_cases(self):
+        out = self.root / "ranks"
+        environment = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+                       "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_plm_rsh_agent": "false"}
+        done = subprocess.run([os.environ["HELICARM_MPIRUN"], "-n", "2", PROGRAM, "run", *map(str, self.cases), "--out",
+                               str(out), *map(str, self.words)], capture_output=True, text=True, env=environment)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertEqual(done.stderr.count("1 of 4 cases"), 1, done.stderr)
+        self.expect_as_alone(out)
 
 
 if __name__ == "__main__":

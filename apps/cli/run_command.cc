@@ -16,6 +16,7 @@
 #include "helicarm/pipeline/result.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/earlier_results.h"
+#include "shared_work.h"
 
 namespace helicarm::cli {
 namespace {
@@ -104,28 +105,57 @@ void forget_earlier(const fs::path& out) {
   forget_files(out, {"summary.csv"});
 }
 
-CommandResult run_several(const RunCasesArguments& arguments, Console& console) {
-  const std::vector<std::string> names = names_of(arguments.cases);
-  const fs::path csv = arguments.run.out / "summary.csv";
-  std::vector<CaseSummary> done;
-  forget_earlier(arguments.run.out);
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    RunArguments run = arguments.run;
-    run.folder = arguments.cases[i];
-    run.out = arguments.run.out / names[i];
-    Console silent = console;
-    silent.quiet = true;
-    done.push_back(summary_of(names[i], run_and_write(run, silent)));
-    const CaseSummary& c = done.back();
-    if (auto written = write_file(csv, csv_of(done)); !written) return written;
-    if (console.quiet) continue;
-    console.progress << fmt::format(
-        "[{}/{}] {}: {}\n", i + 1, names.size(), c.name,
-        c.failure       ? fmt::format("{}: {}", code(c.failure->reason), c.failure->message)
-        : c.points == 0 ? fmt::format("calibrated, no points, {} warnings", c.warnings)
-                        : fmt::format("{} of {} points, 95 % error up to {:.3f} mm, {} warnings", c.located,
-                                      c.points, c.worst_error_mm.value_or(0), c.warnings));
-  }
+Json json_of(const CaseSummary& summary) {
+  const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
+  Json json{{"name", summary.name},
+            {"points", summary.points},
+            {"located", summary.located},
+            {"warnings", summary.warnings},
+            {"worst_error_mm", number(summary.worst_error_mm)},
+            {"fre_mm", number(summary.fre_mm)},
+            {"tre_mm", number(summary.tre_mm)}};
+  if (summary.failure)
+    json["failure"] = {{"code", code(summary.failure->reason)}, {"message", summary.failure->message}};
+  return json;
+}
+
+CaseSummary summary_from(const Json& json) {
+  const auto number = [&](const char* key) {
+    return json.at(key).is_null() ? std::nullopt : std::optional(json.at(key).get<double>());
+  };
+  CaseSummary summary{json.at("name").get<std::string>(),
+                      std::nullopt,
+                      json.at("points").get<std::size_t>(),
+                      json.at("located").get<std::size_t>(),
+                      json.at("warnings").get<std::size_t>(),
+                      number("worst_error_mm"),
+                      number("fre_mm"),
+                      number("tre_mm")};
+  if (json.contains("failure"))
+    for (const Reason reason : all_reasons())
+      if (code(reason) == json["failure"].at("code").get<std::string>())
+        summary.failure = Failure{reason, json["failure"].at("message").get<std::string>(), {}, {}};
+  return summary;
+}
+
+CaseSummary measure_one(const RunCasesArguments& arguments, std::size_t index, const std::string& name,
+                        const Console& console) {
+  RunArguments run = arguments.run;
+  run.folder = arguments.cases[index];
+  run.out = arguments.run.out / name;
+  Console silent = console;
+  silent.quiet = true;
+  return summary_of(name, run_and_write(run, silent));
+}
+
+std::string line_of(const CaseSummary& c) {
+  if (c.failure) return fmt::format("{}: {}: {}", c.name, code(c.failure->reason), c.failure->message);
+  if (c.points == 0) return fmt::format("{}: calibrated, no points, {} warnings", c.name, c.warnings);
+  return fmt::format("{}: {} of {} points, 95 % error up to {:.3f} mm, {} warnings", c.name, c.located,
+                     c.points, c.worst_error_mm.value_or(0), c.warnings);
+}
+
+CommandResult all_done(const std::vector<CaseSummary>& done, const fs::path& csv, Console& console) {
   if (std::ranges::any_of(done, [](const CaseSummary& c) { return c.failure.has_value(); }))
     return tl::unexpected<Failure>(gravest(done, csv));
   if (console.json)
@@ -133,6 +163,51 @@ CommandResult run_several(const RunCasesArguments& arguments, Console& console) 
   else if (!console.quiet)
     console.out << fmt::format("\n  {} cases, written to {}\n", done.size(), csv.string());
   return {};
+}
+
+CommandResult run_several(const RunCasesArguments& arguments, Console& console) {
+  const std::vector<std::string> names = names_of(arguments.cases);
+  const fs::path csv = arguments.run.out / "summary.csv";
+  std::vector<CaseSummary> done;
+  forget_earlier(arguments.run.out);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    done.push_back(measure_one(arguments, i, names[i], console));
+    if (auto written = write_file(csv, csv_of(done)); !written) return written;
+    if (!console.quiet)
+      console.progress << fmt::format("[{}/{}] {}\n", i + 1, names.size(), line_of(done.back()));
+  }
+  return all_done(done, csv, console);
+}
+
+/// As `run_several`, with other processes. The one that ends it reports; the others succeed.
+CommandResult run_shared(const RunCasesArguments& arguments, const Launch& launch, Console& console) {
+  const std::vector<std::string> names = names_of(arguments.cases);
+  const fs::path csv = arguments.run.out / "summary.csv";
+  return guarded([&] {
+    SharedWork work(arguments.run.out, launch, names, [&] { forget_earlier(arguments.run.out); });
+    const auto given_up = [&](std::size_t index) {
+      CaseSummary summary;
+      summary.name = names[index];
+      summary.failure =
+          Failure{Reason::interrupted, "each process that measured it ended before it was done", {}, {}};
+      return json_of(summary);
+    };
+    while (const auto item = work.next(given_up)) {
+      const CaseSummary summary = measure_one(arguments, item->index, names[item->index], console);
+      work.done(*item, json_of(summary));
+      if (!console.quiet)
+        console.progress << fmt::format("[{} of {}{}] {}\n", item->index + 1, names.size(),
+                                        item->taken_over ? ", whose first process ended" : "",
+                                        line_of(summary))
+                         << std::flush;
+    }
+    std::vector<CaseSummary> all;
+    const bool reports = work.finish([&](const std::vector<Json>& rows) {
+      for (const Json& row : rows) all.push_back(summary_from(row));
+      value_or_throw(write_file(csv, csv_of(all)));
+    });
+    if (reports) value_or_throw(all_done(all, csv, console));
+  });
 }
 
 }  // namespace
@@ -149,7 +224,11 @@ std::vector<std::string> names_of(const std::vector<fs::path>& cases) {
 }
 
 CommandResult run_command(const RunCasesArguments& arguments, Console& console) {
-  if (arguments.cases.size() > 1) return run_several(arguments, console);
+  if (arguments.cases.size() > 1) {
+    auto launch = launch_of_environment();
+    if (!arguments.share.empty()) launch = Launch{arguments.share, launch ? launch->processes : 0};
+    return launch ? run_shared(arguments, *launch, console) : run_several(arguments, console);
+  }
   RunArguments run = arguments.run;
   run.folder = arguments.cases.front();
   return run_one_case(run, console);
@@ -160,10 +239,15 @@ void add_run(CLI::App& app, Action& action) {
       app, group::measure, "run",
       "Measure a case: cameras with covariances from X-ray images, and from two or more points and tunnels",
       "helicarm run my-case --out my-result\n"
-      "  helicarm run study/* --out results    each case in results/NAME, all in results/summary.csv");
-  auto& [cases, a] = arguments_of(command, action, run_command);
+      "  helicarm run study/* --out results    each case in results/NAME, all in results/summary.csv\n"
+      "  mpirun -n 8 helicarm run study/* --out results    the same by eight processes");
+  auto& [cases, a, share] = arguments_of(command, action, run_command);
   command->add_option("CASE", cases, "Folder that holds case.json; several are run one after the other")
       ->required();
+  command->add_option(
+      "--share", share,
+      "A word that several processes have in common, which measure the cases together, each the next "
+      "that no other has; mpirun and srun need none. The same word goes on after an interruption");
   command
       ->add_option("--out", a.out,
                    "Folder for result.json, report.html and the overlays; with several cases for a folder of "
