@@ -12,6 +12,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 USES = re.compile(r"\bhelicarm_module\((\w+)[^)]*?\bUSES ([a-z_\s]+)")
+TEST_USES = re.compile(r"\bTEST_USES ([a-z_\s]+)")
 
 
 def modules():
@@ -50,6 +51,9 @@ def breaches_of_layers(module, path):
     allowed = {module, *MODULES[module]}
     if path.stem.endswith("_test"):
         allowed |= FOR_TESTS
+        for cmake in (ROOT / "src" / "helicarm" / module).rglob("CMakeLists.txt"):
+            for names in TEST_USES.findall(cmake.read_text()):
+                allowed |= set(names.split())
         if list(MODULES).index(module) > list(MODULES).index("virtual_devices"):
             allowed.add("virtual_devices")
     for number, included in includes(path):

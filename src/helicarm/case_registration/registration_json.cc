@@ -5,7 +5,7 @@
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/core/output.h"
 #include "helicarm/pipeline/result_description.h"
-#include "helicarm/registration/bone_check_description.h"
+#include "helicarm/guidance/bone_check_description.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -163,7 +163,7 @@ void describe_model(Output& output, const RegisteredModel& model, const std::vec
         row.object_of("bone_check", planned.bone_check,
                       "[the tunnel against the bone](#bone_check), see below",
                       [](auto& check, const registration::BoneCheck& of) {
-                        registration::describe_bone_check(check, of);
+                        guidance::describe_bone_check(check, of);
                       });
       });
   output.value("seconds", found.seconds, "wall-clock time");

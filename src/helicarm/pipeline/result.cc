@@ -14,7 +14,7 @@
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/pipeline/view_description.h"
 #include "helicarm/pipeline/view_parameters.h"
-#include "helicarm/registration/bone_check_description.h"
+#include "helicarm/guidance/bone_check_description.h"
 
 namespace helicarm::pipeline {
 
@@ -225,8 +225,8 @@ void describe_tunnels(Output& output, const Result& result) {
         row.value_where(is_planned, "model", planned.model, "whose plan holds it");
         row.object_where(is_planned, "bone_check", planned.bone_check,
                          "[the tunnel against the bone](#bone_check), see below",
-                         [](auto& check, const registration::BoneCheck& of) {
-                           registration::describe_bone_check(check, of);
+                         [](auto& check, const guidance::BoneCheck& of) {
+                           guidance::describe_bone_check(check, of);
                          });
       });
 }

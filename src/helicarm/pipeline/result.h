@@ -22,7 +22,7 @@
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/rectification/rectify.h"
-#include "helicarm/registration/bone_check.h"
+#include "helicarm/guidance/bone_check.h"
 #include "helicarm/xray/xray_image.h"
 
 namespace helicarm::pipeline {
@@ -95,7 +95,7 @@ struct ModelTunnel {
   TunnelEnds ends;  ///< among the model points
   /// Of the model's pose, to which its ends' `by_calibration` refers; empty: none.
   Eigen::MatrixXd shared_covariance = {};
-  std::optional<registration::BoneCheck> bone_check = {};  ///< nothing: the model has no outline
+  std::optional<guidance::BoneCheck> bone_check = {};  ///< nothing: the model has no outline
 };
 
 /// Wall-clock time of each stage, ms; nothing if not reached.

@@ -23,7 +23,6 @@ constexpr double open_start_mm = 5, open_end_mm = 1;
 constexpr double interruption_mm = 1.5;  // of an opening's face, by steps of a mask
 const double same_face_cosine = std::cos(60 * std::numbers::pi / 180);
 const double least_slope_sine = std::sin(2 * std::numbers::pi / 180);
-constexpr double one_sided_95 = 1.645;
 constexpr double deg = 180 / std::numbers::pi;
 
 struct Frame {
@@ -214,18 +213,6 @@ class Check {
 };
 
 }  // namespace
-
-bool BoneCheck::is_breach() const {
-  if (!diameter_mm) return false;
-  if (!entry) return true;
-  const double spread = drilled_sigma_mm.value_or(0);
-  return (bridge_mm && *bridge_mm < one_sided_95 * spread) ||
-         (end_mm && *end_mm < one_sided_95 * std::max(spread, end_sigma_mm.value_or(0)));
-}
-
-bool BoneCheck::is_thin() const {
-  return required_mm && ((bridge_mm && *bridge_mm < *required_mm) || (end_mm && *end_mm < *required_mm));
-}
 
 BoneCheck check_tunnel(const BoneSurface& bone, const BoneTunnel& tunnel) {
   if (auto check = Check(bone, tunnel).made()) return *std::move(check);

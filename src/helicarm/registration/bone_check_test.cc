@@ -7,8 +7,8 @@
 #include <gmock/gmock.h>
 
 #include "helicarm/core/random.h"
+#include "helicarm/guidance/bone_check_description.h"
 #include "helicarm/phantom/mesh.h"
-#include "helicarm/registration/bone_check_description.h"
 #include "helicarm/registration/bone_surface.h"
 
 namespace helicarm::registration {
@@ -184,7 +184,7 @@ TEST(CheckTunnel, WithoutADiameterOnlyTheAxisIsCompared) {
   EXPECT_NEAR(check.length_in_bone_mm, 44, 0.05);
   EXPECT_FALSE(check.bridge_mm);
   EXPECT_FALSE(check.is_breach());
-  const Json json = output_of([&](OutputJson& output) { describe_bone_check(output, check); });
+  const Json json = output_of([&](OutputJson& output) { guidance::describe_bone_check(output, check); });
   EXPECT_TRUE(json["note"].is_string());
 }
 

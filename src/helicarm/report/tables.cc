@@ -254,10 +254,10 @@ Table tunnels_table(const pipeline::Result& result) {
 
 Table bone_table(const std::vector<TunnelInBoneRow>& tunnels) {
   using Row = TunnelInBoneRow;
-  const auto figure = [](std::optional<double> registration::BoneCheck::*member, int digits) {
+  const auto figure = [](std::optional<double> guidance::BoneCheck::*member, int digits) {
     return [=](const Row& r) { return Cell{fixed(r.check.*member, digits)}; };
   };
-  using registration::BoneCheck;
+  using guidance::BoneCheck;
   return table_of<Row>(
       "Tunnels in the bone",
       {{words("Tunnel", "Name of the tunnel"), [](const Row& r) { return Cell{r.tunnel}; }},

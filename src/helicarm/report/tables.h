@@ -37,7 +37,7 @@ std::vector<ToolAtEnd> tools_at_ends(const std::vector<guidance::Verification>& 
 /// A planned tunnel against the bone of its model.
 struct TunnelInBoneRow {
   std::string tunnel, model;
-  registration::BoneCheck check;
+  guidance::BoneCheck check;
 };
 Table bone_table(const std::vector<TunnelInBoneRow>& tunnels);
 /// Of the result's models.

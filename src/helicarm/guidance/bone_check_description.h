@@ -2,9 +2,9 @@
 #pragma once
 
 #include "helicarm/core/output.h"
-#include "helicarm/registration/bone_check.h"
+#include "helicarm/guidance/bone_check.h"
 
-namespace helicarm::registration {
+namespace helicarm::guidance {
 
 /// "bone_check" of result.json and registration.json (core/output.h).
 template <class Output>
@@ -48,4 +48,4 @@ void describe_bone_check(Output& output, const BoneCheck& check) {
       "for people");
 }
 
-}  // namespace helicarm::registration
+}  // namespace helicarm::guidance
