@@ -16,21 +16,59 @@
 namespace helicarm::image {
 namespace {
 
-std::string encode(std::uint32_t format, int width, int height, const void* pixels, int stride) {
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  image.width = static_cast<png_uint_32>(width);
-  image.height = static_cast<png_uint_32>(height);
-  image.format = format;
-  // Of images beyond 4 megapixels: sooner, for a somewhat larger file.
-  constexpr std::size_t large = std::size_t{4} << 20;
-  if (static_cast<std::size_t>(width) * static_cast<std::size_t>(height) > large)
-    image.flags = PNG_IMAGE_FLAG_FAST;
-  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
-  std::string bytes(size, '\0');
-  if (!png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels, stride, nullptr))
-    throw std::runtime_error(fmt::format("libpng: {}", image.message));
-  bytes.resize(size);
+void append(png_structp png, png_bytep bytes, std::size_t size) {
+  static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(bytes), size);
+}
+
+void keep_message(png_structp png, png_const_charp message) {
+  *static_cast<std::string*>(png_get_error_ptr(png)) = message;
+  png_longjmp(png, 1);
+}
+
+/// Rows of `channels` numbers a pixel of 8 or 16 bits.
+struct Rows {
+  int width, height, channels, bits;
+  const void* first;
+  std::size_t stride;  ///< bytes
+};
+
+/// Nothing here is destroyed while libpng may longjmp.
+bool write_rows(png_structp png, png_infop info, const Rows& rows) {
+  if (setjmp(png_jmpbuf(png))) return false;
+  // Differences to the row above, barely searched for repetitions: noise has none. A fifth larger than all of
+  // libpng's efforts, at a quarter of their time.
+  constexpr int level = 2;
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_UP);
+  png_set_compression_level(png, level);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(rows.width), static_cast<png_uint_32>(rows.height),
+               rows.bits, rows.channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  // Measured values are linear; what is drawn is for a screen.
+  if (rows.bits == 16)
+    png_set_gAMA_fixed(png, info, PNG_GAMMA_LINEAR);
+  else
+    png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+  png_write_info(png, info);
+  if (rows.bits == 16) png_set_swap(png);
+  for (int v = 0; v < rows.height; ++v)
+    png_write_row(png, static_cast<png_const_bytep>(rows.first) + static_cast<std::size_t>(v) * rows.stride);
+  png_write_end(png, info);
+  return true;
+}
+
+std::string encode(const Rows& rows) {
+  std::string bytes, message;
+  bytes.reserve(static_cast<std::size_t>(rows.height) * rows.stride / 4);
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &message, keep_message, nullptr);
+  png_infop info = png ? png_create_info_struct(png) : nullptr;
+  if (!info) {
+    png_destroy_write_struct(&png, nullptr);
+    throw std::bad_alloc();
+  }
+  png_set_write_fn(png, &bytes, append, nullptr);
+  const bool good = write_rows(png, info, rows);
+  png_destroy_write_struct(&png, &info);
+  if (!good) throw std::runtime_error(fmt::format("libpng: {}", message));
   return bytes;
 }
 
@@ -138,16 +176,18 @@ double aspect_of(const Reading& reading) {
 }  // namespace
 
 std::string encode_png(const Image<std::uint8_t>& grey) {
-  return encode(PNG_FORMAT_GRAY, grey.width(), grey.height(), grey.pixels().data(), grey.width());
+  return encode(
+      {grey.width(), grey.height(), 1, 8, grey.pixels().data(), static_cast<std::size_t>(grey.width())});
 }
 
 std::string encode_png(const Image<std::uint16_t>& grey) {
-  return encode(PNG_FORMAT_LINEAR_Y, grey.width(), grey.height(), grey.pixels().data(), grey.width());
+  return encode({grey.width(), grey.height(), 1, 16, grey.pixels().data(),
+                 sizeof(std::uint16_t) * static_cast<std::size_t>(grey.width())});
 }
 
 std::string encode_png(const cv::Mat& rgb) {
   CV_Assert(rgb.type() == CV_8UC3);
-  return encode(PNG_FORMAT_RGB, rgb.cols, rgb.rows, rgb.data, static_cast<int>(rgb.step));
+  return encode({rgb.cols, rgb.rows, 3, 8, rgb.data, rgb.step});
 }
 
 bool is_png(std::string_view bytes) { return bytes.starts_with("\x89PNG\r\n\x1a\n"); }
