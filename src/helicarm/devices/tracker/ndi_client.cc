@@ -50,7 +50,7 @@ class NdiLink {
            fmt::format("no reply to {} within {:g} s", command.substr(0, command.find(':')), seconds));
     return received_;
   }
-  /// A last command, whose reply nobody waits for.
+  /// A last command, whose reply is not awaited.
   void say(const std::string& command) {
     asio::error_code ignored;
     asio::write(socket_, asio::buffer(command), ignored);

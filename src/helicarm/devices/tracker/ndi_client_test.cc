@@ -84,6 +84,15 @@ TEST(NdiClient, MissingToolIsHidden) {
   EXPECT_EQ(state_of(board, "tibia").accepted, 0u);
 }
 
+TEST(NdiClient, MatrixThatIsNoRigidMotionIsMissing) {
+  NdiDevice device({"femur"});
+  for (const char* command : {"INIT ", "PINIT 01", "PENA 01D", "TSTART "})
+    ASSERT_EQ(ndi_text(device.answer(std::string(command) + "\r")).value(), "OKAY") << command;
+  IgtlTracking scaled{{{"femur", 2, 1.01 * Eigen::Matrix4d::Identity()}}};
+  device.measure(scaled);
+  EXPECT_EQ(ndi_tracking(device.answer("BX 0001\r")).value().tools.at(0).state, NdiToolState::missing);
+}
+
 TEST(NdiClient, MeasurementThatWasReceivedBeforeIsNotPassedOnAgain) {
   const auto server = NdiServer::start({.on_cables = {"femur"}}).value();
   PoseBoard board;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include "helicarm/core/text.h"
@@ -28,6 +29,14 @@ enum class NdiError {
 
 std::string error(NdiError why) { return "ERROR" + hexadecimal(std::uint32_t(why), 2); }
 
+/// No quaternion says anything else.
+bool is_pose(const Eigen::Matrix4d& matrix) {
+  constexpr double tolerance = 1e-3;
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+  return matrix.allFinite() && rotation.determinant() > 0 &&
+         (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm() < tolerance;
+}
+
 }  // namespace
 
 NdiDevice::NdiDevice(const std::vector<std::string>& on_cables) {
@@ -43,6 +52,7 @@ void NdiDevice::measure(const IgtlTracking& tracking) {
   for (auto& [name, tool] : newest_) tool.state = NdiToolState::missing;
   for (const IgtlTool& seen : tracking.tools) {
     NdiTool& tool = newest_[seen.name];
+    if (!is_pose(seen.matrix)) continue;
     const Eigen::Matrix3d rotation = seen.matrix.topLeftCorner<3, 3>();
     const Eigen::Quaterniond turn(rotation);
     tool.quaternion = turn.coeffs();
