@@ -115,10 +115,10 @@ void add_c_arm(CLI::App& app, Action& action) {
       ->required();
 
   auto* report =
-      command->add_subcommand("report", "Sag, repeatability and every acquisition, as a page and a table");
+      command->add_subcommand("report", "Sag, repeatability and every acquisition, as a page, a PDF to sign and a table");
   auto& reported = arguments_of(report, action, c_arm_report_command);
   report->add_option("RECORD", reported.record, "The record (JSON)")->required();
-  report->add_option("--out", reported.out, "Folder for report.html, c_arm.csv and c_arm.svg")
+  report->add_option("--out", reported.out, "Folder for report.html, report.pdf, c_arm.csv and c_arm.svg")
       ->capture_default_str();
 
   auto* check = command->add_subcommand("check", "Compare a new case with what the record predicts");

@@ -65,7 +65,7 @@ RefusedError, with c_arm_changed where they lie beyond what the record predicts:
       "c_arm_report", &c_arm_report, py::arg("record"), py::kw_only(), py::arg("out") = py::none(),
       R"(Sag and repeatability of a C-arm by its record, and each acquisition beside the prediction by all others.
 
-out: a folder for report.html, c_arm.csv and c_arm.svg. Returns focal_mm and principal_mm with the standard deviations
+out: a folder for report.html, report.pdf, c_arm.csv and c_arm.svg. Returns focal_mm and principal_mm with the standard deviations
 smooth (over the positions) and repeat (in one position), and acquisitions. Raises InputError, RefusedError.)");
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <sstream>
 
 #include <fmt/format.h>
 
@@ -13,6 +14,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/report/chart.h"
 #include "helicarm/report/markup.h"
+#include "helicarm/report/pdf_document.h"
 
 namespace helicarm::report {
 namespace {
@@ -93,10 +95,12 @@ std::vector<Chart> charts_of(const CArmModel& model) {
   return charts;
 }
 
-std::string summary(const CArmModel& model, std::span<const AcquisitionCheck> left_out) {
+std::ptrdiff_t inside_95(std::span<const AcquisitionCheck> left_out) {
   constexpr double chi2_at_95 = 7.815;  // three degrees of freedom
-  const auto inside =
-      std::ranges::count_if(left_out, [](const AcquisitionCheck& a) { return a.chi2 < chi2_at_95; });
+  return std::ranges::count_if(left_out, [](const AcquisitionCheck& a) { return a.chi2 < chi2_at_95; });
+}
+
+std::string summary(const CArmModel& model, std::span<const AcquisitionCheck> left_out) {
   std::string html = "<div class=\"cards\">\n";
   const auto card = [&](const std::string& value, const std::string& what) {
     html += fmt::format("<div class=\"card\"><b>{}</b><span>{}</span></div>\n", value, what);
@@ -113,7 +117,8 @@ std::string summary(const CArmModel& model, std::span<const AcquisitionCheck> le
       card(fmt::format("{:.1f} to {:.1f} mm", found.at_positions->first[axis],
                        found.at_positions->second[axis]),
            std::string(intrinsic_titles[std::size_t(axis)]) + ", predicted at the recorded positions");
-  card(fmt::format("{} of {}", inside, left_out.size()), "inside the 95 % region predicted by all others");
+  card(fmt::format("{} of {}", inside_95(left_out), left_out.size()),
+       "inside the 95 % region predicted by all others");
   return html + "</div>\n";
 }
 
@@ -214,14 +219,31 @@ std::string c_arm_report_html(const CArmModel& model, std::span<const Acquisitio
       "from the image's centre.");
 }
 
+std::string c_arm_report_pdf(const CArmModel& model, std::span<const AcquisitionCheck> left_out) {
+  PdfDocument pdf("C-arm quality report",
+                  "helicarm " HELICARM_VERSION
+                  ", research instrument, not a medical device. Millimetres on the "
+                  "detector; focal: source distance; u0, v0: principal point from the "
+                  "image's centre");
+  std::istringstream lines(c_arm_text(model));
+  for (std::string line; std::getline(lines, line);) pdf.paragraph(line);
+  pdf.paragraph(fmt::format("{} of {} acquisitions lie inside the 95 % region predicted by all others.",
+                            inside_95(left_out), left_out.size()));
+  for (const Chart& chart : charts_of(model)) pdf.chart(chart);
+  pdf.table(c_arm_table(left_out));
+  pdf.blanks({"C-arm, serial number", "Measured by", "Checked by", "Date", "Signature"});
+  return pdf.bytes();
+}
+
 Expected<void> write_c_arm_report(const CArmModel& model, const std::filesystem::path& folder) {
   const std::vector<AcquisitionCheck> left_out = calibration::leave_one_out(model);
   const std::vector<Chart> charts = charts_of(model);
-  forget_files(folder, {"report.html", "c_arm.csv", "c_arm.svg"});
+  forget_files(folder, {"report.html", "report.pdf", "c_arm.csv", "c_arm.svg"});
   return write_file(folder / "c_arm.csv", c_arm_csv(left_out))
       .and_then([&] {
         return charts.empty() ? Expected<void>() : write_file(folder / "c_arm.svg", chart_svg(charts));
       })
+      .and_then([&] { return write_file(folder / "report.pdf", c_arm_report_pdf(model, left_out)); })
       .and_then([&] { return write_file(folder / "report.html", c_arm_report_html(model, left_out)); });
 }
 

@@ -32,8 +32,12 @@ Json to_json(const calibration::CArmCheck& check);
 std::string c_arm_report_html(const calibration::CArmModel& model,
                               std::span<const calibration::AcquisitionCheck> left_out);
 
-/// Writes report.html, c_arm.csv and c_arm.svg of a history into `folder`, without files of an earlier
-/// report.
+/// The same as PDF, with lines for date and signature.
+std::string c_arm_report_pdf(const calibration::CArmModel& model,
+                             std::span<const calibration::AcquisitionCheck> left_out);
+
+/// Writes report.html, report.pdf, c_arm.csv and c_arm.svg of a history into `folder`, without files of an
+/// earlier report.
 Expected<void> write_c_arm_report(const calibration::CArmModel& model, const std::filesystem::path& folder);
 
 }  // namespace helicarm::report

@@ -32,6 +32,10 @@ TEST(CArmReport, FilesHoldEveryAcquisition) {
   const std::string page = *read_file(folder.path() / "report.html", 1 << 24);
   EXPECT_THAT(page, HasSubstr("A&lt;B"));
   EXPECT_THAT(page, HasSubstr("<svg"));
+  const std::string pdf = *read_file(folder.path() / "report.pdf", 1 << 24);
+  EXPECT_TRUE(pdf.starts_with("%PDF-"));
+  EXPECT_THAT(pdf, HasSubstr("(A<B)"));
+  EXPECT_THAT(pdf, HasSubstr("(Signature)"));
   const std::string csv = *read_file(folder.path() / "c_arm.csv", 1 << 24);
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 5);
   EXPECT_THAT(csv, HasSubstr("A<B,2026-01-02,90,,1000.9"));
