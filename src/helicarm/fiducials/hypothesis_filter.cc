@@ -87,10 +87,11 @@ struct Support {
   const CandidateGrid& near;
   const Eigen::Vector2d& principal_px;
   const std::vector<Eigen::Vector3f>& balls;
+  int required;  ///< of balls near a candidate
 };
 
 /// Adds for each lane the balls that project near a candidate, in the pose and in its mirror image about the
-/// triangle's plane.
+/// triangle's plane; stops once no lane can reach the number required.
 template <class Simd, class Image, class Counts>
 void count_near(const ModelTriangles<Simd>& model, const Depths<Simd>& depths, const Image& image,
                 const Support& support, Counts& upright, Counts& mirrored) {
@@ -111,7 +112,15 @@ void count_near(const ModelTriangles<Simd>& model, const Depths<Simd>& depths, c
   const auto y = in_plane(lifted[0].y, lifted[1].y, image.at0.y() * distance);
   const auto z = in_plane(lifted[0].z, lifted[1].z, distance);
   const Simd normal_offset = own[2].dot(model.corners[0]);
+  constexpr int between_looks = 8;
+  int left = static_cast<int>(support.balls.size());
   for (const auto& ball : support.balls) {
+    if (left % between_looks == 0 && std::max(*std::max_element(upright.begin(), upright.end()),
+                                              *std::max_element(mirrored.begin(), mirrored.end())) +
+                                             left <
+                                         support.required)
+      return;
+    --left;
     const auto at = [&](const std::pair<LaneVector<Simd>, Simd>& row) -> Simd {
       return row.first.x * ball.x() + row.first.y * ball.y() + row.first.z * ball.z() + row.second;
     };
@@ -247,7 +256,7 @@ void HypothesisFilter::test(const Start* starts, int used, const Image& image, i
   settle(model, image, depths);
   std::array<int, width> upright{};
   std::array<int, width> mirrored{};
-  count_near(model, depths, image, {near_, scene_.camera.principal_px, balls_}, upright, mirrored);
+  count_near(model, depths, image, {near_, scene_.camera.principal_px, balls_, required}, upright, mirrored);
   for (int lane = 0; lane < used; ++lane) {
     if (depths.open[lane] > 0 ||
         std::max(std::abs(depths.behind1[lane]), std::abs(depths.behind2[lane])) >= deepest_corner)
