@@ -185,7 +185,7 @@ bool explains_more(const Labelling& loose, const Failure& without) {
 }
 
 /// The refusal with how many discs may be the calibrator's balls and how large these are, where most are
-/// missing: then this is why the labels cannot be told.
+/// missing, or where there are many more: then this is why the labels cannot be told.
 Failure with_found(Failure failure, std::size_t found, const phantom::Calibrator& calibrator,
                    const std::optional<double>& pixel_mm) {
   constexpr double most_found = 0.6;  // of the balls: with more, a labelling is usually certain
@@ -193,9 +193,18 @@ Failure with_found(Failure failure, std::size_t found, const phantom::Calibrator
                          failure.reason == Reason::calibrator_mismatch ||
                          failure.reason == Reason::too_few_fiducials;
   const std::size_t balls = calibrator.balls.size();
-  if (!of_labels || double(found) > most_found * double(balls)) return failure;
+  const bool are_many = found >= 2 * balls;
+  if (!of_labels || (double(found) > most_found * double(balls) && !are_many)) return failure;
   failure.figures["found"] = double(found);
   failure.figures["balls"] = double(balls);
+  if (are_many) {
+    failure.message = fmt::format(
+        "{} discs of the size of balls were found, and the calibrator's file states {} balls: if it has "
+        "more, "
+        "state them all (`helicarm phantom measure` measures them); {}",
+        found, balls, failure.message);
+    return failure;
+  }
   std::string size;
   if (pixel_mm) {
     const auto [least, most] =
