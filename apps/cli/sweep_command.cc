@@ -17,7 +17,10 @@ namespace helicarm::cli {
 struct SweepArguments {
   std::filesystem::path folder;  ///< holds case.json
   std::filesystem::path out = "helicarm-sweep";
-  std::string path;  ///< free, smooth; empty: by the images
+  std::string path;   ///< free, smooth; empty: by the images
+  std::string check;  ///< FDK; empty: none
+  std::optional<std::string> wire;
+  std::optional<std::filesystem::path> against;
 };
 namespace {
 
@@ -34,7 +37,31 @@ std::string summary_of(const sweep::Sweep& sweep) {
   if (path.stiffness)
     text += fmt::format("  jitter of an image: source {:.3f} mm, detector {:.3f} mm\n",
                         path.stiffness->jitter[0], path.stiffness->jitter[1]);
+  if (sweep.check)
+    if (const auto ratio = sweep.check->circle_ratio()) {
+      text += fmt::format("  reconstructed by {}: {} targets, {:.2f} times as wide with the ideal circle",
+                          sweep.check->program, sweep.check->targets.size(), *ratio);
+      if (const auto other = sweep.check->other_ratio())
+        text += fmt::format(", {:.2f} times with the other cameras", *other);
+      text += "\n";
+    }
   return text;
+}
+
+/// What is reconstructed; nothing without --check.
+std::optional<sweep::CheckOptions> check_options(const SweepArguments& arguments, unsigned threads) {
+  if (arguments.check.empty()) {
+    if (arguments.wire || arguments.against)
+      throw BadInput(Reason::usage, "sweep: --wire and --against require --check FDK");
+    return {};
+  }
+  if (arguments.check != "FDK" && arguments.check != "fdk")
+    throw BadInput(Reason::bad_value, fmt::format("--check: \"{}\" is not FDK", arguments.check));
+  sweep::CheckOptions options;
+  options.threads = threads;
+  if (arguments.wire) options.wire = value_or_throw(sweep::wire_from(*arguments.wire));
+  if (arguments.against) options.against = value_or_throw(exchange::import_cameras(*arguments.against));
+  return options;
 }
 
 }  // namespace
@@ -47,10 +74,18 @@ CommandResult sweep_command(const SweepArguments& arguments, Console& console) {
     sweep::SweepOptions options;
     if (!arguments.path.empty()) options.path = value_or_throw(sweep::path_kind(arguments.path));
     options.threads = console.threads;
+    const auto check = check_options(arguments, console.threads);
     const auto the_case = value_or_throw(sweep::read_sweep_case(arguments.folder));
-    ProgressLine progress(console);
-    const sweep::Sweep result =
-        value_or_throw(sweep::run_sweep(the_case, options, [&](double share) { progress.notify(share); }));
+    sweep::Sweep result = [&] {
+      ProgressLine progress(console);
+      return value_or_throw(
+          sweep::run_sweep(the_case, options, [&](double share) { progress.notify(share); }));
+    }();
+    if (check) {
+      ProgressLine progress(console);
+      value_or_throw(
+          sweep::add_check(result, the_case, *check, [&](double share) { progress.notify(share); }));
+    }
     value_or_throw(sweep::write_sweep(result, arguments.out));
     print_warnings(result.warnings, console);
     if (console.json) {
@@ -90,6 +125,19 @@ void add_sweep(CLI::App& app, Action& action) {
                    "smooth: all images lie on one curve, or free: each alone (default: smooth for 16 or more "
                    "images of one run)")
       ->type_name("WORD");
+  command
+      ->add_option("--check", a.check,
+                   "FDK: reconstruct balls, and a wire, with these cameras and with the ideal circle, and "
+                   "compare their widths at half maximum (program plastimatch, left out where it is missing)")
+      ->type_name("WORD");
+  command
+      ->add_option("--wire", a.wire,
+                   "check: ends of a straight wire in the images, \"x,y,z;x,y,z\" in mm, calibrator frame "
+                   "(default: a line_end of the calibrator's file)")
+      ->type_name("TEXT");
+  command->add_option("--against", a.against,
+                      "check: cameras of another program, in the calibrator's frame, compared too; a file as "
+                      "`import` reads it");
 }
 
 }  // namespace helicarm::cli

@@ -40,6 +40,7 @@ class Sweep(SimulatedCase):
         self.assertEqual(answer, json.loads((out / "sweep.json").read_text()))
         self.assertEqual((answer["format"], answer["status"]), ("helicarm-sweep/1", "ok"))
         self.assertIn(answer["frames"][0]["decision"], ("accept", "warn"))
+        self.assertEqual((out / "frames.csv").read_text().count("\n"), 2)
         for name in ("rtk.xml", "tigre.json", "leap.json", "astra.txt", "matrices.ompl", "matrices.csv", "matrices.npy",
                      "plastimatch/0001.txt"):
             self.assertTrue((out / "geometry" / name).exists(), name)
@@ -47,6 +48,14 @@ class Sweep(SimulatedCase):
         self.assertEqual(run("sweep", blank, "--out", out).returncode, 3)
         self.assertEqual(json.loads((out / "sweep.json").read_text())["status"], "refused")
         self.assertFalse((out / "geometry").exists())
+
+    def test_options_of_a_check_are_refused_before_the_run_is_read(self):
+        for options, reason in ((["--check", "ART"], "is not FDK"), (["--wire", "0,0,0;0,0,9"], "require --check FDK"),
+                                (["--check", "FDK", "--wire", "0,0,0"], "is not x,y,z;x,y,z"),
+                                (["--check", "FDK", "--against", self.root / "none.csv"], "none.csv")):
+            done = run("sweep", self.root / "no-case", "--out", self.root / "no-out", *options)
+            self.assertEqual(done.returncode, 2, options)
+            self.assertIn(reason, done.stderr)
 
     def test_a_run_without_any_usable_image_is_refused(self):
         done = run("sweep", self.case_of("blank", "all"), "--out", self.root / "blank-out")

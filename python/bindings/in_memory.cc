@@ -134,7 +134,9 @@ py::object register_given(const std::vector<std::pair<std::string, py::dict>>& m
 
 sweep::Sweep sweep_images(const std::vector<ImagePointer>& images, const phantom::Calibrator& calibrator,
                           const std::optional<phantom::Plate>& plate, std::optional<bool> mirrored,
-                          const std::optional<std::string>& path, unsigned threads,
+                          const std::optional<std::string>& path, const std::optional<std::string>& check,
+                          const std::optional<std::array<std::array<double, 3>, 2>>& wire,
+                          const std::optional<std::filesystem::path>& against, unsigned threads,
                           const py::object& progress) {
   constexpr std::size_t most_images = 1000;
   if (images.empty() || images.size() > most_images)
@@ -161,7 +163,8 @@ sweep::Sweep sweep_images(const std::vector<ImagePointer>& images, const phantom
     the_case.frames.push_back(std::move(frame));
   }
   the_case.files[run.image] = value_or_raise(xray::ImageFile::of(std::move(frames)));
-  return run_sweep([&] { return Expected<sweep::SweepCase>(std::move(the_case)); }, path, threads, progress);
+  return run_sweep([&] { return Expected<sweep::SweepCase>(std::move(the_case)); }, path,
+                   check_options(check, wire, against, threads), threads, progress);
 }
 
 }  // namespace
@@ -175,8 +178,9 @@ void add_in_memory(py::module_& module) {
              py::arg("threads") = usual.run.threads, py::arg("progress") = py::none());
   const sweep::SweepOptions free;
   module.def("_sweep_images", &sweep_images, py::arg("images"), py::arg("calibrator"), py::arg("plate"),
-             py::arg("mirrored"), py::kw_only(), py::arg("path") = py::none(),
-             py::arg("threads") = free.threads, py::arg("progress") = py::none());
+             py::arg("mirrored"), py::kw_only(), py::arg("path") = py::none(), py::arg("check") = py::none(),
+             py::arg("wire") = py::none(), py::arg("against") = py::none(), py::arg("threads") = free.threads,
+             py::arg("progress") = py::none());
 }
 
 }  // namespace helicarm::python

@@ -13,9 +13,14 @@ namespace {
 
 constexpr double absent = std::numeric_limits<double>::quiet_NaN();
 
+using Ends = std::array<std::array<double, 3>, 2>;
+
 sweep::Sweep swept(const std::filesystem::path& folder, const std::optional<std::string>& path,
-                   unsigned threads, const py::object& progress) {
-  return run_sweep([&] { return sweep::read_sweep_case(folder); }, path, threads, progress);
+                   const std::optional<std::string>& check, const std::optional<Ends>& wire,
+                   const std::optional<std::filesystem::path>& against, unsigned threads,
+                   const py::object& progress) {
+  return run_sweep([&] { return sweep::read_sweep_case(folder); }, path,
+                   check_options(check, wire, against, threads), threads, progress);
 }
 
 /// (n, rows, columns), NaN where a frame is refused.
@@ -88,6 +93,9 @@ void add_sweep(py::module_& module) {
                 s, 3, 3, [](const CalibratedView& view) { return calibration::source_covariance(view); });
           },
           "(n, 3, 3): mm^2.")
+      .def_property_readonly(
+          "check", [](const sweep::Sweep& s) { return python_from(sweep::to_json(s)["check"]); },
+          "Widths in a reconstruction, as in sweep.json; None without it.")
       .def(
           "to_dict", [](const sweep::Sweep& s) { return python_from(sweep::to_json(s)); },
           "The content of sweep.json.")
@@ -110,11 +118,14 @@ void add_sweep(py::module_& module) {
   const sweep::SweepOptions usual;
   module.def(
       "sweep", &swept, py::arg("folder"), py::kw_only(), py::arg("path") = py::none(),
+      py::arg("check") = py::none(), py::arg("wire") = py::none(), py::arg("against") = py::none(),
       py::arg("threads") = usual.threads, py::arg("progress") = py::none(),
       R"(Calibrates every image of a rotation or tomosynthesis and all of them on one path, as `helicarm sweep` does.
 
 folder: holds case.json, whose view has "frames". path: "smooth", "free" or None (smooth for 16 or more images of one
-run). progress: called with the share of the images that are done; an exception from it ends the run, and Ctrl-C does.
+run). check: "FDK" reconstructs balls and a wire with plastimatch, with these cameras and with the ideal circle: .check;
+where it is not possible a warning says why. wire: its two ends, mm, calibrator frame. against: file of another program's
+cameras, compared too. progress: called with the share of the images that are done; an exception from it ends the run, and Ctrl-C does.
 Releases the GIL. Returns a Sweep.
 Raises InputError; RefusedError with .result if the run as a whole is refused.)");
 }

@@ -83,6 +83,16 @@ def test_cameras_are_arrays(run, tmp_path):
     assert np.array_equal(array, sweep.projections[[0, 1, 3]])
 
 
+def test_a_check_that_is_not_possible_is_a_warning(run):
+    sweep = helicarm.sweep(run, check="FDK", wire=((0, 0, -20), (0, 0, 20)))
+    assert sweep.check is None and sweep.to_dict()["check"] is None
+    assert "left out" in sweep.warnings[-1]["message"]  # no plastimatch, or 24 degrees
+    with pytest.raises(helicarm.InputError, match="ART"):
+        helicarm.sweep(run, check="ART")
+    with pytest.raises(helicarm.InputError, match="check"):
+        helicarm.sweep(run, wire=((0, 0, -20), (0, 0, 20)))
+
+
 def test_a_case_of_a_run_names_the_function_for_it(run):
     with pytest.raises(helicarm.InputError, match="helicarm sweep"):
         helicarm.run_case(run)

@@ -8,6 +8,7 @@
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/pipeline/stages.h"
 #include "helicarm/pipeline/view_image.h"
+#include "helicarm/rectification/rectify.h"
 #include "helicarm/rectification/usable.h"
 #include "helicarm/xray/sidecar.h"
 
@@ -74,6 +75,23 @@ void estimate_from(FrameEstimate& estimate, const Frame& frame, xray::XrayImage 
 }
 
 }  // namespace
+
+Expected<xray::XrayImage> rectified_image_of(const Frame& frame, const SweepCase& the_case) {
+  return guarded([&] {
+    const auto file = the_case.files.find(frame.view.image);
+    xray::XrayImage image = image_of(frame, file == the_case.files.end() ? nullptr : file->second.get());
+    if (!the_case.base.plate && !frame.view.map && !frame.view.plate_image) return image;
+    pipeline::RunOptions options;
+    options.threads = 1;
+    pipeline::Case one = the_case.base;
+    one.views = {frame.view};
+    auto shared = std::make_shared<const xray::XrayImage>(image);
+    auto detected = passed(pipeline::detect_in_views({{{frame.view.name}, std::move(shared)}}, one, options));
+    const auto rectified = passed(pipeline::rectify_views(std::move(detected), one, options));
+    image.pixels = rectification::resample(image, rectified.front().rectification.map);
+    return image;
+  });
+}
 
 Expected<void> calibrate_alone(FrameEstimate& estimate, const pipeline::Case& base) {
   calibration::CalibrationOptions options;

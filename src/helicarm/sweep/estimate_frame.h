@@ -35,6 +35,10 @@ Expected<FrameEstimate> estimate_frame(const Frame& frame, const xray::ImageFile
                                        const pipeline::Case& base, const pipeline::RunOptions& options,
                                        const std::optional<fiducials::ExpectedView>& expected = {});
 
+/// The frame's image with rectified pixels, as its camera has them. Fails as `estimate_frame`, or with why it
+/// cannot be rectified.
+Expected<xray::XrayImage> rectified_image_of(const Frame& frame, const SweepCase& the_case);
+
 /// Sets `alone`, residuals and rejections of labelled fiducials, by their image alone. Fails as
 /// `calibration::calibrate`.
 Expected<void> calibrate_alone(FrameEstimate& estimate, const pipeline::Case& base);

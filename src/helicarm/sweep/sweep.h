@@ -11,6 +11,7 @@
 #include "helicarm/calibration/c_arm_history.h"
 #include "helicarm/pipeline/result.h"
 #include "helicarm/sweep/path.h"
+#include "helicarm/sweep/reconstruction_check.h"
 #include "helicarm/sweep/sweep_case.h"
 
 namespace helicarm::sweep {
@@ -62,7 +63,8 @@ struct Sweep {
   std::vector<SweepFrame> frames;
   std::optional<SweepPath> path;
   std::vector<calibration::HistoryEntry>
-      acquisitions;         ///< for the C-arm's record: of up to 40 frames, evenly spaced
+      acquisitions;                          ///< for the C-arm's record: of up to 40 frames, evenly spaced
+  std::optional<ReconstructionCheck> check;  ///< where it was asked for and possible
   double noise_factor = 1;  ///< of the fiducials' standard deviations, by all frames' residuals
   double seconds = 0;
 };
@@ -71,6 +73,11 @@ struct Sweep {
 /// refusal of the run or of a frame is in the result. `progress`: share of the images that are done.
 Expected<Sweep> run_sweep(const SweepCase& the_case, const SweepOptions& options = {},
                           const std::function<void(double share)>& progress = {});
+
+/// Sets `check`, or a warning that says why it is left out: no such program, too small an arc, no ball free.
+/// Fails as `check_reconstruction` otherwise. A refused run stays as it is.
+Expected<void> add_check(Sweep& sweep, const SweepCase& the_case, const CheckOptions& options,
+                         const std::function<void(double share)>& progress = {});
 
 /// sweep.json (docs/formats.md).
 Json to_json(const Sweep& sweep);
@@ -81,7 +88,8 @@ Json sweep_schema();
 /// report.html as one page.
 std::string sweep_report(const Sweep& sweep);
 
-/// Writes sweep.json, geometry/ and report.html into the folder. A refused run has no geometry/.
+/// Writes sweep.json, geometry/, frames.csv, report.html and of a check check.csv into the folder. A refused run has no
+/// geometry/.
 Expected<void> write_sweep(const Sweep& sweep, const std::filesystem::path& folder);
 
 /// Removes what `write_sweep` wrote into the folder earlier.

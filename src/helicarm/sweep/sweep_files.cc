@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/csv.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/exchange/run_geometry.h"
@@ -49,6 +50,54 @@ std::vector<std::string> plastimatch_files(const std::filesystem::path& folder) 
   return names;
 }
 
+std::string csv_number(const std::optional<double>& value) {
+  return value ? fmt::format(",{:.9g}", *value) : ",";
+}
+
+std::string csv_vector(const std::optional<Eigen::Vector3d>& values) {
+  std::string fields;
+  for (Eigen::Index k = 0; k < 3; ++k)
+    fields += csv_number(values ? std::optional((*values)[k]) : std::nullopt);
+  return fields;
+}
+
+/// Of the path, or of the image's own camera: source, detector, rotation.
+std::string csv_deviation(const std::optional<CameraVector>& deviation) {
+  if (!deviation) return std::string(9, ',');
+  const Eigen::Vector3d rotation_deg = deviation->segment<3>(6) * (180 / EIGEN_PI);
+  return csv_vector(Eigen::Vector3d(deviation->head<3>())) +
+         csv_vector(Eigen::Vector3d(deviation->segment<3>(3))) + csv_vector(rotation_deg);
+}
+
+/// The report's curves: a line per image.
+std::string frames_csv(const Sweep& sweep) {
+  std::string csv =
+      "frame,view,code,primary_deg,secondary_deg,path_angle_deg,fiducials_used,reprojection_rms_px,off_path_"
+      "sigma,source_x_mm,source_y_mm,source_z_mm,source_x_sigma_mm,source_y_sigma_mm,source_z_sigma_mm";
+  for (const char* of : {"path", "own"})
+    for (const char* what : {"source_{}_mm", "detector_{}_mm", "rotation_{}_deg"})
+      for (const char* axis : {"u", "v", "w"})
+        csv += fmt::format(",{}_", of) + fmt::format(fmt::runtime(what), axis);
+  csv += "\n";
+  for (const SweepFrame& frame : sweep.frames) {
+    csv += fmt::format("{},{},{}", frame.number, csv_field(frame.view),
+                       frame.failure ? code(frame.failure->reason) : "");
+    csv += csv_number(frame.primary_angle_deg) + csv_number(frame.secondary_angle_deg) +
+           csv_number(frame.path_angle_deg) + fmt::format(",{}", frame.fiducials_used);
+    std::optional<double> rms;
+    std::optional<Eigen::Vector3d> source, sigma;
+    if (frame.best) {
+      rms = frame.best->reprojection_rms_px;
+      source = frame.best->view.source_in_world();
+      sigma = calibration::source_covariance(*frame.best).diagonal().cwiseSqrt();
+    }
+    csv += csv_number(rms) + csv_number(frame.off_path_sigma) + csv_vector(source) + csv_vector(sigma) +
+           csv_deviation(frame.best ? frame.flex : std::nullopt) +
+           csv_deviation(frame.best ? frame.own : std::nullopt) + "\n";
+  }
+  return csv;
+}
+
 void remove_if_empty(const std::filesystem::path& folder) {
   std::error_code ignored;
   if (std::filesystem::is_directory(folder, ignored) && std::filesystem::is_empty(folder, ignored))
@@ -65,7 +114,7 @@ void forget_sweep(const std::filesystem::path& folder) {
   forget_files(plastimatch, plastimatch_files(plastimatch));
   remove_if_empty(plastimatch);
   remove_if_empty(folder / "geometry");
-  forget_files(folder, std::vector<std::string>{"report.html", "sweep.json"});
+  forget_files(folder, std::vector<std::string>{"check.csv", "frames.csv", "report.html", "sweep.json"});
 }
 
 Expected<void> write_sweep(const Sweep& sweep, const std::filesystem::path& folder) {
@@ -78,6 +127,8 @@ Expected<void> write_sweep(const Sweep& sweep, const std::filesystem::path& fold
         value_or_throw(write_file(folder / "geometry" / "plastimatch" / plastimatch_name(i),
                                   exchange::plastimatch_matrix(run.images[i].view, run.pixel_mm)));
     }
+    value_or_throw(write_file(folder / "frames.csv", frames_csv(sweep)));
+    if (sweep.check) value_or_throw(write_file(folder / "check.csv", check_csv(*sweep.check)));
     value_or_throw(write_file(folder / "report.html", sweep_report(sweep)));
     value_or_throw(write_file(folder / "sweep.json", to_text(to_json(sweep)) + "\n"));
   });

@@ -140,6 +140,26 @@ void describe_path(Output& output, const SweepPath& path, const Sweep& sweep) {
 }
 
 template <class Output>
+void describe_check(Output& output, const ReconstructionCheck& check) {
+  output.value("program", check.program, "its version");
+  output.value("images", check.images, "number used");
+  output.value(
+      "circle_ratio", [&] { return check.circle_ratio(); },
+      "width by the ideal circle over that by these cameras, median of the targets");
+  output.value(
+      "other_ratio", [&] { return check.other_ratio(); }, "likewise by the other program's cameras");
+  output.list("targets", check.targets, "balls and wire", [](auto& row, const CheckedTarget& target) {
+    row.value("name", target.name, "label of the ball, or `wire`");
+    row.value("diameter_mm", target.diameter_mm, "of a ball, by the calibrator's file");
+    row.value("width_mm", target.own.width_mm, "at half maximum; `null`: not distinct from its surroundings");
+    row.value("circle_width_mm", target.circle.width_mm, "likewise by the ideal circle");
+    row.value(
+        "other_width_mm", [&] { return target.other ? target.other->width_mm : std::nullopt; },
+        "likewise by the other program's cameras; `null` without them");
+  });
+}
+
+template <class Output>
 void describe_sweep(Output& output, const Sweep& sweep) {
   output.value("format", "helicarm-sweep/1", "");
   pipeline::describe_verdict(output, sweep.failure);
@@ -160,6 +180,8 @@ void describe_sweep(Output& output, const Sweep& sweep) {
   output.value(
       "acquisitions", [&] { return calibration::acquisitions_json(sweep.acquisitions); },
       "as in [result.json](#resultjson), of up to 40 images, evenly spaced over the run");
+  output.object_of("check", sweep.check, "of `--check FDK`, widths in a reconstruction; `null` without it",
+                   [](auto& row, const ReconstructionCheck& check) { describe_check(row, check); });
   output.value("seconds", sweep.seconds, "wall-clock time");
   output.value("version", HELICARM_VERSION, "of the program");
 }

@@ -136,10 +136,11 @@ std::string findings(const Sweep& sweep) {
 }  // namespace
 
 std::string sweep_report(const Sweep& sweep) {
-  return report::page_html(
-      "helicarm sweep", "Geometry of a run",
-      summary(sweep) + findings(sweep) + charts(sweep) + worst_frames(sweep) + refused_frames(sweep),
-      ". Millimetres, degrees and pixels.");
+  return report::page_html("helicarm sweep", "Geometry of a run",
+                           summary(sweep) + findings(sweep) + charts(sweep) +
+                               (sweep.check ? check_html(*sweep.check) : std::string()) +
+                               worst_frames(sweep) + refused_frames(sweep),
+                           ". Millimetres, degrees and pixels.");
 }
 
 }  // namespace helicarm::sweep
