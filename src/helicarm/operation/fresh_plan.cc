@@ -40,34 +40,21 @@ PlanBasis Operation::basis_of(const OperationTunnel& tunnel, const PoseWindow& w
           present.base_from_tcp};
 }
 
-const Operation::Planned& Operation::planned(const robot::RobotOrder& order) const {
-  const auto found = planned_.find(order.name);
-  if (found == planned_.end())
-    throw BadInput(Reason::usage, order.name + ": was not planned in this operation; plan it first");
-  return found->second;
-}
-
 Expected<PlanWatch> Operation::plan_watch(const robot::RobotOrder& order) const {
-  return guarded([&] { return planned(order).watch; });
+  return gate_.planned(order.name).map([](const PlannedOrder& planned) { return planned.watch; });
 }
 
 Expected<void> Operation::check_plan(const robot::RobotOrder& order) {
   return guarded([&] {
     value_or_throw(recorded());
-    check_registered(tunnel_named(order.name));
-    const Planned& plan = planned(order);
-    if (plan.order != to_text(robot::to_json(order)))
-      throw BadInput(
-          Reason::plan_stale,
-          order.name + ": is not the last plan to this tunnel: confirm the last one or plan again");
-    if (plan.stale) throw BadInput(*plan.stale);
-    const auto holds = plan.watch.holds(board_, robot().track(), tracker::monotonic_seconds());
-    if (!holds && holds.error().reason == Reason::plan_stale) {
-      planned_.at(order.name).stale = holds.error();
+    const bool was_stale = gate_.is_stale(order.name);
+    const auto may = gate_.may_move(order, tunnel_named(order.name), board_, robot().track(),
+                                    tracker::monotonic_seconds());
+    if (!was_stale && gate_.is_stale(order.name)) {
       in_place_.clear();  // what moved may be a marker on its bone
-      record_halt(order, holds.error());
+      record_halt(order, may.error());
     }
-    value_or_throw(holds);
+    value_or_throw(may);
   });
 }
 

@@ -41,41 +41,37 @@ void check_in_tunnel(const Guidance& now) {
 Expected<void> Operation::guide(const std::string& name, std::optional<double> oldest) {
   return guarded([&] {
     const double oldest_pose_s = oldest.value_or(plan_.tracker.oldest_pose_s());
-    guide_.reset();
-    guided_.reset();
+    gate_.end_guidance();
     const OperationTunnel& tunnel = tunnel_named(name);
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
       throw BadInput(Reason::usage, missing.front() + ": touch this check point first");
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");
-    check_registered(tunnel);
+    value_or_throw(gate_.check_registered(tunnel));
     notify_(Step::navigate, name);
     const PoseWindow window = look(record::Look::guide);
     if (tunnel.of_model)
       value_or_throw(check_error_at_tip(plan_, tunnel, *result_,
                                         value_or_throw(poses_now(window, plan_.tracker)), tool()));
     record(record::Guide{name, oldest_pose_s, window});
-    guide_ =
-        value_or_throw(FreehandGuide::begin(plan_, value_or_throw(live_tool()), name,
-                                            value_or_throw(poses_now(window, plan_.tracker)), oldest_pose_s));
+    gate_.guide(value_or_throw(FreehandGuide::begin(plan_, value_or_throw(live_tool()), name,
+                                                    value_or_throw(poses_now(window, plan_.tracker)),
+                                                    oldest_pose_s)));
   });
 }
 
 Expected<Guidance> Operation::guidance() {
   return guarded([&] {
-    if (!guide_) throw BadInput(Reason::usage, "no tunnel is guided; begin with a tunnel of the plan");
+    if (!gate_.guide()) throw BadInput(Reason::usage, "no tunnel is guided; begin with a tunnel of the plan");
     if (const auto whole = recorded(); !whole) {
-      guide_.reset();
+      gate_.end_guidance();
       throw BadInput(whole.error());
     }
-    const PoseWindow recent = guide_->recent(board_, tracker::monotonic_seconds());
-    Guidance now = guide_->at(recent);
-    const bool is_stale = guided_ && guided_->decision() == code(Reason::plan_stale);
-    if (is_stale) {
-      now.why_not = guided_->why_not;
-    } else if (!guided_ || guided_->decision() != now.decision()) {
-      record(record::Guided{guide_->tunnel().name, recent, now});
+    const PoseWindow recent = gate_.guide()->recent(board_, tracker::monotonic_seconds());
+    const Guidance now = gate_.guidance(recent);
+    if (gate_.is_new(now)) {
+      record(record::Guided{gate_.guide()->tunnel().name, recent, now});
       if (now.decision() == code(Reason::plan_stale)) in_place_.clear();
-      guided_ = now;
+      gate_.shown(now);
     }
     return now;
   });
@@ -86,9 +82,9 @@ Expected<TunnelOutcome> Operation::verify_drilled(const std::string& name) {
     const OperationTunnel& tunnel = tunnel_named(name);
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");
     if (!plan_.drill) throw BadInput(Reason::usage, "the plan has no hand-held drill");
-    check_registered(tunnel);
-    if (guide_) check_in_tunnel(value_or_throw(guidance()));
-    guide_.reset();
+    value_or_throw(gate_.check_registered(tunnel));
+    if (gate_.guide()) check_in_tunnel(value_or_throw(guidance()));
+    gate_.end_guidance();
     in_place_.clear();
     notify_(Step::verify, name);
     return check(tunnel);

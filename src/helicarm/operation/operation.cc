@@ -145,7 +145,7 @@ pipeline::Result Operation::run(const guidance::Poses& now,
   by_images_ = value_or_throw(measure_by_plan(the_case, plan_, by_images_));
   if (by_images_->calibration != earlier || !earlier) ++calibrations_;
   pipeline::Result result = *by_images_;
-  if (registration_confirmed_ && !result.failure)
+  if (gate_.is_confirmed() && !result.failure)
     result = value_or_throw(with_registration(result, *registration_, plan_, the_case, of_models));
   const Digests written = value_or_throw(write_result(result, the_case.folder));
   value_or_throw(check_digests(the_case.folder, files));
@@ -234,7 +234,7 @@ Expected<robot::RobotOrder> Operation::plan_order(const std::string& name) {
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
       throw BadInput(Reason::usage, fmt::format("{}: touch this check point first", missing.front()));
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");
-    check_registered(tunnel);
+    value_or_throw(gate_.check_registered(tunnel));
     if (!hand_eye_) throw BadInput(Reason::usage, "the robot is not registered; register it first");
     notify_(Step::plan, name);
     const PoseWindow window = look(record::Look::plan);
@@ -245,9 +245,8 @@ Expected<robot::RobotOrder> Operation::plan_order(const std::string& name) {
     value_or_throw(refuse_moved_base(*hand_eye_, basis, present, plan_.limits));
     robot::RobotOrder order =
         value_or_throw(tunnel_order(plan_, tunnel, *result_, *hand_eye_, now, present.joints));
-    planned_.insert_or_assign(name, Planned{to_text(robot::to_json(order)),
-                                            target_in_bone(order, tunnel.bone, now, *hand_eye_),
-                                            {plan_.limits, plan_.tracker, basis}});
+    gate_.plan(name, {to_text(robot::to_json(order)), target_in_bone(order, tunnel.bone, now, *hand_eye_),
+                      PlanWatch(plan_.limits, plan_.tracker, basis)});
     record(record::Robot{present.joints});
     record(record::Order::of(order));
     draw_preview(order);
@@ -292,7 +291,8 @@ Expected<PathPreview> Operation::preview(const robot::RobotOrder& order) const {
     PathPreview preview;
     const OperationTunnel& tunnel = tunnel_named(order.name);
     const geometry::RigidTransform bone_from_base =
-        planned_.at(order.name).bone_from_target * order.waypoints.back().base_from_tcp.inverse();
+        value_or_throw(gate_.planned(order.name)).bone_from_target *
+        order.waypoints.back().base_from_tcp.inverse();
     std::vector<Eigen::Vector3d> tips_in_bone;
     for (std::size_t i = 1; i < order.waypoints.size(); ++i) {
       const Eigen::Vector3d from = order.waypoints[i - 1].base_from_tcp.translation;
@@ -320,7 +320,7 @@ Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std:
   return guarded([&] {
     const OperationTunnel& tunnel = tunnel_named(order.name);
     value_or_throw(check_plan(order));
-    Planned& plan = planned_.at(order.name);
+    const PlannedOrder plan = value_or_throw(gate_.planned(order.name));
     in_place_.clear();
     notify_(Step::navigate, order.name);
     const robot::Measure measure = [&] {
@@ -330,7 +330,7 @@ Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std:
       });
     };
     const auto loop = guarded([&] { return carry_out(order, token, measure, in_place(plan.watch)); });
-    if (!loop && loop.error().reason == Reason::plan_stale) plan.stale = loop.error();
+    if (!loop && loop.error().reason == Reason::plan_stale) gate_.found_stale(order.name, loop.error());
     value_or_throw(loop);
     record(record::Navigated{order.name, *loop});
     notify_(Step::verify, order.name);

@@ -15,6 +15,7 @@
 #include "helicarm/devices/robot/robot_link.h"
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/freehand.h"
+#include "helicarm/operation/guidance_gate.h"
 #include "helicarm/operation/image_delays.h"
 #include "helicarm/operation/live_tool.h"
 #include "helicarm/operation/orders.h"
@@ -182,13 +183,6 @@ class Operation {
     guidance::Poses poses;
   };
 
-  struct Planned {
-    std::string order;  ///< its text, which the confirmation must match
-    geometry::RigidTransform bone_from_target;
-    PlanWatch watch;
-    std::optional<Failure> stale = {};  ///< set when first found stale
-  };
-
   Operation(OperationPlan plan, std::filesystem::path folder, const tracker::PoseBoard& board,
             robot::RobotLink* robot, Notify notify)
       : plan_(std::move(plan)),
@@ -224,7 +218,6 @@ class Operation {
   void notify_once(const std::string& warning);
 
   // register_plan_models.cc
-  void check_registered(const OperationTunnel& tunnel) const;
   void forget_registration();
 
   // fresh_plan.cc, plan_again.cc
@@ -232,7 +225,6 @@ class Operation {
   robot::Watch in_place(PlanWatch watch) const;
   PlanBasis basis_of(const OperationTunnel& tunnel, const PoseWindow& window,
                      const robot::RobotState& present) const;
-  const Planned& planned(const robot::RobotOrder& order) const;
   bool answers_again() const;
 
   OperationPlan plan_;
@@ -256,14 +248,10 @@ class Operation {
   std::optional<pipeline::Case> measured_case_;  ///< of the last measurement, not of a verification
   std::optional<case_registration::CaseRegistration> registration_;  ///< of `measured_`
   std::string registered_digest_;
-  bool registration_confirmed_ = false;
-  bool was_registered_ = false;  ///< earlier images were
   std::optional<pipeline::Result> result_, newest_result_;
   std::optional<tracker::HandEye> hand_eye_;
-  std::map<std::string, Planned> planned_;  ///< by tunnel
-  std::map<std::string, int> replans_;      ///< by order
-  std::optional<FreehandGuide> guide_;
-  std::optional<Guidance> guided_;  ///< the last recorded decision
+  GuidanceGate gate_;
+  std::map<std::string, int> replans_;  ///< by order
 };
 
 }  // namespace helicarm::operation

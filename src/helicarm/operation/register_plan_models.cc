@@ -57,54 +57,30 @@ Expected<void> Operation::register_models() {
     registered_digest_ = xray::digest(to_text(operation::recorded(found)));
     record(record::Registered{folder, registered_digest_, files});
     registration_ = std::move(found);
-    if (const auto refusal = refusal_of(*registration_)) throw BadInput(*refusal);
+    const auto refusal = refusal_of(*registration_);
+    gate_.registered(refusal);
+    if (refusal) throw BadInput(*refusal);
   });
 }
 
 Expected<void> Operation::confirm_registration() {
   return guarded([&] {
-    if (!registration_)
-      throw BadInput(Reason::usage, "no registration to confirm; register the models first");
-    if (const auto refusal = refusal_of(*registration_)) throw BadInput(*refusal);
-    if (registration_confirmed_) return;
+    value_or_throw(gate_.confirmable());
+    if (gate_.is_confirmed()) return;
     pipeline::Result with_models =
         value_or_throw(with_registration(*result_, *registration_, plan_, *measured_case_));
     if (with_models.failure) throw BadInput(*with_models.failure);
     record(record::RegistrationConfirmed{registered_digest_, who_});
-    registration_confirmed_ = true;
+    value_or_throw(gate_.confirm());
     result_ = newest_result_ = std::move(with_models);
   });
 }
 
-void Operation::check_registered(const OperationTunnel& tunnel) const {
-  if (!tunnel.of_model || registration_confirmed_) return;
-  if (registration_)
-    throw BadInput(Reason::registration_not_confirmed,
-                   fmt::format("{}: the registration of \"{}\" is not confirmed: look at its overlays, and "
-                               "confirm that the outline follows the bone in every view",
-                               tunnel.name, tunnel.of_model->model));
-  if (was_registered_)
-    throw BadInput(
-        Reason::registration_stale,
-        fmt::format("{}: images or picks were taken again since \"{}\" was registered: register the "
-                    "models again",
-                    tunnel.name, tunnel.of_model->model));
-  throw BadInput(Reason::registration_not_confirmed,
-                 fmt::format("{}: \"{}\" is not registered: register the models first", tunnel.name,
-                             tunnel.of_model->model));
-}
-
 /// What was planned to the models' tunnels ends with their registration.
 void Operation::forget_registration() {
-  was_registered_ = was_registered_ || registration_.has_value();
   registration_.reset();
-  registration_confirmed_ = false;
   registered_digest_.clear();
-  for (const OperationTunnel& tunnel : plan_.tunnels)
-    if (tunnel.of_model) {
-      planned_.erase(tunnel.name);
-      if (guide_ && guide_->tunnel().name == tunnel.name) guide_.reset(), guided_.reset();
-    }
+  gate_.forget_registration(plan_.tunnels);
 }
 
 }  // namespace helicarm::operation
