@@ -47,6 +47,7 @@ Json to_json(std::span<const Rehearsal> rehearsals) {
                       {"name", end.name},
                       {"true_mm", end.true_mm},
                       {"measured_mm", end.measured_mm},
+                      {"off_mm", end.off_mm},
                       {"predicted_mm", end.predicted_mm},
                       {"covered", end.covered},
                       {"in_xrays_mm", end.in_xrays_mm ? Json(*end.in_xrays_mm) : Json()}});

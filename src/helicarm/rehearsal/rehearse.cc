@@ -70,7 +70,8 @@ EndError end_error(const std::string& name, const operation::EndMiss& miss,
           miss.distance_mm(),
           miss.predicted_mm(),
           off.dot(miss.covariance.inverse() * off) <= chi2_95_of_two,
-          in_xrays ? std::optional(in_xrays->combined_mm) : std::nullopt};
+          in_xrays ? std::optional(in_xrays->combined_mm) : std::nullopt,
+          off.norm()};
 }
 
 /// Acquires an image; repeats where a busy machine delayed the tracker.

@@ -29,6 +29,7 @@ struct EndError {
   double predicted_mm;                ///< predicted root mean square
   bool covered;                       ///< the 95 % ellipse of the measured position contains the true one
   std::optional<double> in_xrays_mm;  ///< Eq. 17 at the point's depth; empty if not computed
+  double off_mm = 0;                  ///< of the measured position from the true one, across the tool's axis
 };
 
 struct Rehearsal {
