@@ -123,3 +123,15 @@ function(helicarm_module name)
     endforeach()
   endif()
 endfunction()
+
+# Adds the unit of cmake/commit.cmake to a program, which states it in program_commit().
+function(helicarm_with_commit target)
+  set(unit ${PROJECT_BINARY_DIR}/commit.cc)
+  if(NOT TARGET helicarm_commit)
+    add_custom_target(helicarm_commit BYPRODUCTS ${unit} VERBATIM COMMAND ${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR}
+                      -DOUT=${unit} -P ${PROJECT_SOURCE_DIR}/cmake/commit.cmake)
+  endif()
+  set_source_files_properties(${unit} PROPERTIES GENERATED ON SKIP_UNITY_BUILD_INCLUSION ON SKIP_PRECOMPILE_HEADERS ON)
+  target_sources(${target} PRIVATE ${unit})
+  add_dependencies(${target} helicarm_commit)
+endfunction()

@@ -16,6 +16,7 @@
 
 #include "command_line.h"
 #include "helicarm/core/json.h"
+#include "helicarm/core/program_version.h"
 #include "helicarm/core/text.h"
 #include "helicarm/pipeline/result.h"
 #include "module_description.h"
@@ -57,7 +58,7 @@ void describe(CLI::App& app, Console& console) {
       "helicarm: 3-D points with confidence regions from X-ray images with a calibrator.\n"
       "Research instrument, not a medical device.");
   app.footer("Begin with:\n  helicarm demo\nHelp for a command: helicarm COMMAND --help");
-  app.set_version_flag("--version", std::string("helicarm " HELICARM_VERSION) + commit_in_brackets);
+  app.set_version_flag("--version", "helicarm " + program_version());
   app.fallthrough();
   app.require_subcommand(1);
   app.add_flag("--json", console.json, "Print the answer as JSON");
@@ -146,6 +147,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
+    helicarm::program_commit() = commit_in_brackets;
     helicarm::cli::keep_pages();
     return helicarm::cli::run(argc, argv);
   } catch (const std::exception& error) {

@@ -13,6 +13,7 @@ _Dict = dict[str, Any]
 _Ball = Union[str, Tuple[float, float]]
 
 __version__: str
+__commit__: str
 
 class XrayImage:
     def __init__(self, pixels: ArrayLike, *, pixel_mm: Union[None, float, Tuple[float, float]],

@@ -20,6 +20,11 @@ def again(obj):
     return pickle.loads(pickle.dumps(obj))
 
 
+def test_version_and_commit_are_texts():
+    assert helicarm.__version__.count(".") == 2
+    assert isinstance(helicarm.__commit__, str) and "(" not in helicarm.__commit__
+
+
 @pytest.fixture(scope="module")
 def swept(run):  # noqa: F811
     return helicarm.sweep(run)

@@ -11,6 +11,10 @@
 #include "gui/window/flat_memory.h"
 #include "gui/window/main_window.h"
 #include "gui/window/style.h"
+#include "helicarm/core/program_version.h"
+
+/// " (5da20f9512)", or empty; written at each build by cmake/commit.cmake.
+extern const char* const commit_in_brackets;
 
 namespace {
 volatile std::sig_atomic_t told_to_end = 0;
@@ -18,6 +22,7 @@ volatile std::sig_atomic_t told_to_end = 0;
 
 int main(int argc, char** argv) {
   using namespace helicarm::gui;
+  helicarm::program_commit() = commit_in_brackets;
   keep_memory_flat();
   QApplication app(argc, argv);
   QApplication::setOrganizationName("helicarm");

@@ -10,6 +10,7 @@
 #include "gui/window/ask_files.h"
 #include "gui/window/bones_window.h"
 #include "gui/window/main_window.h"
+#include "helicarm/core/program_version.h"
 
 namespace helicarm::gui {
 namespace fs = std::filesystem;
@@ -114,8 +115,8 @@ void MainWindow::build_menus() {
   });
   help->addAction(tr("&Tour"), this, &MainWindow::ask_tour);
   help->addAction(tr("&About"), this, [notify] {
-    notify(tr("About helicarm"),
-           tr("helicarm %1\nResearch instrument, not a medical device.").arg(HELICARM_VERSION));
+    notify(tr("About helicarm"), tr("helicarm %1\nResearch instrument, not a medical device.")
+                                     .arg(QString::fromStdString(program_version())));
   });
 }
 

@@ -10,6 +10,7 @@
 #include <fmt/ranges.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/program_version.h"
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/measure.h"
@@ -276,7 +277,7 @@ Expected<CaseBundle> bundle_case(const fs::path& path, const BundleOptions& opti
     bundler.write();
     CaseBundle bundle = std::move(bundler.bundle());
     std::string log =
-        fmt::format("helicarm {}, compiler {}\n", HELICARM_VERSION, __VERSION__) + bundler.log();
+        fmt::format("helicarm {}, compiler {}\n", program_version(), __VERSION__) + bundler.log();
     for (const std::string& missing : bundle.left_out) log += fmt::format("not packed: {}\n", missing);
     Renamed known = bundler.names();
     if (options.measure && bundler.has_all_images()) {
