@@ -10,7 +10,7 @@ namespace {
 
 using detection::Dot;
 
-constexpr std::array blurs{0.2, 0.3, 0.4, 0.5, 0.65, 0.85, 1.1};
+constexpr std::array blurs{0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.85, 1.1};
 constexpr double least_radius_px = 1.3;  // of the disc and ring that are compared
 constexpr double overlap_px = 4.5;       // beyond two radii: the fit's ring of background holds the neighbour
 constexpr double same_px = 0.8;          // two fits of one disc

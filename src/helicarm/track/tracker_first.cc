@@ -1,161 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include <fmt/format.h>
 
-#include "helicarm/core/statistics.h"
-#include "helicarm/detection/find_dots.h"
+#include "helicarm/core/parallel.h"
 #include "helicarm/geometry/triangulation.h"
+#include "helicarm/track/first_appearance.h"
 #include "helicarm/track/tracker.h"
 
 namespace helicarm::track {
 
-namespace {
-
-/// A picked marker as one appearance fits it.
-struct FittedMarker {
-  double residual;  ///< rms, grey levels: a contrast that grows with the blur does not hide it
-  double size;      ///< logarithm of the fitted over the stated radius
-};
-
-/// What one appearance makes of the picked markers of a view.
-struct TriedAppearance {
-  double polarity;
-  std::map<std::size_t, FittedMarker> markers;
-
-  double size() const {
-    std::vector<double> sizes;
-    for (const auto& [marker, fitted] : markers) sizes.push_back(fitted.size);
-    return median(std::move(sizes));
-  }
-  /// Of the median size, without those of other discs.
-  double sigma() const {
-    std::vector<double> off;
-    for (const auto& [marker, fitted] : markers) off.push_back(std::abs(fitted.size - size()));
-    return 1.25 * 1.4826 * median(std::move(off)) / std::sqrt(double(markers.size()));
-  }
-};
-
-/// Logarithms of the sizes that fit as well as the best: a blurred small disc looks almost like a sharp large
-/// one.
-struct SizeRange {
-  double low = 0, high = 0, sigma = 0;
-  std::size_t markers = 0;
-};
-
-/// Mean logarithm of the residuals over the least that any appearance leaves of the same marker.
-double excess_of(const TriedAppearance& tried, const std::map<std::size_t, double>& least) {
-  constexpr double most = 0.3;  // another disc
-  double sum = 0;
-  for (const auto& [marker, fitted] : tried.markers)
-    sum += std::min(most, std::log(fitted.residual / least.at(marker)));
-  return sum / double(tried.markers.size());
-}
-
-/// `all` of one polarity.
-SizeRange size_range(const std::vector<TriedAppearance>& all) {
-  // A likelihood ratio of e^8 over some 80 pixels a marker, and what no profile explains.
-  constexpr double as_good = 0.1, model = 0.015;
-  std::map<std::size_t, double> least;
-  for (const TriedAppearance& tried : all)
-    for (const auto& [marker, fitted] : tried.markers) {
-      const auto [at, is_new] = least.emplace(marker, fitted.residual);
-      at->second = std::min(at->second, fitted.residual);
-    }
-  SizeRange range;
-  for (const TriedAppearance& tried : all) range.markers = std::max(range.markers, tried.markers.size());
-  const auto is_enough = [&](const TriedAppearance& tried) {
-    return 2 * tried.markers.size() >= range.markers;
-  };
-  double best = 1e9;
-  for (const TriedAppearance& tried : all)
-    if (is_enough(tried)) best = std::min(best, excess_of(tried, least));
-  range.low = 1e9, range.high = -1e9;
-  for (const TriedAppearance& tried : all)
-    if (is_enough(tried) &&
-        excess_of(tried, least) <= best + std::max(model, as_good / double(tried.markers.size()))) {
-      range.low = std::min(range.low, tried.size());
-      range.high = std::max(range.high, tried.size());
-      range.sigma = std::max(range.sigma, tried.sigma());
-    }
-  return range;
-}
-
-/// Nothing where a view's discs agree with the stated size, or are too few.
-std::optional<Warning> size_contradiction(const std::vector<SizeRange>& views, double diameter_mm) {
-  constexpr std::size_t fewest = 3;
-  constexpr double model = 0.12;  // what profiles that fit alike leave open beyond the range
-  double low = -1e9, high = 1e9;
-  std::size_t used = 0;
-  for (const SizeRange& range : views) {
-    if (range.markers < fewest) continue;
-    const double bound = model + 2 * range.sigma;
-    low = std::max(low, range.low - bound);
-    high = std::min(high, range.high + bound);
-    if (range.low - bound <= 0 && range.high + bound >= 0) return std::nullopt;
-    ++used;
-  }
-  if (used == 0 || low > high || (low <= 0 && high >= 0)) return std::nullopt;
-  return Warning{
-      Reason::scale_disagrees,
-      fmt::format("\"diameter_mm\" is {:g}, the markers' images are those of {:.2f} to {:.2f} mm: measure "
-                  "a marker and correct it; sizes and contrasts are judged by it",
-                  diameter_mm, diameter_mm * std::exp(low), diameter_mm * std::exp(high)),
-      {},
-      {{"stated_mm", diameter_mm},
-       {"low_mm", diameter_mm * std::exp(low)},
-       {"high_mm", diameter_mm * std::exp(high)}}};
-}
-
-}  // namespace
-
 void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
   constexpr double click_px = 6;
-  std::vector<SizeRange> sizes_of_views;
-  for (std::size_t k = 0; k < cameras_.size(); ++k) {
-    std::vector<TriedAppearance> all;
-    MarkerAppearance best;
-    double least = 1e9;
-    std::size_t most = 0;
-    for (const double polarity : {1.0, -1.0})
-      for (const double absorbance : {0.8, 8.0})  // like the chord's length, and a flat disc
-        for (const double blur : profile_blurs()) {
-          MarkerAppearance tried;
-          tried.polarity = polarity;
-          tried.profile = detection::BallProfile(blur, absorbance);
-          tried.options = detection::fit_options_for(images[k]);
-          std::vector<double> misfits, sizes;
-          TriedAppearance fits{polarity, {}};
-          for (const MarkerPick& pick : given_->picks) {
-            if (pick.view != k) continue;
-            const double radius = radius_px(k, markers_[pick.marker].place);
-            if (const auto found = picked_marker(images[k], pick.uv_raw, radius, click_px + radius, tried)) {
-              misfits.push_back(found->misfit);
-              sizes.push_back(std::log(found->image.radius_px / radius));
-              fits.markers[pick.marker] = {std::max(1e-9, found->misfit * std::abs(found->image.contrast)),
-                                           sizes.back()};
-            }
-          }
-          if (misfits.empty()) continue;
-          all.push_back(std::move(fits));
-          if (misfits.size() + 1 < most) continue;
-          // A blurred small disc looks like a sharp large one: of what fits, the stated size decides.
-          const double misfit = (median(misfits) + 0.1 * std::abs(median(sizes))) / double(misfits.size());
-          if (misfits.size() > most + 1 || misfit < least) {
-            least = misfit;
-            best = tried;
-            best.radius_factor = std::exp(median(sizes));
-          }
-          most = std::max(most, misfits.size());
-        }
-    if (most == 0) best.options = detection::fit_options_for(images[k]);
-    std::erase_if(all, [&](const TriedAppearance& tried) { return tried.polarity != best.polarity; });
-    appearance_.push_back(best);
-    sizes_of_views.push_back(size_range(all));
-  }
-  if (const auto contradiction = size_contradiction(sizes_of_views, given_->diameter_mm))
+  std::vector<SizeRange> sizes(cameras_.size());
+  appearance_.resize(cameras_.size());
+  parallel_for(cameras_.size(), 0, [&](std::size_t k) {
+    std::vector<PickedPlace> picks;
+    for (const MarkerPick& pick : given_->picks)
+      if (pick.view == k)
+        picks.push_back({pick.marker, pick.uv_raw, radius_px(k, markers_[pick.marker].place)});
+    const LearntAppearance learnt = learnt_appearance(images[k], picks, click_px);
+    appearance_[k] = learnt.appearance;
+    sizes[k] = learnt.sizes;
+  });
+  if (const auto contradiction = size_contradiction(sizes, given_->diameter_mm))
     warnings_.push_back(*contradiction);
 }
 
