@@ -96,14 +96,26 @@ SequenceData data_of(const TrackCase& the_case, const std::vector<FrameSights>& 
   return work;
 }
 
-/// A marker's places by its own images alone, smoothed over the sequence.
-std::optional<std::vector<FramePlace>> smoothed_alone(const SequenceData& work, std::size_t m) {
-  std::vector<std::optional<FramePlace>> measured;
+/// A marker's places by its own images alone, smoothed between the first and the last frame in which two
+/// views show it; nothing where too few frames do so to know how it moves.
+std::vector<std::optional<FramePlace>> smoothed_alone(const SequenceData& work, std::size_t m) {
+  constexpr int fewest = 8;
+  std::vector<std::optional<FramePlace>> measured, made(work.frames);
+  int count = 0;
+  std::size_t first = work.frames, last = 0;
   for (std::size_t f = 0; f < work.frames; ++f) {
-    auto& made = measured.emplace_back();
-    if (const auto& met = work.points[f][m]) made = FramePlace{met->place, met->covariance};
+    auto& at = measured.emplace_back();
+    if (const auto& met = work.points[f][m]) {
+      at = FramePlace{met->place, met->covariance};
+      ++count;
+      first = std::min(first, f);
+      last = f;
+    }
   }
-  return smooth_places(work.times, measured);
+  if (count < fewest) return made;
+  const auto smooth = smooth_places(work.times, measured);
+  for (std::size_t f = first; smooth && f <= last; ++f) made[f] = (*smooth)[f];
+  return made;
 }
 
 /// Whether the images are of something else than the marker that its body places there.
@@ -152,8 +164,7 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
     const auto i = std::size_t(std::ranges::find(holder->markers, m) - holder->markers.begin());
     return place_by_body(work, *holder, bodies[b], sequence.bodies[b], i, f, by_others);
   };
-  std::optional<std::vector<FramePlace>> alone;
-  bool is_smoothed = false;
+  std::vector<std::optional<FramePlace>> alone;
   Eigen::Matrix3d of_cameras = Eigen::Matrix3d::Zero();
   bool is_first = true;
   for (std::size_t f = 0; f < work.frames; ++f) {
@@ -183,8 +194,8 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
       std::optional<FramePlace> guess;
       if (holder != work.the_case.bodies.end()) guess = by_body(f, false);
       if (!guess) {
-        if (!is_smoothed) alone = smoothed_alone(work, m), is_smoothed = true;
-        if (alone) guess = (*alone)[f];
+        if (alone.empty()) alone = smoothed_alone(work, m);
+        guess = alone[f];
       }
       if (guess && seen.size() == 1 && contradicts(seen.front(), *guess)) {
         seen.clear();

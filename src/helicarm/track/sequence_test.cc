@@ -181,6 +181,18 @@ TEST(Sequence, LoneDiscsAfterALongGapAreNoMarker) {
   EXPECT_EQ(estimate_sequence(the_case, sights).markers[39][5].status, MarkerStatus::lost);
 }
 
+TEST(Sequence, MarkerSeenInFewFramesIsNotCarriedOn) {
+  TrackCase the_case = two_bodies();
+  the_case.bodies.clear();
+  auto sights = drawn(the_case, none);
+  for (FrameSights& frame : sights)
+    if (frame.frame != 12 && frame.frame != 20 && frame.frame != 30) frame.of[0][1].reset();
+  sights[29].of[0][1]->uv_raw.x() += 20;  // an outlier
+  const Sequence sequence = estimate_sequence(the_case, sights);
+  for (std::size_t f = 0; f < sequence.frames.size(); ++f)
+    if (!sights[f].of[0][1]) EXPECT_EQ(sequence.markers[f][0].status, MarkerStatus::lost) << f;
+}
+
 TEST(Sequence, SwapOfTwoMarkersIsRepaired) {
   const TrackCase the_case = two_bodies();
   for (const std::size_t other : {std::size_t(2), std::size_t(6)}) {  // of the same body, of the other
