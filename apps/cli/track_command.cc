@@ -144,8 +144,9 @@ void add_track(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->add_option(
       "--axes", a.axes,
-      "CSV body,axis,x,y,z: unit vectors x, y, z of two bodies or more in the first frame's world: "
-      "angles.csv then has joint angles (Grood and Suntay)");
+      "CSV body,axis,x,y,z: unit vectors x, y, z, and origin, of two bodies or more in the first frame's "
+      "world; or 3D Slicer's markups (.mrk.json, .fcsv) of the points BODY_origin, BODY_z, BODY_x: "
+      "angles.csv then has joint angles and translations (Grood and Suntay)");
   command->add_option(
       "--butterworth", a.butterworth_hz,
       "Cut-off in Hz: butterworth.csv then has the places of markers.csv filtered forwards and "

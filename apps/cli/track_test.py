@@ -186,7 +186,8 @@ class Track(unittest.TestCase):
     def test_interruption_says_what_is_kept(self):
         out = self.root / "stopped"
         process = subprocess.Popen([PROGRAM, "track", self.root / "case", "--frames", f"1-{FRAMES}", "--out", out],
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
         while process.poll() is None and not (out / "sights.csv").exists():
             pass
         process.send_signal(signal.SIGINT)
@@ -275,11 +276,29 @@ class Track(unittest.TestCase):
                 sigma = float(row[f"sigma_{name}_deg"])
                 self.assertLess(sigma, 0.5)
                 self.assertLess(abs(float(row[f"{name}_deg"]) - expected), 4 * sigma + 0.02, row)
+            self.assertEqual(row["lateral_mm"] + row["sigma_lateral_mm"], "")
         self.assertIn("Joint of skull and jaw", (self.root / "angles" / "report.html").read_text())
         axes.write_text("body,axis,x,y,z\nhip,x,1,0,0\n")
         done = self.track(self.root / "case", "no-angles", f"1-{FRAMES}", "--axes", axes)
         self.assertEqual(done.returncode, 2)
         self.assertIn('axes.csv: "hip" is no body of the case', done.stderr)
+
+    def test_joint_translations_follow_from_markups_of_slicer(self):
+        points = {"skull_origin": (0, 0, 0), "skull_z": (0, 0, 40), "skull_x": (30, 0, 7),
+                  "jaw_origin": (0, 5, 0), "jaw_z": (0, 5, 9), "jaw_x": (9, 5, 0)}
+        axes = self.root / "axes.mrk.json"
+        axes.write_text(json.dumps({"markups": [{"type": "Fiducial", "coordinateSystem": "RAS", "controlPoints": [
+            {"label": name, "position": [-x, -y, z]} for name, (x, y, z) in points.items()]}]}))
+        done = self.track(self.root / "case", "translations", f"1-{FRAMES}", "--axes", axes)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for row in table(self.root / "translations" / "angles.csv"):
+            frame = int(row["frame"]) - 1
+            for name, expected in (("lateral", -0.3 * frame), ("anterior", 5 + 0.5 * frame), ("distraction", 0)):
+                # The jaw turns about the world's y: a share of the lateral shift is along its z.
+                lean = -0.3 * frame * math.sin(0.02 * frame) if name == "distraction" else 0
+                self.assertLess(abs(float(row[f"{name}_mm"]) - expected - lean), 0.15, row)
+                self.assertLess(float(row[f"sigma_{name}_mm"]), 0.3)
+        self.assertIn("Joint translations", (self.root / "translations" / "report.html").read_text())
 
     def test_butterworth_filter_stays_near_the_places(self):
         def rated(case, folder):

@@ -86,8 +86,13 @@ std::unique_ptr<Tracked> tracked_images(
   for (const auto& [name, of, geometry] : bodies)
     the_case.bodies.push_back(
         {name, of, geometry ? rows_of<3>(*geometry, "bodies: " + name) : std::vector<Eigen::Vector3d>{}});
-  for (const auto& [body, matrix] : axes)
-    the_case.axes.push_back({body, matrix_of(matrix, 3, 3, "axes: " + the_case.bodies[body].name)});
+  for (const auto& [body, matrix] : axes) {
+    const bool has_origin = matrix.ndim() == 2 && matrix.shape(1) == 4;
+    const Eigen::MatrixXd given =
+        matrix_of(matrix, 3, has_origin ? 4 : 3, "axes: " + the_case.bodies[body].name);
+    track::BodyAxes& of = the_case.axes.emplace_back(track::BodyAxes{body, given.leftCols<3>()});
+    if (has_origin) of.origin = given.col(3);
+  }
   if (butterworth_hz) the_case.butterworth = track::Butterworth{*butterworth_hz, butterworth_order};
   value_or_raise(guarded([&] { track::check_butterworth(the_case, 1); }));
   if (!axes.empty())
@@ -264,6 +269,24 @@ void add_track(py::module_& module) {
             });
           },
           "{name: (n, 3, 3)}: rad^2; the axes are taken as exact.")
+      .def_property_readonly(
+          "joint_translations",
+          [](const Tracked& t) {
+            return joints_dict(t, {3}, [](const track::JointAngles& joint, double* at) {
+              if (joint.shift) Eigen::Map<Eigen::Vector3d>{at} = *joint.shift;
+            });
+          },
+          "{name: (n, 3)}: the body's origin from that of the first body of `axes`, mm, along x of the "
+          "latter, "
+          "the floating axis (anterior) and against z of the body (distraction); NaN without origins.")
+      .def_property_readonly(
+          "joint_translation_covariances",
+          [](const Tracked& t) {
+            return joints_dict(t, {3, 3}, [](const track::JointAngles& joint, double* at) {
+              if (joint.shift) Eigen::Map<Eigen::Matrix3d>{at} = joint.shift_covariance;
+            });
+          },
+          "{name: (n, 3, 3)}: mm^2.")
       .def_property_readonly("warnings", [](const Tracked& t) { return warning_list(t.sequence.warnings); })
       .def(
           "to_dict", [](const Tracked& t) { return python_from(track::to_json(t.sequence, t.the_case)); },
@@ -293,7 +316,7 @@ void add_track(py::module_& module) {
 
 case: folder that holds case.json. frames: "A-B" or "A-B:STEP"; the markers are picked in frame A. out: folder for all
 files, whose rows are written as they are computed. resume: go on after the frames of an interrupted run in `out`.
-axes: CSV body,axis,x,y,z of two bodies or more: joint angles against the first one. butterworth_hz, butterworth_order
+axes: CSV body,axis,x,y,z of two bodies or more, or 3D Slicer's markups: joint angles against the first one. butterworth_hz, butterworth_order
 (2 or 4, of both passes): cut-off of the filtered places; the case states frame_rate_hz.
 progress: called with the share of the frames that are done; an exception from it ends the run, and Ctrl-C does.
 Releases the GIL. Returns a Track.

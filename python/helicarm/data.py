@@ -216,7 +216,8 @@ def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, b
       picks: raw pixels in the first frame, each marker in one view or more. diameter_mm: of the markers, 0.1 to 30.
       bodies: {name: [markers]}, or {name: {marker: (x, y, z)}} where the body's geometry is known, mm.
       axes: {body: 3 x 3} of two bodies or more, columns x (right), y (anterior), z (proximal) in the first frame's
-        world: joint angles against the first one. Of a case: the path of a CSV body,axis,x,y,z.
+        world: joint angles against the first one; 3 x 4 with the origin, mm: joint translations too. Of a case: the path of
+        a CSV body,axis,x,y,z, or of 3D Slicer's markups.
       butterworth_hz, butterworth_order=4: cut-off and order (2 or 4, of both passes) of places filtered as motion
         laboratories do, for comparison; frame_rate_hz is then required.
       frame_rate_hz, out, progress: as of a case; camera_covariance: as register takes it.

@@ -255,6 +255,11 @@ def test_markers_are_tracked_in_arrays(tmp_path):
     joint = helicarm.track(views=views, picks=picks, diameter_mm=3, bodies=bodies, axes={"bone": np.eye(3), "other": np.eye(3)})
     assert joint.joint_angles["other"] == pytest.approx(np.zeros((3, 3)), abs=0.02)
     assert joint.joint_covariances["other"].shape == (3, 3, 3) and joint.butterworth is None
+    assert np.isnan(joint.joint_translations["other"]).all()
+    placed = {"bone": np.c_[np.eye(3), [0, 0, 0]], "other": np.c_[np.eye(3), [3, 4, -5]]}
+    joint = helicarm.track(views=views, picks=picks, diameter_mm=3, bodies=bodies, axes=placed)
+    assert joint.joint_translations["other"] == pytest.approx(np.tile([3, 4, 5], (3, 1)), abs=0.3)
+    assert np.isfinite(joint.joint_translation_covariances["other"]).all()
     refused("too_few_views", "two views", helicarm.track, views={"A": views["A"]}, picks=picks, diameter_mm=3)
     refused("bad_size", "numbers of images differ", helicarm.track, views={"A": views["A"], "B": (views["B"][0][:2], views["B"][1])},
             picks=picks, diameter_mm=3)

@@ -67,13 +67,16 @@ std::string warnings_list(const std::vector<Warning>& warnings) {
 std::string motion_charts(const std::vector<int>& frames, const std::vector<std::string>& names,
                           const std::vector<BodySequence>& bodies,
                           const std::vector<std::vector<TrackedBody>>& relative,
-                          const std::vector<report::Chart>& residuals) {
+                          const std::vector<report::Chart>& residuals,
+                          const std::vector<std::vector<report::ChartSeries>>& beside) {
   std::string html;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
-    const std::vector<report::Chart> charts{
+    std::vector<report::Chart> charts{
         pose_chart(frames, bodies[b].smoothed, "Centre from its place in the first frame", false),
         pose_chart(frames, bodies[b].smoothed, "Rotation vector against the first frame", true),
         residuals[b]};
+    if (b < beside.size())
+      charts[0].series.insert(charts[0].series.end(), beside[b].begin(), beside[b].end());
     html += fmt::format(
         "<h2>{}</h2>\n<figure class=\"plain\">{}<figcaption>Smoothed; bars: 95 %.</figcaption></figure>\n",
         report::escaped(names[b]), report::chart_svg(charts));

@@ -84,7 +84,8 @@ std::string angles_table(const std::vector<int>& frames, const std::vector<std::
                          const std::vector<Joint>& joints) {
   std::string table =
       "frame,body,reference,flexion_deg,adduction_deg,rotation_deg,sigma_flexion_deg,sigma_adduction_deg,"
-      "sigma_rotation_deg\n";
+      "sigma_rotation_deg,lateral_mm,anterior_mm,distraction_mm,sigma_lateral_mm,sigma_anterior_mm,"
+      "sigma_distraction_mm\n";
   for (std::size_t f = 0; f < frames.size(); ++f)
     for (const Joint& joint : joints) {
       table +=
@@ -94,6 +95,11 @@ std::string angles_table(const std::vector<int>& frames, const std::vector<std::
       for (int i = 0; i < 3; ++i)
         table += at ? fmt::format(",{:.6g}", degrees_of_rad * std::sqrt(std::max(0.0, at->covariance(i, i))))
                     : ",";
+      const bool has_shift = at && at->shift;
+      for (int i = 0; i < 3; ++i) table += has_shift ? fmt::format(",{:.9g}", (*at->shift)[i]) : ",";
+      for (int i = 0; i < 3; ++i)
+        table +=
+            has_shift ? fmt::format(",{:.6g}", std::sqrt(std::max(0.0, at->shift_covariance(i, i)))) : ",";
       table += "\n";
     }
   return table;

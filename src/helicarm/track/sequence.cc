@@ -262,8 +262,8 @@ std::vector<Joint> joints_of(const TrackCase& the_case, const std::vector<BodySe
     const BodyAxes &reference = the_case.axes[0], &body = the_case.axes[i];
     Joint& joint = joints.emplace_back(Joint{reference.body, body.body, {}});
     for (std::size_t f = 0; f < bodies[body.body].smoothed.size(); ++f)
-      joint.frames.push_back(joint_angles(bodies[reference.body].smoothed[f], reference.axes,
-                                          bodies[body.body].smoothed[f], body.axes));
+      joint.frames.push_back(
+          joint_angles(bodies[reference.body].smoothed[f], reference, bodies[body.body].smoothed[f], body));
   }
   return joints;
 }

@@ -16,6 +16,33 @@ namespace {
 
 constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
+/// Of each body, the mean of its markers' Butterworth-filtered places, where all have one, from the centre of
+/// its first smooth pose, by axes.
+std::vector<std::vector<report::ChartSeries>> filtered_centres(const Sequence& sequence,
+                                                               const TrackCase& the_case) {
+  const auto places = butterworth_places(sequence, the_case);
+  std::vector<std::vector<report::ChartSeries>> curves;
+  if (places.empty()) return curves;
+  for (std::size_t b = 0; b < the_case.bodies.size(); ++b) {
+    const auto& smoothed = sequence.bodies[b].smoothed;
+    const auto begun = std::ranges::find_if(smoothed, [](const auto& frame) { return bool(frame.pose); });
+    auto& of = curves.emplace_back();
+    if (begun == smoothed.end()) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      report::ChartSeries curve{fmt::format("{}, Butterworth", "xyz"[axis])};
+      curve.dashed = true;
+      for (std::size_t f = 0; f < sequence.frames.size(); ++f) {
+        double sum = 0;
+        for (const std::size_t marker : the_case.bodies[b].markers)
+          sum += places[marker][f] ? (*places[marker][f])[axis] - begun->centre[axis] : no_value;
+        curve.points.push_back({double(sequence.frames[f]), sum / double(the_case.bodies[b].markers.size())});
+      }
+      of.push_back(std::move(curve));
+    }
+  }
+  return curves;
+}
+
 std::string body_charts(const Sequence& sequence, const TrackCase& the_case) {
   std::vector<std::string> names;
   std::vector<report::Chart> residuals;
@@ -30,7 +57,31 @@ std::string body_charts(const Sequence& sequence, const TrackCase& the_case) {
     rms.y_from_zero = true;
     residuals.push_back(std::move(rms));
   }
-  return motion_charts(sequence.frames, names, sequence.bodies, sequence.relative, residuals);
+  return motion_charts(sequence.frames, names, sequence.bodies, sequence.relative, residuals,
+                       filtered_centres(sequence, the_case));
+}
+
+/// Nothing where the bodies have no origins.
+std::optional<report::Chart> shift_chart(const Sequence& sequence, const Joint& joint) {
+  constexpr double bar_sigmas = 1.959964;
+  constexpr std::array names{"lateral", "anterior", "distraction"};
+  report::Chart chart{"Joint translations (Grood and Suntay)", "frame", "mm"};
+  bool is_any = false;
+  for (int i = 0; i < 3; ++i) {
+    report::ChartSeries curve{names[std::size_t(i)]};
+    curve.joined = true;
+    for (std::size_t f = 0; f < sequence.frames.size(); ++f) {
+      const auto& at = joint.frames[f];
+      const bool is_here = at && at->shift;
+      is_any = is_any || is_here;
+      const double value = is_here ? (*at->shift)[i] : no_value;
+      const double width = is_here ? bar_sigmas * std::sqrt(at->shift_covariance(i, i)) : no_value;
+      curve.points.push_back({double(sequence.frames[f]), value});
+      curve.ranges.push_back({value - width, value + width});
+    }
+    chart.series.push_back(std::move(curve));
+  }
+  return is_any ? std::optional(std::move(chart)) : std::nullopt;
 }
 
 std::string joint_charts(const Sequence& sequence, const TrackCase& the_case) {
@@ -51,11 +102,13 @@ std::string joint_charts(const Sequence& sequence, const TrackCase& the_case) {
       }
       chart.series.push_back(std::move(curve));
     }
+    std::vector<report::Chart> charts{std::move(chart)};
+    if (auto shifts = shift_chart(sequence, joint)) charts.push_back(std::move(*shifts));
     html += fmt::format(
         "<h2>Joint of {} and {}</h2>\n<figure class=\"plain\">{}<figcaption>Smoothed; bars: 95 %, of "
         "the poses.</figcaption></figure>\n",
         report::escaped(the_case.bodies[joint.reference].name),
-        report::escaped(the_case.bodies[joint.body].name), report::chart_svg({&chart, 1}));
+        report::escaped(the_case.bodies[joint.body].name), report::chart_svg(charts));
   }
   return html;
 }
