@@ -8,7 +8,8 @@
 namespace helicarm::cli {
 
 /// Ctrl-C or SIGTERM during a long command, seen between two of its steps. A second signal ends the program
-/// at once. One object at a time.
+/// at once. A signal that the program was started to ignore, as a shell's background job is, stays ignored.
+/// One object at a time.
 class Interruption {
  public:
   /// Thrown by the step after which the command stops.
@@ -19,8 +20,8 @@ class Interruption {
     struct sigaction action = {};
     action.sa_handler = &note;
     action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
-    sigaction(SIGINT, &action, &earlier_int_);
-    sigaction(SIGTERM, &action, &earlier_term_);
+    catch_signal(SIGINT, action, earlier_int_);
+    catch_signal(SIGTERM, action, earlier_term_);
   }
   ~Interruption() { restore(); }
   Interruption(const Interruption&) = delete;
@@ -39,6 +40,10 @@ class Interruption {
     signal_ = signal;
     constexpr char text[] = "\nhelicarm: interrupted: stops after this frame (once more: at once)\n";
     static_cast<void>(!::write(STDERR_FILENO, text, sizeof text - 1));
+  }
+  static void catch_signal(int signal, const struct sigaction& action, struct sigaction& earlier) {
+    sigaction(signal, nullptr, &earlier);
+    if (earlier.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
   }
   void restore() const {
     sigaction(SIGINT, &earlier_int_, nullptr);

@@ -201,6 +201,18 @@ class Track(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual((out / "markers.csv").read_bytes(), (self.root / "out/markers.csv").read_bytes())
 
+    def test_signal_that_a_background_job_ignores_does_not_end_it(self):
+        out = self.root / "background"
+        process = subprocess.Popen([PROGRAM, "track", self.root / "case", "--frames", f"1-{FRAMES}", "--out", out],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
+        while process.poll() is None and not (out / "sights.csv").exists():
+            pass
+        process.send_signal(signal.SIGINT)
+        _, stderr = process.communicate()
+        self.assertEqual(process.returncode, 0, stderr)
+        self.assertNotIn("interrupted", stderr)
+
     def test_markers_are_found_without_picks(self):
         def without(case, folder):
             del case["picks"], case["bodies"]
