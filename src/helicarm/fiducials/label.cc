@@ -290,16 +290,11 @@ LabellingAttempt attempt_labels(const phantom::Calibrator& calibrator,
   const LabellingProblem scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
   search.try_expected();
-  // By then, a labelling with one fiducial less would have been found, too. Where the expected camera
-  // explains most of many fiducials, the triples of `search_rivals` alone find it.
-  constexpr std::size_t many_balls = 40;
-  const std::size_t could_match = std::min(candidates.size(), calibrator.balls.size());
-  const bool is_expected = prior.expected && calibrator.balls.size() > many_balls;
+  // By then, a labelling with one fiducial less would have been found, too.
   try_random_triples(
       search, triples_required(least_balls, candidates.size()), [&](const Hypothesis& h, std::size_t tried) {
-        if (!is_certain(h, options)) return false;
-        if (is_expected && 10 * std::size_t(h.matched) >= 9 * could_match) return true;
-        return tried >= triples_required(std::max(least_balls, h.matched - 1), candidates.size());
+        return is_certain(h, options) &&
+               tried >= triples_required(std::max(least_balls, h.matched - 1), candidates.size());
       });
   if (!search.ranking().empty()) search_rivals(search);
   LabellingAttempt attempt;

@@ -27,6 +27,8 @@ struct DrawnRun {
   int moved_from = 1000;                    ///< from this frame on the balls are shifted
   Eigen::Vector3d shift_mm = Eigen::Vector3d(1.5, 0, 0);
   std::vector<int> blank = {};
+  double flex_mm = 3;     ///< of the detector to the right, times the sine of the harmonic's angle
+  int flex_harmonic = 1;  ///< above 1 no circle about another axis holds it
 
   static std::vector<Eigen::Vector3d> balls() {
     RandomStream random{21, 0};
@@ -47,7 +49,8 @@ struct DrawnRun {
     const Eigen::Vector3d source = -620 * w + std::sin(angle) * u;
     view.camera_from_world.translation = -(view.camera_from_world.rotation * source);
     const double middle = (size - 1) / 2.0;
-    view.intrinsics = {1000 / pixel_mm, 1000 / pixel_mm, middle + 3 * std::sin(angle),
+    view.intrinsics = {1000 / pixel_mm, 1000 / pixel_mm,
+                       middle + flex_mm / pixel_mm * std::sin(flex_harmonic * angle),
                        middle + 2 * std::cos(angle), 0};
     return view;
   }

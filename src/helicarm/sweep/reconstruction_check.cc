@@ -16,6 +16,7 @@
 #include "helicarm/core/statistics.h"
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/exchange/run_geometry.h"
+#include "helicarm/geometry/triangulation.h"
 #include "helicarm/sweep/estimate_frame.h"
 #include "helicarm/sweep/path.h"
 #include "helicarm/sweep/reconstruction.h"
@@ -217,20 +218,34 @@ Upright upright_of(const Sweep& sweep, const Cameras& own) {
   return {std::abs(along.x()) > std::abs(along.y())};
 }
 
+/// The box where the target appears with other cameras, by their rays through its images: a circle about
+/// another centre, or another world, displaces it as a whole.
+CheckBox as_seen_by(const Cameras& cameras, CheckBox box, const Cameras& own) {
+  std::vector<geometry::Projection> projections;
+  std::vector<Eigen::Vector2d> pixels;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    projections.push_back(cameras[i].projection());
+    pixels.push_back(own[i].project(box.world_from_box.translation));
+  }
+  box.world_from_box.translation = value_or_throw(geometry::intersect_linear(projections, pixels));
+  return box;
+}
+
 /// Rows of the images that hold a target in every geometry: of each image the first, and their number.
 struct Rows {
   std::vector<int> first;
   int count = 0;
 };
 
-Rows rows_of(const CheckBox& box, const Geometries& all, const Upright& upright, int height) {
+/// `boxes`: of the target, in each geometry.
+Rows rows_of(const std::vector<CheckBox>& boxes, const Geometries& all, const Upright& upright, int height) {
   constexpr int margin = 4;
   std::vector<std::pair<double, double>> spans;
   for (std::size_t i = 0; i < all.frames.size(); ++i) {
     double lowest = height, highest = 0;
-    for (const Cameras& cameras : all.cameras)
-      for (const Eigen::Vector3d& corner : corners_of(box)) {
-        const double v = upright(cameras[i]).project(corner).y();
+    for (std::size_t g = 0; g < boxes.size(); ++g)
+      for (const Eigen::Vector3d& corner : corners_of(boxes[g])) {
+        const double v = upright(all.cameras[g][i]).project(corner).y();
         lowest = std::min(lowest, v), highest = std::max(highest, v);
       }
     spans.emplace_back(std::max(0.0, lowest), std::min<double>(height - 1, highest));
@@ -347,8 +362,12 @@ ReconstructionCheck checked(const SweepCase& the_case, const Sweep& sweep, const
   const auto& size = sweep.detector.image_size;
   const TemporaryFolder folder;
   std::vector<Rows> rows;
+  std::vector<std::vector<CheckBox>> of_geometries;
   for (std::size_t t = 0; t < boxes.size(); ++t) {
-    rows.push_back(rows_of(boxes[t], all, upright, upright.transposed ? size.x() : size.y()));
+    auto& seen = of_geometries.emplace_back(std::vector{boxes[t]});
+    for (std::size_t g = 1; g < all.cameras.size(); ++g)
+      seen.push_back(as_seen_by(all.cameras[g], boxes[t], all.cameras.front()));
+    rows.push_back(rows_of(seen, all, upright, upright.transposed ? size.x() : size.y()));
     fs::create_directory(folder.path() / std::to_string(t));
   }
   const std::size_t each = all.cameras.size(), jobs = boxes.size() * each;
@@ -362,8 +381,8 @@ ReconstructionCheck checked(const SweepCase& the_case, const Sweep& sweep, const
   std::mutex guard;
   parallel_for(jobs, options.threads, [&](std::size_t job) {
     const std::size_t t = job / each;
-    images[job] = reconstructed(boxes[t], rows[t], all.cameras[job % each], upright, sweep.detector.pixel_mm,
-                                options.program, folder.path() / std::to_string(t));
+    images[job] = reconstructed(of_geometries[t][job % each], rows[t], all.cameras[job % each], upright,
+                                sweep.detector.pixel_mm, options.program, folder.path() / std::to_string(t));
     const std::lock_guard lock(guard);
     tell();
   });

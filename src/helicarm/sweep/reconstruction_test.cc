@@ -30,15 +30,15 @@ Reconstruction blob(double radius_mm, double stretch, double inside, double nois
 }
 
 TEST(WidthAtHalfMaximum, OfABallIsItsDiameter) {
-  EXPECT_NEAR(ball_width_mm(blob(1.6, 1, 1000, 30), 3.2).value_or(0), 3.2, 0.02);
+  EXPECT_NEAR(ball_width_mm(blob(1.6, 1, 1000, 30), 3.2).value_or(0), 3.2, 0.03);  // of voxels of 0.2 mm
 }
 
 TEST(WidthAtHalfMaximum, DarkMetalIsAsWideAsBright) {
-  EXPECT_NEAR(ball_width_mm(blob(1.6, 1, -1000, 30), 3.2).value_or(0), 3.2, 0.02);
+  EXPECT_NEAR(ball_width_mm(blob(1.6, 1, -1000, 30), 3.2).value_or(0), 3.2, 0.03);  // of voxels of 0.2 mm
 }
 
 TEST(WidthAtHalfMaximum, OfAWireIsItsDiameter) {
-  EXPECT_NEAR(wire_width_mm(blob(0.9, 0, 1000, 30)).value_or(0), 1.8, 0.04);
+  EXPECT_NEAR(wire_width_mm(blob(0.9, 0, 1000, 30)).value_or(0), 1.8, 0.1);
 }
 
 TEST(WidthAtHalfMaximum, NoiseAloneHasNone) {
@@ -66,20 +66,20 @@ TEST(WireEnds, AreReadOrRefused) {
   }
 }
 
-/// A drawn run of 40 images over 195 degrees whose detector flexes by 3 mm.
+/// A drawn run whose detector flexes.
 class CheckOfARun : public testing::Test {
  protected:
-  void run(const CheckOptions& options) {
+  void run(int frames, const CheckOptions& options) {
     DrawnRun drawn;
-    drawn.frames = frames_;
-    drawn.step_deg = 5;
+    drawn.frames = frames;
+    drawn.flex_mm = 6;
+    drawn.flex_harmonic = 3;
     drawn.write(folder_.path());
     the_case_ = value_or_throw(read_sweep_case(folder_.path()));
     sweep_ = value_or_throw(run_sweep(the_case_));
     ASSERT_FALSE(sweep_.failure) << sweep_.failure->message;
     value_or_throw(add_check(sweep_, the_case_, options));
   }
-  int frames_ = 40;
   TemporaryFolder folder_;
   SweepCase the_case_;
   Sweep sweep_;
@@ -88,7 +88,7 @@ class CheckOfARun : public testing::Test {
 TEST_F(CheckOfARun, MissingProgramIsAWarning) {
   CheckOptions options;
   options.program = "no-such-program-of-helicarm";
-  ASSERT_NO_FATAL_FAILURE(run(options));
+  ASSERT_NO_FATAL_FAILURE(run(8, options));
   EXPECT_FALSE(sweep_.check);
   ASSERT_FALSE(sweep_.warnings.empty());
   EXPECT_EQ(sweep_.warnings.back().reason, Reason::missing_file);
@@ -97,15 +97,18 @@ TEST_F(CheckOfARun, MissingProgramIsAWarning) {
 
 TEST_F(CheckOfARun, TooSmallAnArcIsAWarning) {
   if (!version_of("plastimatch")) GTEST_SKIP() << "plastimatch is not installed";
-  frames_ = 20;
-  ASSERT_NO_FATAL_FAILURE(run({}));
+  ASSERT_NO_FATAL_FAILURE(run(8, {}));
   EXPECT_FALSE(sweep_.check);
   EXPECT_EQ(sweep_.warnings.back().reason, Reason::too_few_views);
 }
 
-TEST_F(CheckOfARun, BallsAreNarrowerThanWithTheIdealCircle) {
+TEST_F(CheckOfARun, BallsAreNarrowerThanWithTheIdealCircleAndAsWideAsWithTheSameCameras) {
   if (!version_of("plastimatch")) GTEST_SKIP() << "plastimatch is not installed";
-  ASSERT_NO_FATAL_FAILURE(run({}));
+  ASSERT_NO_FATAL_FAILURE(run(40, {.program = "no-such-program-of-helicarm"}));
+  CheckOptions options;
+  for (const SweepFrame& frame : sweep_.frames)
+    if (frame.best) options.against.push_back({frame.best->view, {}, {}, true, {}});
+  ASSERT_TRUE(add_check(sweep_, the_case_, options));
   ASSERT_TRUE(sweep_.check) << sweep_.warnings.back().message;
   ASSERT_FALSE(sweep_.check->targets.empty());
   for (const CheckedTarget& target : sweep_.check->targets) {
@@ -114,20 +117,10 @@ TEST_F(CheckOfARun, BallsAreNarrowerThanWithTheIdealCircle) {
     EXPECT_FALSE(target.own.slice.empty());
   }
   EXPECT_GT(sweep_.check->circle_ratio().value_or(0), 1.05);
+  EXPECT_DOUBLE_EQ(sweep_.check->other_ratio().value_or(0), 1);
   EXPECT_THAT(sweep_report(sweep_), HasSubstr("ideal circle"));
   EXPECT_EQ(to_json(sweep_)["check"]["targets"].size(), sweep_.check->targets.size());
-}
-
-TEST_F(CheckOfARun, OwnCamerasAsAnotherProgramsAreAsWide) {
-  if (!version_of("plastimatch")) GTEST_SKIP() << "plastimatch is not installed";
-  ASSERT_NO_FATAL_FAILURE(run({.program = "no-such-program-of-helicarm"}));
-  CheckOptions options;
-  for (const SweepFrame& frame : sweep_.frames)
-    options.against.push_back({frame.best->view, {}, {}, true, {}});
-  ASSERT_TRUE(add_check(sweep_, the_case_, options));
-  ASSERT_TRUE(sweep_.check);
-  EXPECT_DOUBLE_EQ(sweep_.check->other_ratio().value_or(0), 1);
-  options.against.pop_back();
+  options.against.resize(3);
   const auto refused = add_check(sweep_, the_case_, options);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::bad_value);

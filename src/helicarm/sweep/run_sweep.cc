@@ -28,6 +28,25 @@ const xray::ImageFile* file_of(const Frame& frame, const SweepCase& the_case) {
   return file == the_case.files.end() ? nullptr : file->second.get();
 }
 
+/// Each frame's estimate; unreadable input is thrown.
+std::vector<FrameEstimate> estimates_of(const SweepCase& the_case, const SweepOptions& options,
+                                        const std::function<void(double)>& progress) {
+  const std::size_t count = the_case.frames.size();
+  std::vector<Expected<FrameEstimate>> estimated(count, FrameEstimate{});
+  pipeline::RunOptions run;
+  std::mutex guard;
+  std::size_t done = 0;
+  parallel_for(count, options.threads, [&](std::size_t i) {
+    estimated[i] =
+        estimate_frame(the_case.frames[i], file_of(the_case.frames[i], the_case), the_case.base, run);
+    const std::lock_guard lock(guard);
+    if (progress) progress(double(++done) / double(count));
+  });
+  std::vector<FrameEstimate> estimates;
+  for (auto& estimate : estimated) estimates.push_back(value_or_throw(std::move(estimate)));
+  return estimates;
+}
+
 void refuse(FrameEstimate& estimate, Failure failure, const std::string& view) {
   failure.view = view;
   estimate.failure = std::move(failure);
@@ -179,50 +198,6 @@ std::optional<fiducials::ExpectedView> expected_at(std::ptrdiff_t frame,
   return {};
 }
 
-bool is_one_run(const SweepCase& the_case) {
-  return std::ranges::all_of(the_case.frames,
-                             [&](const Frame& frame) { return frame.run == the_case.frames.front().run; });
-}
-
-/// Each frame's estimate; unreadable input is thrown. Of a phantom of many balls every fifth image is
-/// labelled first: the others' search then begins at the camera between those beside them, which decides
-/// nothing.
-std::vector<FrameEstimate> estimates_of(const SweepCase& the_case, const SweepOptions& options,
-                                        const std::function<void(double)>& progress) {
-  constexpr std::size_t many_balls = 40, stride = 5;
-  const std::size_t count = the_case.frames.size();
-  const bool is_slow = is_one_run(the_case) && the_case.base.calibrator.balls.size() > many_balls;
-  FrameEstimate unknown;
-  unknown.failure = Failure{Reason::not_seen, "", "", {}};
-  std::vector<FrameEstimate> estimates(count, unknown);
-  const pipeline::RunOptions run;
-  std::mutex guard;
-  std::size_t done = 0;
-  const auto estimate_all = [&](const std::vector<std::size_t>& frames) {
-    const std::vector<FrameEstimate> before = is_slow ? estimates : std::vector<FrameEstimate>();
-    std::vector<Expected<FrameEstimate>> estimated(frames.size(), FrameEstimate{});
-    parallel_for(frames.size(), options.threads, [&](std::size_t k) {
-      const Frame& frame = the_case.frames[frames[k]];
-      auto expected = is_slow ? expected_at(std::ptrdiff_t(frames[k]), before) : std::nullopt;
-      constexpr double any_deg = 181;
-      if (expected) expected->within_deg = any_deg;
-      const xray::ImageFile* file = file_of(frame, the_case);
-      estimated[k] = estimate_frame(frame, file, the_case.base, run, expected);
-      if (expected && estimated[k] && estimated[k]->failure)
-        estimated[k] = estimate_frame(frame, file, the_case.base, run);
-      const std::lock_guard lock(guard);
-      if (progress) progress(double(++done) / double(count));
-    });
-    for (std::size_t k = 0; k < frames.size(); ++k)
-      estimates[frames[k]] = value_or_throw(std::move(estimated[k]));
-  };
-  std::vector<std::size_t> first, others;
-  for (std::size_t i = 0; i < count; ++i) (is_slow && i % stride != 0 ? others : first).push_back(i);
-  estimate_all(first);
-  if (!others.empty()) estimate_all(others);
-  return estimates;
-}
-
 /// Labels again the frames that their image alone leaves ambiguous and whose camera the accepted frames
 /// beside them tell; returns how many. A phantom seen along its axis, or half out of the field, looks alike
 /// from two directions: a run does not jump.
@@ -266,6 +241,11 @@ std::vector<calibration::HistoryEntry> acquisitions_of(const std::vector<FrameEs
     entries.push_back(*std::move(entry));
   }
   return entries;
+}
+
+bool is_one_run(const SweepCase& the_case) {
+  return std::ranges::all_of(the_case.frames,
+                             [&](const Frame& frame) { return frame.run == the_case.frames.front().run; });
 }
 
 Failure nothing_accepted(const std::vector<FrameEstimate>& estimates) {
