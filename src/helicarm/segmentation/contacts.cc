@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <set>
 
 #include <Eigen/LU>
@@ -94,6 +95,64 @@ void add_narrow_joins(Segmentation& made, Parts& parts, const std::vector<std::u
                      made.bones[k].name, text_of(place_of(join.neck, made, parts)), neck_mm, join.width),
          {},
          {{"neck_mm", neck_mm}, {"width", join.width}}});
+  }
+}
+
+namespace {
+
+/// Sizes of the pieces of what reaches the threshold in one bone, in voxels that touch, also by corners.
+std::vector<std::size_t> dense_pieces(const volume::Volume& ct, const Segmentation& made, std::uint8_t label,
+                                      std::vector<bool>& seen) {
+  const Eigen::Vector3i& size = made.size;
+  const auto is_dense = [&](std::size_t i) {
+    return made.labels[i] == label && double(ct.voxels[i]) >= made.threshold_hu;
+  };
+  std::vector<std::size_t> sizes, open;
+  for (std::size_t first = 0; first < made.labels.size(); ++first) {
+    if (seen[first] || !is_dense(first)) continue;
+    std::size_t count = 0;
+    seen[first] = true;
+    open.assign(1, first);
+    while (!open.empty()) {
+      const Eigen::Vector3i at = voxel_of(std::uint32_t(open.back()), size);
+      open.pop_back();
+      ++count;
+      const Eigen::Vector3i low = (at.array() - 1).max(0), high = (at.array() + 1).min(size.array() - 1);
+      for (int z = low.z(); z <= high.z(); ++z)
+        for (int y = low.y(); y <= high.y(); ++y)
+          for (int x = low.x(); x <= high.x(); ++x) {
+            const std::size_t next = index_in(ct, {x, y, z});
+            if (seen[next] || !is_dense(next)) continue;
+            seen[next] = true;
+            open.push_back(next);
+          }
+    }
+    sizes.push_back(count);
+  }
+  std::ranges::sort(sizes, std::greater());
+  return sizes;
+}
+
+}  // namespace
+
+void add_held_by_gaps(const volume::Volume& ct, Segmentation& made) {
+  constexpr double least_part = 0.05, least_cm3 = 0.5;  // of what is said
+  const double voxel_cm3 = std::abs(made.patient_from_voxel.linear().determinant()) / 1000;
+  std::vector<bool> seen(made.labels.size(), false);
+  for (const Bone& bone : made.bones) {
+    const std::vector<std::size_t> pieces = dense_pieces(ct, made, bone.label, seen);
+    if (pieces.size() < 2) continue;
+    const double first = double(pieces[0]) * voxel_cm3, second = double(pieces[1]) * voxel_cm3;
+    if (second < std::max(least_cm3, least_part * first)) continue;
+    made.warnings.push_back(
+        {Reason::bones_in_contact,
+         fmt::format(
+             "{}: bone of {:.1f} cm3 and of {:.1f} cm3 in it do not touch; only closed gaps and filled "
+             "cavities hold them together: if these are two bones, as where a joint's space is narrow, "
+             "give each a seed, or a smaller gap (--gap, half of the width that is closed)",
+             bone.name, first, second),
+         {},
+         {{"first_cm3", first}, {"second_cm3", second}}});
   }
 }
 

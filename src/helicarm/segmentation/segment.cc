@@ -58,13 +58,15 @@ bool on_bone(const Work& work, const Vector3i& voxel) {
 }
 
 [[noreturn]] void refuse_one_bone(const Seed& seed, const Seed& other) {
-  throw BadInput({Reason::seeds_in_one_bone,
-                  fmt::format("the seeds {} {} and {} {} are on one bone: between them it is never narrower "
-                              "than {:g} of its radius; leave one out, or raise the threshold where two "
-                              "bones have grown together in the CT",
-                              other.name, text_of(other.point), seed.name, text_of(seed.point), surely_one),
-                  {},
-                  {{"distance_mm", (other.point - seed.point).norm()}}});
+  throw BadInput(
+      {Reason::seeds_in_one_bone,
+       fmt::format(
+           "the seeds {} {} and {} {} are on one bone: between them it is never narrower "
+           "than {:g} of its radius; leave one out, or raise the threshold where two "
+           "bones have grown together in the CT, or a smaller gap (--gap) where a joint's space is narrow",
+           other.name, text_of(other.point), seed.name, text_of(seed.point), surely_one),
+       {},
+       {{"distance_mm", (other.point - seed.point).norm()}}});
 }
 
 /// The regions of the seeds, which must differ.
@@ -203,6 +205,7 @@ Expected<Segmentation> segment(const volume::Volume& ct, std::span<const Seed> s
     add_left_out(made, parts.regions, label_of, sizes);
     add_contacts(made, parts, label_of, sizes);
     add_narrow_joins(made, parts, of_seeds, narrowest, options.neck);
+    add_held_by_gaps(ct, made);
     return made;
   });
 }

@@ -167,6 +167,41 @@ TEST(Segment, ABoneThatIsNearlyAsWideWhereItMeetsAnotherIsReported) {
   EXPECT_THAT(one->warnings[0].message, HasSubstr("is narrow at"));
 }
 
+/// A head and the half shell of a socket about it, 1.5 mm apart.
+volume::Volume head_in_socket() {
+  volume::Volume ct;
+  ct.size = {50, 50, 50};
+  const double voxel_mm = 0.75;
+  ct.patient_from_voxel = Eigen::Translation3d(Eigen::Vector3d::Constant(-24.5 * voxel_mm)) *
+                          Eigen::Affine3d(Eigen::Scaling(voxel_mm));
+  for (int z = 0; z < 50; ++z)
+    for (int y = 0; y < 50; ++y)
+      for (int x = 0; x < 50; ++x) {
+        const Eigen::Vector3d p = ct.patient_from_voxel * Eigen::Vector3d(x, y, z);
+        const double r = p.norm();
+        const bool bone = r < 11 || (r > 12.5 && r < 16 && p.z() > -2);
+        ct.voxels.push_back(bone ? 900.0F : 40.0F);
+      }
+  return ct;
+}
+
+TEST(Segment, BonesThatOnlyAClosedJointSpaceHoldsTogetherAreReported) {
+  const volume::Volume ct = head_in_socket();
+  const std::vector<Seed> head{{"head", {0, 0, 0}}};
+  const auto as_usual = segment(ct, head, {});
+  ASSERT_TRUE(as_usual) << as_usual.error().message;
+  const bool holds_socket = as_usual->bones[0].volume_cm3 > 8;  // 5.6 cm3 alone
+  const bool is_told = std::ranges::any_of(as_usual->warnings, [](const Warning& warning) {
+    return warning.message.find("do not touch") != std::string::npos;
+  });
+  EXPECT_EQ(is_told, holds_socket);
+  EXPECT_TRUE(holds_socket);  // else the scene tests nothing
+  const auto narrow = segment(ct, head, {.gap_mm = 0.4});
+  ASSERT_TRUE(narrow) << narrow.error().message;
+  EXPECT_NEAR(narrow->bones[0].volume_cm3, 5.6, 0.4);
+  EXPECT_TRUE(narrow->warnings.empty()) << narrow->warnings[0].message;
+}
+
 TEST(Segment, TwoClicksOnOneBoneAreRefused) {
   const Failure refused = refusal_of(plain_ct(), {on_upper, {"again", {0, 0, 25}}});
   EXPECT_EQ(refused.reason, Reason::seeds_in_one_bone);
