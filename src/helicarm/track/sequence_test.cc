@@ -190,7 +190,9 @@ TEST(Sequence, MarkerSeenInFewFramesIsNotCarriedOn) {
   sights[29].of[0][1]->uv_raw.x() += 20;  // an outlier
   const Sequence sequence = estimate_sequence(the_case, sights);
   for (std::size_t f = 0; f < sequence.frames.size(); ++f)
-    if (!sights[f].of[0][1]) EXPECT_EQ(sequence.markers[f][0].status, MarkerStatus::lost) << f;
+    if (!sights[f].of[0][1]) {
+      EXPECT_EQ(sequence.markers[f][0].status, MarkerStatus::lost) << f;
+    }
 }
 
 TEST(Sequence, SwapOfTwoMarkersIsRepaired) {
