@@ -13,8 +13,8 @@ void add_left_out(Segmentation& made, Watershed& regions, const std::vector<std:
 void add_contacts(Segmentation& made, Parts& parts, const std::vector<std::uint8_t>& label_of,
                   const std::vector<std::size_t>& sizes);
 
-/// Warns of bones whose parts hang together by closed gaps and filled cavities alone, as a hip's do whose joint
-/// space is narrower than the gaps.
+/// Warns of bones whose parts hang together by closed gaps and filled cavities alone, as a hip's do whose
+/// joint space is narrower than the gaps.
 void add_held_by_gaps(const volume::Volume& ct, Segmentation& made);
 
 /// Warns of bones that are nearly two. `narrowest`: of `join_regions`.
