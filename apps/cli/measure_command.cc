@@ -14,8 +14,10 @@
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/localization/pick_checks.h"
 #include "helicarm/measures/measure_json.h"
+#include "helicarm/measures/zones.h"
 #include "helicarm/pipeline/result.h"
 #include "helicarm/rectification/distortion_map.h"
+#include "measure_landmarks.h"
 
 namespace helicarm::cli {
 namespace {
@@ -245,7 +247,7 @@ Answers answers_to(const MeasureArguments& arguments) {
   std::optional<Measured> measured;
   if (arguments.calibration) measured = measured_from(arguments);
   const auto table = value_or_throw(
-      read_csv(arguments.clicks, {"measure", "kind", "view", "name", "u_px", "v_px"}, {"sigma_px"}));
+      read_csv(*arguments.clicks, {"measure", "kind", "view", "name", "u_px", "v_px"}, {"sigma_px"}));
   const std::vector<Wanted> all = wanted_measures(table, measured, arguments.raw);
   std::vector<Answer> answers;
   for (const Wanted& wanted : all) {
@@ -284,10 +286,24 @@ void print(const Answer& answer, std::ostream& out) {
                          warning.value("message", warning.value("code", std::string())));
 }
 
+void check_combination(const MeasureArguments& arguments) {
+  if (arguments.clicks.has_value() == arguments.landmarks.has_value())
+    throw BadInput(Reason::usage, "give --clicks (of an image) or --landmarks (of a CT)");
+  if (arguments.zones && !arguments.landmarks) throw BadInput(Reason::usage, "--zones needs --landmarks");
+  if (arguments.landmarks && (arguments.raw || arguments.depth_mm || arguments.at))
+    throw BadInput(Reason::usage, "--raw, --depth and --at are of --clicks");
+}
+
 }  // namespace
 
 CommandResult measure_command(const MeasureArguments& arguments, Console& console) {
   return guarded([&] {
+    if (arguments.print_zones) {
+      console.out << measures::usual_zones_text();
+      return;
+    }
+    check_combination(arguments);
+    if (arguments.landmarks) return measure_landmarks(arguments, console);
     const auto [answers, notes] = answers_to(arguments);
     for (const Warning& note : notes) console.progress << note.message << '\n';
     if (!console.json) {
@@ -309,7 +325,8 @@ void add_measure(CLI::App& app, Action& action) {
       app, group::measure, "measure",
       "Measure in single images: distance, angle, circle, positions in femur and tibia",
       "helicarm measure --clicks clicks.csv --calibration my-result/result.json\n"
-      "  helicarm measure --clicks clicks.csv      without a calibration: lengths in pixels\n\n"
+      "  helicarm measure --clicks clicks.csv      without a calibration: lengths in pixels\n"
+      "  helicarm measure --landmarks femur.csv --registration my-registration/registration.json\n\n"
       "kind and the names of its clicks:\n"
       "  distance           from, to\n"
       "  angle              first, vertex, second\n"
@@ -319,12 +336,22 @@ void add_measure(CLI::App& app, Action& action) {
       "  tibia_ap           anterior, posterior[, plateau1, plateau2]\n"
       "  tibia_ml           medial, lateral\n"
       "In the last three, clicks of other names are points whose positions are given in per cent; a point\n"
-      "without pixels is the located one of this name in result.json.");
+      "without pixels is the located one of this name in result.json. With --landmarks these three are "
+      "measured "
+      "in\nthe bone's CT, in three dimensions; femoral_quadrants and tibia_ap also need axis_medial and "
+      "axis_lateral, the\nends of the axis of a true lateral image, such as both condyles' posterior "
+      "borders.");
   auto& a = arguments_of(command, action, measure_command);
-  command
-      ->add_option("--clicks", a.clicks,
-                   "CSV: measure,kind,view,name,u_px,v_px[,sigma_px], rectified pixels; a row per click")
-      ->required();
+  command->add_option("--clicks", a.clicks,
+                      "CSV: measure,kind,view,name,u_px,v_px[,sigma_px], rectified pixels; a row per click");
+  command->add_option(
+      "--landmarks", a.landmarks,
+      "CSV: measure,kind,model,name,x_mm,y_mm,z_mm[,sigma_mm] in the CT; a row without numbers is "
+      "a point of the model's plan (--registration) or a located one (--calibration too)");
+  command->add_option(
+      "--zones", a.zones,
+      "zones.json: published positions with their sources, to compare with; default: built in");
+  command->add_flag("--print-zones", a.print_zones, "Print the built-in zones.json");
   command->add_option("--calibration", a.calibration, "result.json of a run: gives lengths in mm");
   command->add_option("--registration", a.registration,
                       "registration.json of the same views: its planned points may be named too");

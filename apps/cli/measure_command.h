@@ -10,7 +10,11 @@
 namespace helicarm::cli {
 
 struct MeasureArguments {
-  std::filesystem::path clicks;  ///< CSV: measure,kind,view,name,u_px,v_px[,sigma_px]
+  std::optional<std::filesystem::path> clicks = {};  ///< CSV: measure,kind,view,name,u_px,v_px[,sigma_px]
+  /// Instead: CSV in the bone's CT: measure,kind,model,name,x_mm,y_mm,z_mm[,sigma_mm]
+  std::optional<std::filesystem::path> landmarks = {};
+  std::optional<std::filesystem::path> zones = {};         ///< of --landmarks; without it the built-in ones
+  bool print_zones = false;                                ///< only
   std::optional<std::filesystem::path> calibration = {};   ///< result.json; without it lengths are in pixels
   std::optional<std::filesystem::path> registration = {};  ///< registration.json: its planned points
   bool raw = false;                                        ///< clicks are raw pixels, not rectified ones

@@ -175,5 +175,94 @@ TEST(MeasureCommand, RefusalsNameTheRow) {
   EXPECT_THAT(refusal(distance + "d,angle,LAT,vertex,1,2,\n"), HasSubstr("another kind"));
 }
 
+/// Landmarks of a femur in its CT, which lies turned by 90 degrees about z in the calibrator's frame.
+struct InSpace {
+  CommandResult result;
+  std::string text;
+};
+
+InSpace in_space(const std::string& rows, bool as_json = true, const std::string& zones = {}) {
+  const fs::path folder = fs::temp_directory_path() / fmt::format("helicarm_in_space_{}", ::getpid());
+  const Json zero = geometry::json_rows(Eigen::Matrix<double, 6, 6>::Zero());
+  const Json turned = {{0, 0, 1, 0}, {1, 0, 0, 0}, {0, 1, 0, 20}, {0, 0, 0, 1}};
+  const Json planned{{"name", "planned_start"},
+                     {"xyz_mm", {-7, -20, 7.5}},
+                     {"covariance_mm2", geometry::json_rows(Eigen::Matrix3d::Identity())}};
+  const Json model{{"name", "femur"},    {"decision", "accept"},    {"world_from_model", turned},
+                   {"covariance", zero}, {"centre_mm", {0, 0, 20}}, {"points", {planned}}};
+  EXPECT_TRUE(write_file(folder / "result.json", measured_result_json().dump()));
+  EXPECT_TRUE(write_file(folder / "registration.json", Json{{"models", {model}}}.dump()));
+  EXPECT_TRUE(
+      write_file(folder / "landmarks.csv", "measure,kind,model,name,x_mm,y_mm,z_mm,sigma_mm\n" + rows));
+  EXPECT_TRUE(write_file(folder / "zones.json", zones));
+  MeasureArguments arguments;
+  arguments.landmarks = folder / "landmarks.csv";
+  arguments.calibration = folder / "result.json";
+  arguments.registration = folder / "registration.json";
+  if (!zones.empty()) arguments.zones = folder / "zones.json";
+  std::ostringstream out, progress;
+  Console console{out, progress};
+  console.json = as_json;
+  auto result = measure_command(arguments, console);
+  return {std::move(result), out.str()};
+}
+
+const std::string femur_in_ct =
+    "q,femoral_quadrants,femur,axis_medial,-45,-25,-20,0.5\n"
+    "q,femoral_quadrants,femur,axis_lateral,5,-25,-20,0.5\n"
+    "q,femoral_quadrants,femur,blumensaat_posterior,0,-20,0,0.5\n"
+    "q,femoral_quadrants,femur,blumensaat_anterior,-3,20,0,0.5\n"
+    "q,femoral_quadrants,femur,inferior,8,3,-25,0.5\n"
+    "q,femoral_quadrants,femur,posterior,6,-25,-10,0.5\n"
+    "q,femoral_quadrants,femur,anterior,7,25,-4,0.5\n";
+
+TEST(MeasureLandmarks, APlannedPointIsGivenInQuadrantsBesidePublishedZones) {
+  const InSpace done = in_space(femur_in_ct + "q,femoral_quadrants,femur,planned_start,,,,\n");
+  ASSERT_TRUE(done.result) << done.result.error().message;
+  const Json measure = (*parse_json(done.text, "out"))["measures"][0];
+  // In the model the point lies at (-20, -12.5, -7).
+  EXPECT_NEAR(measure["positions"][0]["percent"]["depth"].get<double>(), 25, 1e-9);
+  EXPECT_NEAR(measure["positions"][0]["percent"]["height"].get<double>(), 28, 1e-9);
+  EXPECT_EQ(measure["positions"][0]["zones"].size(), 2U);
+  EXPECT_NEAR(measure["positions"][0]["zones"][0]["from_centre_percent"]["depth"].get<double>(), 0.2, 1e-9);
+}
+
+TEST(MeasureLandmarks, AViewBesideTheTrueLateralOneIsNamed) {
+  // The view looks along z, the model's y.
+  const std::string rows =
+      "t,tibia_ap,femur,axis_medial,8,-30,0,0\nt,tibia_ap,femur,axis_lateral,-4,30,0,0\n"
+      "t,tibia_ap,femur,anterior,0,0,20,0\nt,tibia_ap,femur,posterior,0,0,-30,0\nt,tibia_ap,femur,FS,,,,\n";
+  const InSpace done = in_space(rows);
+  ASSERT_TRUE(done.result) << done.result.error().message;
+  const Json view = (*parse_json(done.text, "out"))["measures"][0]["laterals"][0];
+  EXPECT_EQ(view["view"], "LAT");
+  EXPECT_NEAR(view["off_deg"].get<double>(), 11.3, 0.1);
+  EXPECT_NEAR(view["apart_mm"].get<double>(), 12, 1);
+  EXPECT_FALSE(view["is_lateral"]);
+  EXPECT_THAT(in_space(rows, false).text, HasSubstr("this image is no lateral one"));
+}
+
+TEST(MeasureLandmarks, ZonesOfAFileReplaceTheBuiltInOnes) {
+  const InSpace done =
+      in_space(femur_in_ct + "q,femoral_quadrants,femur,P,-20,-12.5,-7,\n", true,
+               R"({"format": "helicarm-zones/1", "zones": [{"kind": "femoral_quadrants", "name": "mine",
+                   "source": "our clinic", "depth": {"low": 40, "high": 50}}]})");
+  ASSERT_TRUE(done.result) << done.result.error().message;
+  const Json zone = (*parse_json(done.text, "out"))["measures"][0]["positions"][0]["zones"][0];
+  EXPECT_EQ(zone["name"], "mine");
+  EXPECT_TRUE(zone["outside"]);
+}
+
+TEST(MeasureLandmarks, WhatIsMissingIsNamed) {
+  EXPECT_THAT(in_space(femur_in_ct + "q,femoral_quadrants,femur,nowhere,,,,\n").result.error().message,
+              HasSubstr("\"nowhere\" has no coordinates"));
+  EXPECT_THAT(in_space("q,femoral_quadrants,tibia,FS,,,,\n").result.error().message,
+              HasSubstr("no registered model"));
+  EXPECT_THAT(in_space("q,quadrants,femur,FS,1,2,3,\n").result.error().message, HasSubstr("is none of"));
+  std::ostringstream out, progress;
+  Console console{out, progress};
+  EXPECT_EQ(measure_command({}, console).error().reason, Reason::usage);
+}
+
 }  // namespace
 }  // namespace helicarm::cli

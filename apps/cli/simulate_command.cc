@@ -18,6 +18,7 @@
 #include "helicarm/volume/hounsfield.h"
 #include "helicarm/volume/read_volume.h"
 #include "named_files.h"
+#include "simulated_ct.h"
 
 namespace helicarm::cli {
 
@@ -36,9 +37,7 @@ struct SimulateArguments {
   std::optional<double> arc_deg, flex_mm, jitter_mm;
   std::vector<std::string> views;         ///< NAME:PRIMARY,SECONDARY (deg); none: AP and LAT
   std::optional<std::uint64_t> arm_seed;  ///< none: the seed
-  std::filesystem::path ct;               ///< a CT volume instead of the synthetic knee
-  std::vector<double> ct_centre_mm;       ///< three numbers or none
-  std::vector<double> ct_turn_deg;
+  CtArguments ct;
   /// decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL for a missing ball
   std::vector<std::string> faults;
   std::vector<double> distances_mm;  ///< kind grid: from the receiver to the wires; none: 45 mm
@@ -47,52 +46,6 @@ struct SimulateArguments {
 namespace {
 
 using simulation::Visibility;
-
-Eigen::Vector3d three(const std::vector<double>& numbers, const char* option) {
-  if (numbers.size() != 3)
-    throw BadInput(Reason::usage, fmt::format("simulate: {} takes three numbers", option));
-  return Eigen::Vector3d::Map(numbers.data());
-}
-
-void check_inside(const volume::Volume& volume, const Eigen::Vector3d& centre) {
-  const Eigen::Vector3d last = (volume.size.cast<double>().array() - 1).matrix();
-  const Eigen::Array3d voxel = (volume.patient_from_voxel.inverse() * centre).array();
-  if ((voxel >= -0.5).all() && (voxel <= last.array() + 0.5).all()) return;
-  const Eigen::AlignedBox3d block =
-      Eigen::AlignedBox3d(Eigen::Vector3d::Zero(), last).transformed(volume.patient_from_voxel);
-  throw BadInput(
-      Reason::bad_value,
-      fmt::format("--ct-centre: {:g},{:g},{:g} lies outside the CT, which extends from {:g},{:g},{:g} to "
-                  "{:g},{:g},{:g} mm",
-                  centre.x(), centre.y(), centre.z(), block.min().x(), block.min().y(), block.min().z(),
-                  block.max().x(), block.max().y(), block.max().z()));
-}
-
-std::shared_ptr<const simulation::CtOptions> ct_from(const SimulateArguments& arguments,
-                                                     const Console& console) {
-  if (arguments.ct.empty()) {
-    if (!arguments.ct_centre_mm.empty() || !arguments.ct_turn_deg.empty())
-      throw BadInput(Reason::usage, "simulate: --ct-centre and --ct-turn require --ct");
-    return nullptr;
-  }
-  if (!arguments.knee) throw BadInput(Reason::usage, "simulate: --no-knee cannot be combined with --ct");
-  if (arguments.kind == "grid")
-    throw BadInput(Reason::usage, "simulate: --ct cannot be combined with --kind grid");
-  simulation::CtOptions ct;
-  ct.volume = value_or_throw(volume::read_volume(arguments.ct));
-  const std::filesystem::path whole = std::filesystem::absolute(arguments.ct).lexically_normal();
-  ct.name = (whole.has_filename() ? whole : whole.parent_path()).filename().string();
-  for (Warning& warning : value_or_throw(volume::check_hounsfield(ct.volume, ct.name)))
-    ct.volume.warnings.push_back(std::move(warning));
-  for (const Warning& warning : ct.volume.warnings)
-    console.progress << fmt::format("helicarm: {}: {}\n", code(warning.reason), warning.message);
-  if (!arguments.ct_centre_mm.empty()) {
-    ct.centre = three(arguments.ct_centre_mm, "--ct-centre");
-    check_inside(ct.volume, *ct.centre);
-  }
-  if (!arguments.ct_turn_deg.empty()) ct.turn_deg = three(arguments.ct_turn_deg, "--ct-turn");
-  return std::make_shared<simulation::CtOptions>(std::move(ct));
-}
 
 simulation::SimulationOptions options_from(const SimulateArguments& arguments, const Console& console) {
   simulation::SimulationOptions options;
@@ -117,7 +70,11 @@ simulation::SimulationOptions options_from(const SimulateArguments& arguments, c
   if (!arguments.plate.empty()) options.plate = plate_from(arguments.plate);
   if (options.calibrator && options.kind == simulation::CaseKind::grid)
     throw BadInput(Reason::usage, "simulate: --calibrator cannot be combined with --kind grid");
-  options.ct = ct_from(arguments, console);
+  if (!arguments.ct.path.empty() && !arguments.knee)
+    throw BadInput(Reason::usage, "simulate: --no-knee cannot be combined with --ct");
+  if (!arguments.ct.path.empty() && options.kind == simulation::CaseKind::grid)
+    throw BadInput(Reason::usage, "simulate: --ct cannot be combined with --kind grid");
+  options.ct = ct_from(arguments.ct, console);
   constexpr std::string_view lost = "lost:";
   for (const std::string& fault : arguments.faults)
     if (fault.starts_with(lost))
@@ -286,20 +243,7 @@ void add_simulate(CLI::App& app, Action& action) {
       ->allow_extra_args(false);
   command->add_option("--arm-seed", a.arm_seed, "Seed of the C-arm (default: the seed)")
       ->check(within(0, 1e19));
-  command->add_option("--ct", a.ct,
-                      "A CT instead of the synthetic knee: MHA, NRRD, NIfTI or a folder of DICOM slices");
-  command
-      ->add_option("--ct-centre", a.ct_centre_mm,
-                   "x,y,z (L, P, S; mm) of the CT at the knee's origin; default: its centre")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(within(-1e5, 1e5));
-  command
-      ->add_option("--ct-turn", a.ct_turn_deg,
-                   "x,y,z: rotation of the CT about the knee's distal, lateral and anterior axis, degrees")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(within(-360, 360));
+  add_ct(*command, a.ct);
   command
       ->add_option(
           "--fault", a.faults,

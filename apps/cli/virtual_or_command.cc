@@ -17,6 +17,7 @@
 #include "helicarm/virtual_devices/virtual_devices.h"
 #include "helicarm/virtual_devices/virtual_devices_fields.h"
 #include "line_input.h"
+#include "simulated_ct.h"
 #include "stop_signal.h"
 
 namespace helicarm::cli {
@@ -27,6 +28,7 @@ struct VirtualOrArguments {
   std::filesystem::path plan;  ///< written for `navigate`; empty: none
   bool check_points = false;   ///< in the plan
   std::optional<double> seconds;
+  CtArguments ct;
 };
 
 namespace {
@@ -168,6 +170,7 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
     StopSignal end;
     virtual_devices::VirtualDevicesOptions options = arguments.virtual_or;
     options.seed = console.seed;
+    options.ct = ct_from(arguments.ct, console);
     std::mutex telling;
     options.on_notice = [&](const std::string& line) {
       const std::lock_guard lock(telling);
@@ -179,6 +182,7 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
       if (arguments.check_points)
         plan.check_points = {{"femur notch", "femur", notch_limit_mm},
                              {"tibia notch", "tibia", notch_limit_mm}};
+      if (options.ct) plan.picks.clear(), plan.tunnels.clear();  // the knee's; a model's take their place
       value_or_throw(write_file(arguments.plan, to_text(operation::to_json(plan))));
     }
     if (!console.quiet)
@@ -207,6 +211,7 @@ void add_virtual_or(CLI::App& app, Action& action) {
   command->add_flag(
       "--freehand", a.virtual_or.freehand,
       "A person holds the drill; there is no robot, and the plan is one for freehand navigation");
+  add_ct(*command, a.ct);
   add_fields(command, a.virtual_or, virtual_devices::virtual_devices_fields);
   add_port(command, "--tracker-port", a.virtual_or.tracker_port,
            "Port of the tracker; 0: a free port, as for the ports below");

@@ -84,10 +84,11 @@ double level_around(const Reconstruction& volume, int first_z, int end_z, double
   return level;
 }
 
-/// Number of voxels of slices above half of the contrast between the level around and the mean of the
-/// `highest` voxels; nothing where that is noise. Metal may be dark or bright.
-std::optional<double> count_above_half(const Reconstruction& volume, int first_z, int end_z,
-                                       std::size_t highest) {
+/// Mean squared distance from their middle, along `axes` axes, of the voxels of slices above half of the
+/// contrast between the level around and the mean of the `highest` voxels, in voxels; nothing where that is
+/// noise. Metal may be dark or bright.
+std::optional<double> spread_above_half(const Reconstruction& volume, int first_z, int end_z,
+                                        std::size_t highest, Eigen::Index axes) {
   constexpr double least_contrast = 8;  // times the scatter
   double scatter = 0;
   const double level = level_around(volume, first_z, end_z, scatter);
@@ -96,15 +97,24 @@ std::optional<double> count_above_half(const Reconstruction& volume, int first_z
              end = volume.values.begin() + std::ptrdiff_t(slice) * end_z;
   const auto [lowest, top] = std::minmax_element(first, end);
   const double sign = *top - level >= level - *lowest ? 1 : -1;
-  std::vector<double> above;
-  for (auto value = first; value != end; ++value) above.push_back(sign * (*value - level));
-  std::vector<double> ranked = above;
+  std::vector<double> ranked;
+  for (auto value = first; value != end; ++value) ranked.push_back(sign * (*value - level));
   highest = std::clamp<std::size_t>(highest, 1, ranked.size());
   std::ranges::nth_element(ranked, ranked.begin() + std::ptrdiff_t(highest) - 1, std::greater<>());
   double peak = 0;
   for (std::size_t i = 0; i < highest; ++i) peak += ranked[i] / double(highest);
   if (!(peak > least_contrast * scatter)) return {};
-  return double(std::ranges::count_if(above, [&](double value) { return value > peak / 2; }));
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), squares = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (int z = first_z; z < end_z; ++z)
+    for (int y = 0; y < volume.size[1]; ++y)
+      for (int x = 0; x < volume.size[0]; ++x) {
+        if (sign * (volume.at(x, y, z) - level) < peak / 2) continue;
+        const Eigen::Vector3d at(x, y, z);
+        sum += at, squares += at.cwiseAbs2(), count += 1;
+      }
+  constexpr double within_voxel = 1.0 / 12;
+  return (squares / count - (sum / count).cwiseAbs2()).head(axes).sum() + within_voxel * double(axes);
 }
 
 }  // namespace
@@ -138,20 +148,22 @@ Expected<Reconstruction> reconstruct(const std::string& program, const std::file
 }
 
 std::optional<double> ball_width_mm(const Reconstruction& volume, double nominal_mm) {
-  constexpr double share_of_ball = 0.1;  // whose mean is the maximum: one voxel alone is noise
+  constexpr double share_of_ball = 0.1;             // whose mean is the maximum: one voxel alone is noise
+  constexpr double diameter2_by_spread = 20.0 / 3;  // of a ball
   const double ball = std::pow(nominal_mm / volume.voxel_mm, 3) * EIGEN_PI / 6;
-  const auto voxels = count_above_half(volume, 0, volume.size[2], std::size_t(share_of_ball * ball) + 1);
-  if (!voxels) return {};
-  return std::cbrt(*voxels * 6 / EIGEN_PI) * volume.voxel_mm;
+  const auto spread = spread_above_half(volume, 0, volume.size[2], std::size_t(share_of_ball * ball) + 1, 3);
+  if (!spread) return {};
+  return std::sqrt(diameter2_by_spread * *spread) * volume.voxel_mm;
 }
 
 std::optional<double> wire_width_mm(const Reconstruction& volume) {
   constexpr std::size_t highest = 4;
+  constexpr double diameter2_by_spread = 8;  // of a circle
   double sum = 0;
   for (int z = 0; z < volume.size[2]; ++z) {
-    const auto pixels = count_above_half(volume, z, z + 1, highest);
-    if (!pixels) return {};
-    sum += std::sqrt(*pixels * 4 / EIGEN_PI) * volume.voxel_mm;
+    const auto spread = spread_above_half(volume, z, z + 1, highest, 2);
+    if (!spread) return {};
+    sum += std::sqrt(diameter2_by_spread * *spread) * volume.voxel_mm;
   }
   return sum / volume.size[2];
 }

@@ -34,11 +34,12 @@ Expected<Reconstruction> reconstruct(const std::string& program, const std::file
 /// First line that the program prints of its version; missing_file where there is no such program.
 Expected<std::string> version_of(const std::string& program);
 
-/// Width at half maximum: diameter of the ball whose volume is that of the voxels above half of the contrast.
-/// `nominal_mm`: the ball's diameter. Nothing where nothing stands out of the noise.
+/// Width at half maximum: diameter of the ball that spreads as the voxels above half of the contrast do, by
+/// their second moments; so what is doubled or bent is wide. `nominal_mm`: the ball's diameter. Nothing where
+/// nothing stands out of the noise.
 std::optional<double> ball_width_mm(const Reconstruction& volume, double nominal_mm);
 
-/// Likewise of a wire along z: diameter of the circle of that area, mean of the slices.
+/// Likewise of a wire along z: diameter of the circle that spreads as much, mean of the slices.
 std::optional<double> wire_width_mm(const Reconstruction& volume);
 
 /// The middle slice across z for display; white: the volume's highest value.

@@ -41,6 +41,15 @@ TEST(WidthAtHalfMaximum, OfAWireIsItsDiameter) {
   EXPECT_NEAR(wire_width_mm(blob(0.9, 0, 1000, 30)).value_or(0), 1.8, 0.1);
 }
 
+TEST(WidthAtHalfMaximum, TwoBallsAreWiderThanOne) {
+  Reconstruction two = blob(1.2, 1, 1000, 30);
+  const double one_mm = ball_width_mm(two, 2.4).value_or(0);
+  const std::vector<float> other = two.values;
+  for (std::size_t i = 20; i < two.values.size(); ++i)
+    two.values[i] = std::max(two.values[i], other[i - 20]);  // 4 mm to the right
+  EXPECT_GT(ball_width_mm(two, 2.4).value_or(0), 1.8 * one_mm);
+}
+
 TEST(WidthAtHalfMaximum, NoiseAloneHasNone) {
   EXPECT_FALSE(ball_width_mm(blob(1.6, 1, 0, 30), 3.2));
   EXPECT_FALSE(wire_width_mm(blob(1.6, 0, 0, 30)));

@@ -39,11 +39,13 @@ Eigen::Matrix3d pointer_at(const Vector3d& ball_in_tracker, int touch) {
 
 }  // namespace
 
-Expected<std::unique_ptr<SimulatedScene>> SimulatedScene::set_up(std::uint64_t seed, int image_size) {
+Expected<std::unique_ptr<SimulatedScene>> SimulatedScene::set_up(
+    std::uint64_t seed, int image_size, std::shared_ptr<const simulation::CtOptions> ct) {
   simulation::SimulationOptions options;
   options.seed = seed;
   options.kind = simulation::CaseKind::tunnels;
   options.size = image_size;
+  options.ct = std::move(ct);
   auto simulated_case = simulation::simulate_case(options);
   if (!simulated_case) return tl::unexpected<Failure>(simulated_case.error());
   return std::unique_ptr<SimulatedScene>(new SimulatedScene(*std::move(simulated_case)));

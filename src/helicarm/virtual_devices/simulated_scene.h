@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 
@@ -18,8 +19,10 @@ namespace helicarm::virtual_devices {
 /// table. All members are thread-safe.
 class SimulatedScene {
  public:
-  /// Renders the X-ray images of the seed's AP and lateral view. Refuses as `simulate_case`.
-  static Expected<std::unique_ptr<SimulatedScene>> set_up(std::uint64_t seed, int image_size = 1024);
+  /// Renders the X-ray images of the seed's AP and lateral view. `ct`: instead of the modelled knee, on the
+  /// femur's marker; the tunnels' balls stay. Refuses as `simulate_case`.
+  static Expected<std::unique_ptr<SimulatedScene>> set_up(
+      std::uint64_t seed, int image_size = 1024, std::shared_ptr<const simulation::CtOptions> ct = {});
 
   const simulation::SimulatedCase& simulated_case() const { return simulated_case_; }
 

@@ -45,7 +45,8 @@ std::string hide_names(const VirtualTracker& tracker) {
 Expected<std::unique_ptr<VirtualDevices>> VirtualDevices::open(const VirtualDevicesOptions& options) {
   return guarded([&] {
     std::unique_ptr<VirtualDevices> virtual_or(new VirtualDevices);
-    virtual_or->simulated_scene_ = value_or_throw(SimulatedScene::set_up(options.seed, options.image_size));
+    virtual_or->simulated_scene_ =
+        value_or_throw(SimulatedScene::set_up(options.seed, options.image_size, options.ct));
     SimulatedScene& simulated_scene = *virtual_or->simulated_scene_;
 
     if (options.freehand)

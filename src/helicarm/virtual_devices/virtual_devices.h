@@ -25,6 +25,7 @@ struct VirtualDevicesOptions {
   bool freehand = false;  ///< a person holds the drill; there is no robot
   std::uint16_t primary_port = 0;
   bool ndi_tracker = false;  ///< the tracker speaks NDI's API in place of OpenIGTLink
+  std::shared_ptr<const simulation::CtOptions> ct = {};  ///< instead of the modelled knee
 };
 
 /// A simulated scene with a running tracker and a robot or a hand-held drill; the C-arm sends by `shoot`. All
