@@ -65,12 +65,33 @@ std::optional<Exchange> exchange_in(SequenceData& work, const std::vector<Shape>
   return best;
 }
 
+/// The names of a body's markers are those of the first frame: where most frames have two exchanged, so has
+/// the geometry learnt from them.
+void take_first_names(SequenceData& work, std::vector<Shape>& shapes) {
+  for (std::size_t round = 0; round < work.markers; ++round) {
+    const auto found = exchange_in(work, shapes, 0);
+    if (!found || found->view != work.views) return;
+    bool is_taken = false;
+    for (std::size_t b = 0; b < shapes.size(); ++b) {
+      const BodyPlan& plan = work.the_case.bodies[b];
+      const auto first = std::ranges::find(plan.markers, found->first),
+                 second = std::ranges::find(plan.markers, found->second);
+      if (first == plan.markers.end() || second == plan.markers.end() || !plan.geometry.empty()) continue;
+      std::swap(shapes[b].in_body[std::size_t(first - plan.markers.begin())],
+                shapes[b].in_body[std::size_t(second - plan.markers.begin())]);
+      is_taken = true;
+    }
+    if (!is_taken) return;
+  }
+}
+
 }  // namespace
 
 void repair_exchanges(SequenceData& work, Sequence& sequence) {
   std::vector<Shape> shapes;
   for (const BodyPlan& plan : work.the_case.bodies)
     shapes.push_back(shape_of(work, plan, std::vector<char>(plan.markers.size(), 1)));
+  take_first_names(work, shapes);
   for (std::size_t f = 0; f < work.frames; ++f)
     while (const auto found = exchange_in(work, shapes, f)) {
       exchange(work, f, found->first, found->second, found->view);

@@ -209,6 +209,19 @@ TEST(Sequence, SwapOfTwoMarkersIsRepaired) {
   }
 }
 
+TEST(Sequence, NamesOfTheFirstFrameCountWhereMostFramesAreSwapped) {
+  constexpr std::size_t begin = 11;
+  const TrackCase the_case = two_bodies();
+  auto sights = drawn(the_case, none);
+  for (std::size_t f = begin; f < sights.size(); ++f) std::swap(sights[f].of[1], sights[f].of[3]);
+  const Sequence sequence = estimate_sequence(the_case, sights);
+  EXPECT_EQ(sequence.repaired, int(sights.size() - begin));
+  EXPECT_LT(farthest(sequence, none), 0.2);
+  const Warning* warning = warning_of(sequence, Reason::markers_swapped);
+  ASSERT_TRUE(warning);
+  EXPECT_TRUE(warning->message.starts_with("frame 12: ")) << warning->message;
+}
+
 TEST(Sequence, SwapInOneViewIsRepaired) {
   const TrackCase the_case = two_bodies();
   auto sights = drawn(the_case, none);
