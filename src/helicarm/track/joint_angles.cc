@@ -47,7 +47,7 @@ std::optional<Joint6> joint_of(const AxesNow& reference, const AxesNow& body) {
                         between = body.origin - reference.origin;
   Joint6 joint;
   joint << std::atan2(r(1, 2), r(2, 2)), std::atan2(r(0, 2), cosine), std::atan2(r(0, 1), r(0, 0)),
-      between.dot(x), between.dot(floating), -between.dot(z);
+      between.dot(x), between.dot(floating), (reference.origin - body.origin).dot(z);
   return joint;
 }
 

@@ -68,15 +68,14 @@ std::string motion_charts(const std::vector<int>& frames, const std::vector<std:
                           const std::vector<BodySequence>& bodies,
                           const std::vector<std::vector<TrackedBody>>& relative,
                           const std::vector<report::Chart>& residuals,
-                          const std::vector<std::vector<report::ChartSeries>>& beside) {
+                          const std::vector<std::vector<report::Chart>>& further) {
   std::string html;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     std::vector<report::Chart> charts{
         pose_chart(frames, bodies[b].smoothed, "Centre from its place in the first frame", false),
         pose_chart(frames, bodies[b].smoothed, "Rotation vector against the first frame", true),
         residuals[b]};
-    if (b < beside.size())
-      charts[0].series.insert(charts[0].series.end(), beside[b].begin(), beside[b].end());
+    if (b < further.size()) charts.insert(charts.end(), further[b].begin(), further[b].end());
     html += fmt::format(
         "<h2>{}</h2>\n<figure class=\"plain\">{}<figcaption>Smoothed; bars: 95 %.</figcaption></figure>\n",
         report::escaped(names[b]), report::chart_svg(charts));

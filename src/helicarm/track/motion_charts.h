@@ -16,12 +16,12 @@ std::string report_card(const std::string& value, const std::string& what);
 std::string warnings_list(const std::vector<Warning>& warnings);
 
 /// For each body its smooth motion against the first frame with 95 % bars and the chart of its residuals,
-/// then the motion of each further body in the first one's coordinates. `beside`: further curves of each
-/// body's centre. HTML.
+/// then the motion of each further body in the first one's coordinates. `further`: charts of each
+/// body behind these. HTML.
 std::string motion_charts(const std::vector<int>& frames, const std::vector<std::string>& names,
                           const std::vector<BodySequence>& bodies,
                           const std::vector<std::vector<TrackedBody>>& relative,
                           const std::vector<report::Chart>& residuals,
-                          const std::vector<std::vector<report::ChartSeries>>& beside = {});
+                          const std::vector<std::vector<report::Chart>>& further = {});
 
 }  // namespace helicarm::track

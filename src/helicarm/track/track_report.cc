@@ -16,31 +16,31 @@ namespace {
 
 constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
-/// Of each body, the mean of its markers' Butterworth-filtered places, where all have one, from the centre of
-/// its first smooth pose, by axes.
-std::vector<std::vector<report::ChartSeries>> filtered_centres(const Sequence& sequence,
-                                                               const TrackCase& the_case) {
+/// Of each body, how far the mean of its markers' Butterworth-filtered places, where all have one, is from
+/// its smooth centre; empty without a filter.
+std::vector<std::vector<report::Chart>> filter_charts(const Sequence& sequence, const TrackCase& the_case) {
   const auto places = butterworth_places(sequence, the_case);
-  std::vector<std::vector<report::ChartSeries>> curves;
-  if (places.empty()) return curves;
+  std::vector<std::vector<report::Chart>> charts;
+  if (places.empty()) return charts;
   for (std::size_t b = 0; b < the_case.bodies.size(); ++b) {
-    const auto& smoothed = sequence.bodies[b].smoothed;
-    const auto begun = std::ranges::find_if(smoothed, [](const auto& frame) { return bool(frame.pose); });
-    auto& of = curves.emplace_back();
-    if (begun == smoothed.end()) continue;
+    const auto& markers = the_case.bodies[b].markers;
+    report::Chart chart{fmt::format("Centre by Butterworth at {:g} Hz, less the smooth one",
+                                    the_case.butterworth->cut_off_hz),
+                        "frame", "mm"};
     for (int axis = 0; axis < 3; ++axis) {
-      report::ChartSeries curve{fmt::format("{}, Butterworth", "xyz"[axis])};
-      curve.dashed = true;
+      report::ChartSeries curve{std::string(1, "xyz"[axis])};
       for (std::size_t f = 0; f < sequence.frames.size(); ++f) {
-        double sum = 0;
-        for (const std::size_t marker : the_case.bodies[b].markers)
-          sum += places[marker][f] ? (*places[marker][f])[axis] - begun->centre[axis] : no_value;
-        curve.points.push_back({double(sequence.frames[f]), sum / double(the_case.bodies[b].markers.size())});
+        const TrackedBody& smooth = sequence.bodies[b].smoothed[f];
+        double sum = smooth.pose ? 0 : no_value;
+        for (const std::size_t marker : markers)
+          sum += places[marker][f] ? (*places[marker][f])[axis] - smooth.centre[axis] : no_value;
+        curve.points.push_back({double(sequence.frames[f]), sum / double(markers.size())});
       }
-      of.push_back(std::move(curve));
+      chart.series.push_back(std::move(curve));
     }
+    charts.push_back({std::move(chart)});
   }
-  return curves;
+  return charts;
 }
 
 std::string body_charts(const Sequence& sequence, const TrackCase& the_case) {
@@ -58,7 +58,7 @@ std::string body_charts(const Sequence& sequence, const TrackCase& the_case) {
     residuals.push_back(std::move(rms));
   }
   return motion_charts(sequence.frames, names, sequence.bodies, sequence.relative, residuals,
-                       filtered_centres(sequence, the_case));
+                       filter_charts(sequence, the_case));
 }
 
 /// Nothing where the bodies have no origins.
