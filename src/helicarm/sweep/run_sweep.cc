@@ -262,6 +262,28 @@ Failure nothing_accepted(const std::vector<FrameEstimate>& estimates) {
           {{"images", double(estimates.size())}}};
 }
 
+/// Why the accepted images of a run are not used: they are too few for a path, and the labels of more images
+/// were refused. A file that states some of a phantom's balls fits single images by chance.
+std::optional<Failure> unconfirmed(const std::vector<FrameEstimate>& estimates, std::size_t accepted) {
+  constexpr std::size_t least_confirmed = 8;  // frames of a path
+  std::size_t refused = 0;
+  const Failure* first = nullptr;
+  for (const FrameEstimate& at : estimates)
+    if (at.failure && (at.failure->reason == Reason::ambiguous_labels ||
+                       at.failure->reason == Reason::calibrator_mismatch)) {
+      ++refused;
+      if (!first) first = &*at.failure;
+    }
+  if (accepted >= least_confirmed || refused <= accepted) return std::nullopt;
+  return Failure{
+      first->reason,
+      fmt::format("only {} of {} images would be accepted, and the labels of {} are refused: too few "
+                  "to confirm each other; the first: {}",
+                  accepted, estimates.size(), refused, first->message),
+      {},
+      {{"accepted", double(accepted)}, {"refused", double(refused)}, {"images", double(estimates.size())}}};
+}
+
 SweepFrame reported(const Frame& frame, const FrameEstimate& estimate) {
   SweepFrame sweep_frame;
   sweep_frame.number = frame.number;
@@ -300,6 +322,11 @@ Sweep swept(const SweepCase& the_case, const SweepOptions& options,
     sweep.frames.push_back(reported(the_case.frames[i], estimates[i]));
   if (accepted == 0) {
     sweep.failure = nothing_accepted(estimates);
+    return sweep;
+  }
+  if (is_one_run(the_case)) sweep.failure = unconfirmed(estimates, accepted);
+  if (sweep.failure) {
+    for (SweepFrame& frame : sweep.frames) frame.best.reset();
     return sweep;
   }
   const PathKind kind = options.path.value_or(

@@ -55,6 +55,22 @@ TEST(RunSweep, CamerasOfARunAreNearTheTruthAndBlankImagesAreNamed) {
   EXPECT_NEAR(*sweep.path->source_to_detector_mm, 1000, 3);
 }
 
+TEST(RunSweep, AFileOfSomeOfTheBallsGivesNoWrongCamera) {
+  DrawnRun run;
+  run.frames = 6;
+  const TemporaryFolder folder;
+  run.write(folder.path());
+  Json calibrator = read_json(folder.path() / "calibrator.json").value();
+  calibrator["balls"].erase(calibrator["balls"].begin() + 6, calibrator["balls"].end());
+  ASSERT_TRUE(write_file(folder.path() / "calibrator.json", calibrator.dump()));
+  const Sweep sweep = *run_sweep(*read_sweep_case(folder.path()));
+  for (const SweepFrame& frame : sweep.frames) {
+    if (frame.best) EXPECT_LT(reprojection_px(frame.best->view, run.view(frame.number - 1)), 2) << frame.view;
+    if (frame.failure)
+      EXPECT_NE(frame.failure->message.find("if it has more"), std::string::npos) << frame.failure->message;
+  }
+}
+
 TEST(RunSweep, StatedDistanceThatTheImagesContradictIsWarnedOf) {
   DrawnRun run;
   run.stated_source_detector_mm = 1300;
