@@ -15,7 +15,7 @@ writes into the folder:
   examples/bones/bones.py vertebra my-vertebra --into my-case/case.json
 
 copies CT, plan and the mask that `helicarm segment --out my-vertebra` wrote beside a case.json or plan.json, and adds model and tunnel
-to it; in a plan.json the bone carries the marker that the virtual operating room calls "femur". The steps are in docs/howto.md ("A
+to it; in a plan.json the bone carries the marker that the virtual devices call "femur". The steps are in docs/howto.md ("A
 vertebra, a hip, a wrist"). Needs NumPy."""
 import argparse
 import json
