@@ -23,6 +23,7 @@ import registration_protocol as protocol
 
 RIGHT = ("femur", "tibia")
 WRONG = ("mirrored", "mirrored_tibia", "patient", "patient_tibia")
+MARKS = "<!-- registration anywhere -->", "<!-- end of the registration anywhere -->"
 END_MM = {"femur": (0, 5, 20.0), "tibia": (0, 5, -20.0)}
 
 
@@ -99,6 +100,7 @@ def main():
     parser.add_argument("--kinds", default=",".join(RIGHT + WRONG))
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--rows", type=pathlib.Path, help="JSON lines of all cases; those it holds are not run again")
+    parser.add_argument("--doc", type=pathlib.Path, help="renews the table between the marks of that document")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for the simulated cases (default: a temporary one)")
     arguments = parser.parse_args()
     rows = protocol.rows_in(arguments.rows)
@@ -117,6 +119,8 @@ def main():
                     with arguments.rows.open("a") as out:
                         out.write(json.dumps(rows[-1]) + "\n")
     print(table(rows))
+    if arguments.doc:
+        protocol.renew(arguments.doc, table(rows), *MARKS)
     return any(map(is_false, rows))
 
 
