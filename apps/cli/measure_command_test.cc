@@ -236,7 +236,7 @@ TEST(MeasureLandmarks, AViewBesideTheTrueLateralOneIsNamed) {
   ASSERT_TRUE(done.result) << done.result.error().message;
   const Json view = (*parse_json(done.text, "out"))["measures"][0]["laterals"][0];
   EXPECT_EQ(view["view"], "LAT");
-  EXPECT_NEAR(view["off_deg"].get<double>(), 11.3, 0.1);
+  EXPECT_NEAR(view["off_deg"].get<double>(), 11.3, 0.3);  // the axis lies beside the central ray
   EXPECT_NEAR(view["apart_mm"].get<double>(), 12, 1);
   EXPECT_FALSE(view["is_lateral"]);
   EXPECT_THAT(in_space(rows, false).text, HasSubstr("this image is no lateral one"));
