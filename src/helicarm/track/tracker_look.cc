@@ -96,7 +96,7 @@ FrameSights Tracker::look(int frame, const std::vector<xray::XrayImage>& images)
   std::vector<std::size_t> lost;
   std::vector<ExpectedMarker> alone;
   for (std::size_t m = 0; m < count; ++m)
-    if (body_of_[m] && std::ranges::all_of(assigned[m], [](int disc) { return disc == not_seen; })) {
+    if (body_of_[m] && std::ranges::find(assigned[m], not_seen) != assigned[m].end()) {
       lost.push_back(m);
       alone.push_back(expected(m));
       alone.back().covariance += 0.7 * 0.7 * Eigen::Matrix3d::Identity();
@@ -108,13 +108,15 @@ FrameSights Tracker::look(int frame, const std::vector<xray::XrayImage>& images)
   auto left = search(images, alone, std::nullopt);
   for (std::size_t k = 0; k < cameras_.size(); ++k)
     std::erase_if(left[k], [&](const Candidate& disc) {
-      return std::ranges::any_of(sights.of, [&](const auto& of) {
-        return of[k] && (of[k]->uv_raw - disc.image.uv_raw).norm() < 1.5;
-      });
+      for (std::size_t m = 0; m < count; ++m)
+        if (const auto& image = sights.of[m][k]; image && std::ranges::find(lost, m) == lost.end() &&
+                                                 (image->uv_raw - disc.image.uv_raw).norm() < 1.5)
+          return true;
+      return false;
     });
   const auto found = assign(cameras_, alone, left);
   for (std::size_t i = 0; i < lost.size(); ++i) {
-    constexpr double most_moved_mm = 3, clear_px = 0.12;
+    constexpr double most_moved_mm = 3, clear_px = 0.12, most_gap_mm = 0.15, most_off = 0.35;
     std::vector<Sight> seen;
     for (std::size_t k = 0; k < cameras_.size(); ++k)
       if (found[i][k] != not_seen) {
@@ -123,6 +125,17 @@ FrameSights Tracker::look(int frame, const std::vector<xray::XrayImage>& images)
       }
     const auto met = seen.size() >= 2 ? sighted_point(seen) : std::nullopt;
     if (!met || (met->place - again[lost[i]].place).norm() > most_moved_mm) continue;
+    // Beside a view that shows it where its body has it, another may show bone: a clear disc of its contrast.
+    if (std::ranges::any_of(assigned[lost[i]], [](int disc) { return disc != not_seen; })) {
+      bool is_like_it = met->ray_gap_mm < most_gap_mm;
+      for (std::size_t k = 0; k < cameras_.size(); ++k) {
+        if (found[i][k] == not_seen) continue;
+        const double expected = alone[i].images[k].visible,
+                     contrast = std::abs(left[k][std::size_t(found[i][k])].image.contrast);
+        is_like_it = is_like_it && expected > 0 && std::abs(contrast / expected - 1) < most_off;
+      }
+      if (!is_like_it) continue;
+    }
     for (std::size_t k = 0; k < cameras_.size(); ++k)
       if (found[i][k] != not_seen) sights.of[lost[i]][k] = left[k][std::size_t(found[i][k])].image;
   }
