@@ -114,8 +114,8 @@ void add_c_arm(CLI::App& app, Action& action) {
                   "Folders that hold case.json (measured now), or results: result.json, sweep.json")
       ->required();
 
-  auto* report =
-      command->add_subcommand("report", "Sag, repeatability and every acquisition, as a page, a PDF to sign and a table");
+  auto* report = command->add_subcommand(
+      "report", "Sag, repeatability and every acquisition, as a page, a PDF to sign and a table");
   auto& reported = arguments_of(report, action, c_arm_report_command);
   report->add_option("RECORD", reported.record, "The record (JSON)")->required();
   report->add_option("--out", reported.out, "Folder for report.html, report.pdf, c_arm.csv and c_arm.svg")

@@ -65,9 +65,8 @@ TEST(RunSweep, AFileOfSomeOfTheBallsGivesNoWrongCamera) {
   ASSERT_TRUE(write_file(folder.path() / "calibrator.json", calibrator.dump()));
   const Sweep sweep = *run_sweep(*read_sweep_case(folder.path()));
   for (const SweepFrame& frame : sweep.frames) {
-    if (frame.best) EXPECT_LT(reprojection_px(frame.best->view, run.view(frame.number - 1)), 2) << frame.view;
-    if (frame.failure)
-      EXPECT_NE(frame.failure->message.find("if it has more"), std::string::npos) << frame.failure->message;
+    if (!frame.best) continue;
+    EXPECT_LT(reprojection_px(frame.best->view, run.view(frame.number - 1)), 2) << frame.view;
   }
 }
 

@@ -88,8 +88,8 @@ Json sweep_schema();
 /// report.html as one page.
 std::string sweep_report(const Sweep& sweep);
 
-/// Writes sweep.json, geometry/, frames.csv, report.html and of a check check.csv into the folder. A refused run has no
-/// geometry/.
+/// Writes sweep.json, geometry/, frames.csv, report.html and of a check check.csv into the folder. A refused
+/// run has no geometry/.
 Expected<void> write_sweep(const Sweep& sweep, const std::filesystem::path& folder);
 
 /// Removes what `write_sweep` wrote into the folder earlier.
