@@ -64,7 +64,7 @@ TEST(PdfDocument, ChartsLeaveOutWhatIsNotFinite) {
   PdfDocument pdf("C-arm", "");
   pdf.chart(chart);
   pdf.chart({"empty", "angle", "mm"});
-  EXPECT_THAT(pdf.bytes(), HasSubstr("predicted (line); seen (dots)"));
+  EXPECT_THAT(pdf.bytes(), HasSubstr(R"(predicted \(line\); seen \(dots\))"));
   EXPECT_THAT(pdf.bytes(), Not(HasSubstr("nan")));
   EXPECT_THAT(pdf.bytes(), Not(HasSubstr("inf")));
 }
