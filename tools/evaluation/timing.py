@@ -52,10 +52,9 @@ def pairs(helicarm, folder, a):
     run = lambda name, *options: [[helicarm, "run", folder / name, "--out", folder / "out", "--quiet", *options]]
     yield row("two images, plate of 48 dots: `run --no-report`", run("pair", "--no-cache", "--no-report"), a.repeat)
     yield row("the same with report: `run`", run("pair", "--no-cache"), a.repeat)
-    cost(run("dense", "--cache", folder / "cache")[0])
+    cost(run("dense", "--no-cache")[0])
     holes = min(view["rectification"]["dots_found"] for view in json.loads((folder / "out" / "result.json").read_text())["views"])
     yield row(f"two images, perforated plate, {holes} holes and more found: `run`", run("dense", "--no-cache"), a.repeat)
-    yield row("the same again, maps from the cache", run("dense", "--cache", folder / "cache"), a.repeat)
 
 
 def runs(helicarm, folder, a):
