@@ -33,16 +33,17 @@ def launch(command):
 
 
 def cost(name, *command):
-    """Row of the table: CPU seconds, seconds, MB of the largest process."""
-    before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    """Row of the table: CPU seconds with those of its children, seconds, MB of the largest compiler, else of the process."""
+    begin = time.monotonic()
     log = FOLDER / "times.txt"
     log.unlink(missing_ok=True)
-    subprocess.run([str(word) for word in command], check=True, stdout=sys.stderr, cwd=FOLDER,
-                   env={**os.environ, LOG: str(log)})
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    memory = max([int(line.split()[1]) for line in log.read_text().splitlines()] if log.exists() else [after.ru_maxrss // 1024])
-    row = f"| {name} | {cpu:.0f} | {time.monotonic() - begin:.0f} | {memory} |"
+    process = subprocess.Popen([str(word) for word in command], stdout=sys.stderr, cwd=FOLDER, env={**os.environ, LOG: str(log)})
+    _, status, used = os.wait4(process.pid, 0)
+    if status:
+        sys.exit(f"{name}: failed")
+    compilers = [int(line.split()[1]) for line in log.read_text().splitlines()] if log.exists() else []
+    memory = max(compilers or [used.ru_maxrss // 1024])
+    row = f"| {name} | {used.ru_utime + used.ru_stime:.0f} | {time.monotonic() - begin:.0f} | {memory} |"
     print(row, flush=True)
     return row
 

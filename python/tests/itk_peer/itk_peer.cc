@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// itk_peer volumes FOLDER COUNT SEED   writes volumes of random geometry, type and compression, and what ITK reads back
-// itk_peer transforms FOLDER COUNT SEED   writes transforms, and where they map three points
+// itk_peer volumes FOLDER COUNT SEED   writes volumes of random geometry, type and compression, and what ITK
+// reads back itk_peer transforms FOLDER COUNT SEED   writes transforms, and where they map three points
 // itk_peer read-volume FILE   prints size and index-to-physical matrix, and writes the voxels to FILE.raw
 // itk_peer read-transform FILE   prints where it maps three points
 #include <fstream>
@@ -97,13 +97,26 @@ void write_volumes(const std::string& folder, int count, Random& random) {
   for (int n = 0; n < count; ++n) {
     const std::string file = folder + "/v" + std::to_string(n) + "." + endings[n % 6];
     switch (n / 6 % 7) {
-      case 0: write_volume<unsigned char>(file, random); break;
-      case 1: write_volume<signed char>(file, random); break;
-      case 2: write_volume<short>(file, random); break;
-      case 3: write_volume<unsigned short>(file, random); break;
-      case 4: write_volume<int>(file, random); break;
-      case 5: write_volume<float>(file, random); break;
-      default: write_volume<double>(file, random);
+      case 0:
+        write_volume<unsigned char>(file, random);
+        break;
+      case 1:
+        write_volume<signed char>(file, random);
+        break;
+      case 2:
+        write_volume<short>(file, random);
+        break;
+      case 3:
+        write_volume<unsigned short>(file, random);
+        break;
+      case 4:
+        write_volume<int>(file, random);
+        break;
+      case 5:
+        write_volume<float>(file, random);
+        break;
+      default:
+        write_volume<double>(file, random);
     }
   }
 }

@@ -8,13 +8,13 @@
 #include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/core/output.h"
 #include "helicarm/fiducials/candidates.h"
+#include "helicarm/guidance/bone_check_description.h"
 #include "helicarm/pipeline/calibrate_case.h"
 #include "helicarm/pipeline/diagnosis/advice.h"
 #include "helicarm/pipeline/result_description.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/pipeline/view_description.h"
 #include "helicarm/pipeline/view_parameters.h"
-#include "helicarm/guidance/bone_check_description.h"
 
 namespace helicarm::pipeline {
 
@@ -223,11 +223,10 @@ void describe_tunnels(Output& output, const Result& result) {
         const bool is_planned = !planned.model.empty();
         describe_tunnel(row, planned.tunnel);
         row.value_where(is_planned, "model", planned.model, "whose plan holds it");
-        row.object_where(is_planned, "bone_check", planned.bone_check,
-                         "[the tunnel against the bone](#bone_check), see below",
-                         [](auto& check, const guidance::BoneCheck& of) {
-                           guidance::describe_bone_check(check, of);
-                         });
+        row.object_where(
+            is_planned, "bone_check", planned.bone_check,
+            "[the tunnel against the bone](#bone_check), see below",
+            [](auto& check, const guidance::BoneCheck& of) { guidance::describe_bone_check(check, of); });
       });
 }
 
