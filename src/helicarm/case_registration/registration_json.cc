@@ -4,8 +4,8 @@
 
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/core/output.h"
-#include "helicarm/pipeline/result_description.h"
 #include "helicarm/guidance/bone_check_description.h"
+#include "helicarm/pipeline/result_description.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -160,11 +160,9 @@ void describe_model(Output& output, const RegisteredModel& model, const std::vec
       "tunnels", [&] { return tunnels_of(model); }, "as in [result.json](#resultjson)",
       [](auto& row, const CheckedTunnel& planned) {
         pipeline::describe_tunnel(row, planned.tunnel);
-        row.object_of("bone_check", planned.bone_check,
-                      "[the tunnel against the bone](#bone_check), see below",
-                      [](auto& check, const registration::BoneCheck& of) {
-                        guidance::describe_bone_check(check, of);
-                      });
+        row.object_of(
+            "bone_check", planned.bone_check, "[the tunnel against the bone](#bone_check), see below",
+            [](auto& check, const registration::BoneCheck& of) { guidance::describe_bone_check(check, of); });
       });
   output.value("seconds", found.seconds, "wall-clock time");
 }

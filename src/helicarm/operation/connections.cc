@@ -37,9 +37,7 @@ Connections::Connections(const OperationPlan& plan, std::unique_ptr<receiver::In
                          const FreshnessLimits& limits)
     : inbox_(std::move(inbox)), board_(board_options(limits)) {
   if (!plan.drill) robot_ = std::make_unique<robot::RobotLink>(config_of(plan.robot, limits));
-  tracker_ = value_or_throw(tracker::open_tracker(
-      {plan.tracker.address, plan.tracker.port, plan.tracker.rate_hz, true, plan.tracker.definitions},
-      tracker::onto(board_)));
+  tracker_ = value_or_throw(tracker::open_tracker(tracker_address(plan), tracker::onto(board_)));
 }
 
 robot::RobotLink& Connections::robot() {

@@ -139,6 +139,13 @@ Expected<std::vector<pipeline::Pick>> picks_of(const OperationPlan& plan, const 
   return pipeline::picks_from(picks, origin, views, plan.bones);
 }
 
+tracker::TrackerAddress tracker_address(const OperationPlan& plan) {
+  tracker::TrackerAddress address{
+      .address = plan.tracker.address, .port = plan.tracker.port, .rate_hz = plan.tracker.rate_hz};
+  for (const auto& [name, file] : plan.tracker.definitions) address.definitions[name] = plan.folder / file;
+  return address;
+}
+
 case_registration::RegisterOptions measuring_options(const OperationPlan& plan) {
   case_registration::RegisterOptions options = plan.measuring;
   options.run.max_error_mm = plan.max_error_mm;
@@ -154,7 +161,6 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin,
     plan.folder = folder.empty() ? std::filesystem::absolute(origin).parent_path() : folder;
     description::describe_plan(codec, plan, origin);
     reader.finish();
-    for (auto& [name, file] : plan.tracker.definitions) file = plan.folder / file;
     return plan;
   });
 }

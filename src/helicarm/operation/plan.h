@@ -13,6 +13,7 @@
 #include "helicarm/devices/robot/plan_approach.h"
 #include "helicarm/devices/tracker/check_point.h"
 #include "helicarm/devices/tracker/facets.h"
+#include "helicarm/devices/tracker/tracker_source.h"
 #include "helicarm/guidance/poses.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/result.h"
@@ -41,7 +42,7 @@ struct TrackerPlan {
   std::map<guidance::Bone, std::string> markers = {{"femur", "femur"}, {"tibia", "tibia"}};  ///< of the bones
   std::string tool = "tool";
   std::vector<tracker::Facet> facets;  ///< of the calibrator; a single marker is one facet
-  /// Definitions (.rom) of the passive tools of an NDI tracker, by the markers' names.
+  /// Definitions (.rom) of the passive tools of an NDI tracker, by the markers' names; in the plan's folder.
   std::map<std::string, std::filesystem::path> definitions = {};
   std::optional<Pointer> pointer;
   double sigma_mm = 0.12;  ///< error of a pose averaged over 1 s, per axis
@@ -116,6 +117,9 @@ struct OperationPlan {
   std::vector<pipeline::CaseModel> models = {};  ///< registered after the measurement
   std::filesystem::path folder = {};             ///< of the plan's files
 };
+
+/// Of the plan's tracker, the definitions of its tools in the plan's folder.
+tracker::TrackerAddress tracker_address(const OperationPlan& plan);
 
 /// Of the plan's measurements, with its limit.
 case_registration::RegisterOptions measuring_options(const OperationPlan& plan);

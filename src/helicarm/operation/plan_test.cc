@@ -126,8 +126,9 @@ TEST(Plan, DefinitionsOfAnNdiTrackersToolsLieInThePlansFolder) {
   OperationPlan by_ndi = plan();
   by_ndi.tracker.address = "ndi:192.168.1.10";
   by_ndi.tracker.definitions = {{"femur", "tools/femur.rom"}};
-  const OperationPlan read = plan_from(to_json(by_ndi), "/theatre/plan.json").value();
-  EXPECT_EQ(read.tracker.definitions.at("femur"), "/theatre/tools/femur.rom");
+  const OperationPlan read = plan_from(to_json(by_ndi), "/plans/plan.json").value();
+  EXPECT_EQ(tracker_address(read).definitions.at("femur"), "/plans/tools/femur.rom");
+  EXPECT_EQ(to_json(read)["tracker"]["definitions"]["femur"], "tools/femur.rom");  // as the record keeps it
 }
 
 TEST(Plan, DefinitionsWithoutAnNdiTrackerAreRefused) {

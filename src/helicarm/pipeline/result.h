@@ -16,13 +16,13 @@
 #include "helicarm/core/json.h"
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/fiducials/label_fiducials.h"
+#include "helicarm/guidance/bone_check.h"
 #include "helicarm/guidance/guide.h"
 #include "helicarm/guidance/tunnel.h"
 #include "helicarm/guidance/verify.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/rectification/rectify.h"
-#include "helicarm/guidance/bone_check.h"
 #include "helicarm/xray/xray_image.h"
 
 namespace helicarm::pipeline {
