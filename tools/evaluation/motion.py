@@ -27,10 +27,11 @@ from pathlib import Path
 
 import numpy as np
 
+from evaluate import renew
+
 SIZE, FOCUS, DISTANCE, DIAMETER, RATE_HZ = 1024, 3600.0, 900.0, 1.0, 50.0
 BODIES = ("jaw", "skull")
 AXES = [np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]]), np.array([[0.28, -0.96, 0], [0, 0, -1], [0.96, 0.28, 0.0]])]
-BEGIN, END = "<!-- motion.py -->", "<!-- /motion.py -->"
 
 
 def turn(vector):
@@ -432,8 +433,7 @@ def main():
             return
         text = "\n".join(noise_table(a, Path(root)) + [""] + faults_table(a, Path(root)))
     if a.doc:
-        head, rest = a.doc.read_text().split(BEGIN)
-        a.doc.write_text(head + BEGIN + "\n" + text + "\n" + END + rest.split(END)[1])
+        renew(a.doc, "motion.py", [text])
     else:
         print("\n" + text)
 

@@ -20,11 +20,11 @@ from pathlib import Path
 import numpy
 
 from coverage import interval
+from evaluate import renew
 
 GROUPS = [("flat panel, phantom alone", ["--kind", "flat", "--no-knee"]), ("flat panel, knee", ["--kind", "flat"]),
           ("intensifier with plate, phantom alone", ["--no-knee"]), ("intensifier with plate, knee", [])]
 LIMIT = 7.815
-BEGIN, END = "<!-- sweep.py -->", "<!-- /sweep.py -->"
 
 
 def run_of(helicarm, options, seed, a):
@@ -90,9 +90,7 @@ def main():
     table = "\n".join(lines)
     print(table)
     if a.doc:
-        text = a.doc.read_text()
-        before, rest = text.split(BEGIN)
-        a.doc.write_text(before + BEGIN + "\n" + table + "\n" + END + rest.split(END)[1])
+        renew(a.doc, "sweep.py", [table])
 
 
 if __name__ == "__main__":

@@ -17,9 +17,10 @@ import tempfile
 from pathlib import Path
 from statistics import median
 
+from evaluate import renew
+
 GROUPS = [("flat panel, phantom alone", ["--kind", "flat", "--no-knee"]), ("flat panel, knee", ["--kind", "flat"]),
           ("intensifier with plate, knee", [])]
-BEGIN, END = "<!-- sweep_reconstruction.py -->", "<!-- /sweep_reconstruction.py -->"
 
 
 def calibrator():
@@ -104,9 +105,7 @@ def main():
     table = "\n".join(lines)
     print(table)
     if a.doc:
-        text = a.doc.read_text()
-        before, rest = text.split(BEGIN)
-        a.doc.write_text(before + BEGIN + "\n" + table + "\n" + END + rest.split(END)[1])
+        renew(a.doc, "sweep_reconstruction.py", [table])
 
 
 if __name__ == "__main__":
