@@ -156,6 +156,29 @@ class Track(unittest.TestCase):
         self.assertEqual([float(x) for x in tra[0].split(",")], [float(i % 5 == 0) for i in range(16)])
         self.assertEqual(len(table(out / "relative.csv")), FRAMES)
 
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_film_gives_the_bytes_of_its_frames(self):
+        def filmed(case, folder):
+            for view, codec, first in ((case["views"][0], ("ffv1", "A.avi"), 1), (case["views"][1], ("png", "B.mov"), 101)):
+                name = view["name"]
+                subprocess.run(["ffmpeg", "-v", "error", "-nostdin", "-start_number", str(first), "-i", folder / f"{name}_%04d.png",
+                                "-c:v", codec[0], folder / codec[1]], check=True)
+                view["image"] = codec[1]
+                view.pop("frame_offset")
+                for path in folder.glob(f"{name}_*.png"):
+                    path.unlink()
+        folder = self.changed("film", filmed)
+        done = self.track(folder, "film-out")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for name in ("markers.csv", "bodies.csv", "smoothed.csv", "points2d.csv"):
+            self.assertEqual((self.root / "film-out" / name).read_bytes(), (self.root / "out" / name).read_bytes(), name)
+        done = self.track(folder, "refused", f"2-{FRAMES + 1}")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn(f"A.avi has the frames 1 to {FRAMES}", done.stderr)
+        film = folder / "B.mov"
+        film.write_bytes(film.read_bytes()[:3000])
+        self.assertEqual(self.track(folder).returncode, 2)
+
     def test_interrupted_and_resumed_gives_the_same_bytes(self):
         out = self.root / "resumed"
         shutil.copytree(self.root / "out", out)

@@ -96,21 +96,26 @@ xray::XrayImage SequenceImages::as_read(std::size_t view, int frame) const {
 void SequenceImages::decide_polarity(const case_registration::FrameRange& frames) {
   constexpr int most_looked_at = 15;
   const int looked_at = std::min(most_looked_at, frames.count());
-  std::vector<char> looks_bright(views_.size() * std::size_t(looked_at));
-  parallel_for(looks_bright.size(), 0, [&](std::size_t i) {
-    const int at = int(i) % looked_at * (frames.count() - 1) / std::max(1, looked_at - 1);
-    looks_bright[i] =
-        xray::was_inverted(as_read(i / std::size_t(looked_at), frames.first + at * frames.step));
+  std::vector<int> bright(views_.size());
+  std::vector<std::optional<Warning>> lossy(views_.size());
+  // In the order of the frames, in which a film is decoded.
+  parallel_for(views_.size(), 0, [&](std::size_t view) {
+    for (int i = 0; i < looked_at; ++i) {
+      const int at = i * (frames.count() - 1) / std::max(1, looked_at - 1);
+      const xray::XrayImage image = as_read(view, frames.first + at * frames.step);
+      bright[view] += xray::was_inverted(image);
+      const auto found = std::ranges::find(image.warnings, Reason::lossy_image, &Warning::reason);
+      if (found != image.warnings.end() && !lossy[view]) lossy[view] = *found;
+    }
   });
   for (std::size_t view = 0; view < views_.size(); ++view) {
-    const auto first = looks_bright.begin() + std::ptrdiff_t(view) * looked_at;
-    const int bright = int(std::count(first, first + looked_at, char(true)));
-    inverted_.push_back(2 * bright > looked_at);
+    if (lossy[view]) warnings_.push_back(*std::move(lossy[view]));
+    inverted_.push_back(2 * bright[view] > looked_at);
     const std::string& name = views_[view].images.name;
     if (inverted_.back())
       warnings_.push_back({Reason::tag_disagrees,
-                           fmt::format("{}: in {} of {} frames {}, those of all its frames", name, bright,
-                                       looked_at, xray::inverted_note),
+                           fmt::format("{}: in {} of {} frames {}, those of all its frames", name,
+                                       bright[view], looked_at, xray::inverted_note),
                            name,
                            {}});
   }

@@ -34,7 +34,8 @@ class SequenceImages {
   /// Thread-safe.
   Expected<std::vector<xray::XrayImage>> at(int frame) const;
 
-  /// tag_disagrees for each view that is inverted.
+  /// tag_disagrees for each view that is inverted, lossy_image for one whose images were compressed with
+  /// loss.
   const std::vector<Warning>& warnings() const { return warnings_; }
 
  private:

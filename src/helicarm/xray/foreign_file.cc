@@ -14,7 +14,9 @@ using namespace std::literals;
 
 constexpr std::string_view save_as_png = "save it as PNG, TIFF or DICOM";
 constexpr std::string_view export_frames =
-    "export its frames as images without loss, for example with ffmpeg -i FILE frame_%04d.png";
+    "it is read where Debian's package ffmpeg is installed; or export its frames as images without loss, for "
+    "example "
+    "with ffmpeg -i FILE -vsync passthrough frame_%04d.png";
 constexpr std::string_view unpack_it_first = "unpack it first";
 constexpr std::string_view as_model = "a volume is no X-ray image; name it as a model, see docs/formats.md";
 
@@ -22,20 +24,21 @@ struct Signature {
   std::size_t at;
   std::string_view bytes;
   std::string_view what, way_out;
+  std::string_view container = {};  ///< of a film, as ffmpeg names it
 };
 
 constexpr std::array signatures = {
     Signature{0, "GIF8"sv, "a GIF image", save_as_png},
     Signature{8, "WEBP"sv, "a WebP image", save_as_png},
-    Signature{8, "AVI "sv, "an AVI film", export_frames},
+    Signature{8, "AVI "sv, "an AVI film", export_frames, "avi"},
     Signature{4, "ftypheic"sv, "a HEIC image", save_as_png},
     Signature{4, "ftypmif1"sv, "a HEIF image", save_as_png},
     Signature{4, "ftypavif"sv, "an AVIF image", save_as_png},
-    Signature{4, "ftyp"sv, "an MP4 or QuickTime film", export_frames},
-    Signature{4, "moov"sv, "a QuickTime film", export_frames},
-    Signature{0, "\x1A\x45\xDF\xA3"sv, "a Matroska or WebM film", export_frames},
-    Signature{0, "\x30\x26\xB2\x75\x8E\x66\xCF\x11"sv, "a Windows Media film", export_frames},
-    Signature{0, "\0\0\1\xBA"sv, "an MPEG film", export_frames},
+    Signature{4, "ftyp"sv, "an MP4 or QuickTime film", export_frames, "mov"},
+    Signature{4, "moov"sv, "a QuickTime film", export_frames, "mov"},
+    Signature{0, "\x1A\x45\xDF\xA3"sv, "a Matroska or WebM film", export_frames, "matroska"},
+    Signature{0, "\x30\x26\xB2\x75\x8E\x66\xCF\x11"sv, "a Windows Media film", export_frames, "asf"},
+    Signature{0, "\0\0\1\xBA"sv, "an MPEG film", export_frames, "mpeg"},
     Signature{4, "jP  \r\n\x87\n"sv, "a JPEG 2000 file", save_as_png},
     Signature{0, "\xFF\x4F\xFF\x51"sv, "a JPEG 2000 codestream", save_as_png},
     Signature{0, "\xFF\x0A"sv, "a JPEG XL image", save_as_png},
@@ -85,6 +88,12 @@ std::optional<std::string> text_kind(std::string_view text) {
 }
 
 }  // namespace
+
+std::string_view film_container(std::string_view bytes) {
+  for (const Signature& signature : signatures)
+    if (has(bytes, signature)) return signature.container;
+  return {};
+}
 
 std::optional<std::string> foreign_file(std::string_view bytes) {
   for (const Signature& signature : signatures)

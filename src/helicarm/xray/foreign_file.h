@@ -11,4 +11,7 @@ namespace helicarm::xray {
 /// as PNG". Nothing if it is not known.
 std::optional<std::string> foreign_file(std::string_view bytes);
 
+/// The container of a film by its first bytes, as ffmpeg names it: "avi", "mov". Empty if it is none.
+std::string_view film_container(std::string_view bytes);
+
 }  // namespace helicarm::xray

@@ -11,6 +11,7 @@
 #include "helicarm/image/tiff.h"
 #include "helicarm/xray/dicom_check.h"
 #include "helicarm/xray/dicom_tags.h"
+#include "helicarm/xray/film.h"
 #include "helicarm/xray/foreign_file.h"
 #include "helicarm/xray/image_file.h"
 #include "helicarm/xray/image_in_memory.h"
@@ -20,7 +21,7 @@
 namespace helicarm::xray {
 namespace fs = std::filesystem;
 
-enum class FileKind { dicom, png, tiff, jpeg, bmp };
+enum class FileKind { dicom, png, tiff, jpeg, bmp, film };
 
 namespace {
 
@@ -69,7 +70,7 @@ FileKind file_kind(std::string_view bytes, const std::string& origin) {
   const auto foreign = foreign_file(bytes);
   throw BadInput(Reason::not_an_image,
                  foreign ? fmt::format("{}: {}", origin, *foreign)
-                         : fmt::format("{}: {}, not DICOM, PNG, TIFF, JPEG or BMP", origin,
+                         : fmt::format("{}: {}, not DICOM, PNG, TIFF, JPEG, BMP or a film", origin,
                                        bytes.empty() ? "zero bytes" : fmt::format("{} bytes", bytes.size())));
 }
 
@@ -92,12 +93,25 @@ image::GreyImage grey_image_of(std::string_view bytes, FileKind kind, int page, 
   }
 }
 
+XrayImage image_of_film(const Film& film, const fs::path& path, std::optional<int> frame) {
+  const std::string origin = path.filename().string();
+  const int index = value_or_throw(choose_frame(origin, film.frames(), frame));
+  XrayImage xray_image = xray_image_of(film.read(index), path);
+  xray_image.highest = float((1 << film.bits()) - 1);
+  if (const auto loss = film.loss())
+    xray_image.warnings.push_back({Reason::lossy_image, fmt::format("{}: {}", origin, *loss)});
+  return xray_image;
+}
+
+/// `outline` of a DICOM file; `bytes` of no film.
 XrayImage read_by_content(const fs::path& path, std::string_view bytes, FileKind kind,
-                          const DicomOutline* outline, std::optional<int> frame) {
+                          const DicomOutline* outline, const Film* film, std::optional<int> frame) {
   const std::string origin = path.filename().string();
   XrayImage xray_image;
   if (outline) {
     xray_image = value_or_throw(read_dicom_frame(*outline, frame));
+  } else if (film) {
+    xray_image = image_of_film(*film, path, frame);
   } else {
     const int page = value_or_throw(choose_frame(origin, frames_of(bytes, kind, origin), frame));
     xray_image = xray_image_of(grey_image_of(bytes, kind, page, origin), path);
@@ -109,7 +123,7 @@ XrayImage read_by_content(const fs::path& path, std::string_view bytes, FileKind
   if (const auto sidecar = kind == FileKind::dicom ? full_sidecar_of(path) : sidecar_of(path)) {
     const StatedGeometry stated = value_or_throw(read_sidecar(*sidecar));
     const std::string name = sidecar->filename().string();
-    const int frames = outline ? outline->frames : frames_of(bytes, kind, origin);
+    const int frames = outline ? outline->frames : film ? film->frames() : frames_of(bytes, kind, origin);
     if (frames > 1 && (stated.primary_deg || stated.secondary_deg))
       throw BadInput(
           {Reason::bad_value,
@@ -124,12 +138,14 @@ XrayImage read_by_content(const fs::path& path, std::string_view bytes, FileKind
 }
 
 XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
+  if (const auto film = Film::at(path))
+    return read_by_content(path, {}, FileKind::film, nullptr, film.get(), frame);
   const std::string bytes = value_or_throw(read_file(path, max_image_file_bytes));
   const std::string origin = path.filename().string();
   const FileKind kind = file_kind(bytes, origin);
-  if (kind != FileKind::dicom) return read_by_content(path, bytes, kind, nullptr, frame);
+  if (kind != FileKind::dicom) return read_by_content(path, bytes, kind, nullptr, nullptr, frame);
   const DicomOutline outline = value_or_throw(check_dicom(bytes, origin));
-  return read_by_content(path, bytes, kind, &outline, frame);
+  return read_by_content(path, bytes, kind, &outline, nullptr, frame);
 }
 
 /// With the view's name, or the failure of that view.
@@ -151,6 +167,7 @@ struct ImageFile::Content {
   std::string bytes;
   FileKind kind = FileKind::dicom;
   std::optional<DicomOutline> outline = {};
+  std::shared_ptr<const Film> film = {};
   int frames = 1;
   std::vector<XrayImage> images = {};  ///< in memory: then there is no file
 };
@@ -160,6 +177,12 @@ ImageFile::~ImageFile() = default;
 
 Expected<std::shared_ptr<const ImageFile>> ImageFile::open(const fs::path& path) {
   return guarded([&] {
+    if (auto film = Film::at(path)) {
+      auto content = std::make_unique<Content>(Content{path, {}, FileKind::film});
+      content->frames = film->frames();
+      content->film = std::move(film);
+      return std::shared_ptr<const ImageFile>(new ImageFile(std::move(content)));
+    }
     auto content = std::make_unique<Content>(
         Content{path, value_or_throw(read_file(path, max_image_file_bytes * run_factor))});
     const std::string origin = path.filename().string();
@@ -209,13 +232,14 @@ Expected<XrayImage> ImageFile::read(const std::string& view_name, std::optional<
                  view_name);
   return named(guarded([&] {
                  return read_by_content(of.path, of.bytes, of.kind, of.outline ? &*of.outline : nullptr,
-                                        frame);
+                                        of.film.get(), frame);
                }),
                view_name);
 }
 
 Expected<int> count_frames(const fs::path& path) {
   return guarded([&] {
+    if (const auto film = Film::at(path)) return film->frames();
     const std::string bytes = value_or_throw(read_file(path, max_image_file_bytes));
     const std::string origin = path.filename().string();
     return frames_of(bytes, file_kind(bytes, origin), origin);
