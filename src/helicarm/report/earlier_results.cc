@@ -38,7 +38,7 @@ void forget_registration(const fs::path& folder) {
   forget_files(folder, overlays_of(folder / "registration.json"));
   // The file that names the overlays last: an interrupted removal can be repeated.
   forget_files(folder, {"report.html", "registration.csv", "relative.csv", "bodies.csv", "smoothed.csv",
-                        "frames.jsonl", "sequence.json", "registration.json"});
+                        "smoothed.seq.mha", "frames.jsonl", "sequence.json", "registration.json"});
 }
 
 void forget_results(const fs::path& folder) {

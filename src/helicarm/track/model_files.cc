@@ -5,6 +5,7 @@
 #include "helicarm/pipeline/result.h"
 #include "helicarm/track/model_sequence.h"
 #include "helicarm/track/rows.h"
+#include "helicarm/track/slicer_sequence.h"
 
 namespace helicarm::track {
 
@@ -50,6 +51,7 @@ Expected<void> write_models(const ModelSequence& sequence, const std::filesystem
     write("smoothed.csv",
           bodies_table(sequence.frames, sequence.names, sequence.bodies, &BodySequence::smoothed));
     write("relative.csv", relative_table(sequence.frames, sequence.names, sequence.relative));
+    write("smoothed.seq.mha", slicer_sequence(sequence.names, sequence.frames, sequence.bodies, {}));
     write("report.html", model_report(sequence));
     write("sequence.json", to_text(to_json(sequence)) + "\n");
   });

@@ -63,7 +63,8 @@ Json to_json(const ModelSequence& sequence);
 /// report.html as one page.
 std::string model_report(const ModelSequence& sequence);
 
-/// Writes registration.csv, bodies.csv, smoothed.csv, relative.csv, report.html and sequence.json.
+/// Writes registration.csv, bodies.csv, smoothed.csv, relative.csv, smoothed.seq.mha, report.html and
+/// sequence.json.
 Expected<void> write_models(const ModelSequence& sequence, const std::filesystem::path& folder);
 
 }  // namespace helicarm::track

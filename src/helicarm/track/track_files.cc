@@ -11,6 +11,7 @@
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/pipeline/result.h"
 #include "helicarm/track/rows.h"
+#include "helicarm/track/slicer_sequence.h"
 #include "helicarm/track/track.h"
 
 namespace helicarm::track {
@@ -74,10 +75,10 @@ std::vector<std::string> names_of(const TrackCase& the_case) {
   return bodies;
 }
 
-constexpr std::array file_names{"markers.csv",    "bodies.csv",   "smoothed.csv", "relative.csv",
-                                "track.json",     "points2d.csv", "points3d.csv", "report.html",
-                                "sights.csv",     "sights.id",    "images.csv",   "angles.csv",
-                                "butterworth.csv"};
+constexpr std::array file_names{"markers.csv",     "bodies.csv",      "smoothed.csv", "relative.csv",
+                                "track.json",      "points2d.csv",    "points3d.csv", "report.html",
+                                "sights.csv",      "sights.id",       "images.csv",   "angles.csv",
+                                "butterworth.csv", "smoothed.seq.mha"};
 
 }  // namespace
 
@@ -270,6 +271,8 @@ Expected<void> write_track(const Sequence& sequence, const TrackCase& the_case,
     write("points3d.csv", points3d_csv(sequence, the_case));
     for (std::size_t b = 0; b < the_case.bodies.size(); ++b)
       write(the_case.bodies[b].name + ".tra", tra_of(sequence.bodies[b]));
+    write("smoothed.seq.mha",
+          slicer_sequence(names_of(the_case), sequence.frames, sequence.bodies, the_case.frame_rate_hz));
     write("report.html", track_report(sequence, the_case));
     write("track.json", to_text(to_json(sequence, the_case)) + "\n");
   });
