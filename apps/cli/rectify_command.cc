@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -20,6 +21,7 @@
 #include "helicarm/rectification/distortion_model.h"
 #include "helicarm/rectification/inpaint.h"
 #include "helicarm/rectification/paper_dots.h"
+#include "helicarm/rectification/pixel_map.h"
 #include "helicarm/rectification/rectified_dicom.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/rectification/test_grid.h"
@@ -47,6 +49,8 @@ struct RectifyArguments {
   bool stages = false;               ///< also the images of the paper's Fig. 2
   bool field = false;                ///< also displacement.nrrd
   bool keep_patient = false;         ///< written images stay with the patient and the study of theirs
+  std::vector<std::filesystem::path> xmalab;  ///< raw and undistorted dots of XMALab's grid
+  std::vector<int> size;                      ///< of its image
 };
 
 namespace {
@@ -140,6 +144,34 @@ void rectify_image(const RectifyArguments& arguments, Console& console) {
         "{}: {} dots, residual {:.3f} px rms, {:.3f} max, cross-validated {:.3f}; written to {}\n",
         r.map.model->name(), r.dots_found, r.map.residual_rms_px, r.map.residual_max_px,
         r.map.held_out_rms_px, arguments.out.string());
+}
+
+/// The map between XMALab's raw and undistorted dots.
+void map_grid(const RectifyArguments& arguments, Console& console) {
+  const auto dots = value_or_throw(rectification::read_xmalab_grid(arguments.xmalab[0], arguments.xmalab[1]));
+  const auto fit = value_or_throw(rectification::fit_pixel_map(dots, arguments.size[0], arguments.size[1],
+                                                               {{}, arguments.model.value_or("")}));
+  std::string residuals = "u_px,v_px,residual_px\n";
+  for (std::size_t i = 0; i < dots.size(); ++i)
+    if (fit.used[i])
+      residuals += fmt::format("{},{},{}\n", dots[i].raw_px.x(), dots[i].raw_px.y(), fit.residual_px[i]);
+  value_or_throw(write_file(arguments.out / "map.json", to_text(rectification::to_json(fit.map)) + "\n"));
+  value_or_throw(write_file(arguments.out / "residuals.csv", residuals));
+  const auto used = std::ranges::count(fit.used, true);
+  if (console.json)
+    console.out << to_text({{"model", fit.map.model->name()},
+                            {"dots_found", dots.size()},
+                            {"dots_used", used},
+                            {"residual_rms_px", fit.map.residual_rms_px},
+                            {"residual_max_px", fit.map.residual_max_px},
+                            {"held_out_rms_px", fit.map.held_out_rms_px},
+                            {"warnings", Json::array()}})
+                << '\n';
+  else if (!console.quiet)
+    console.out << fmt::format(
+        "{}: {} of {} dots, residual {:.3f} px rms, {:.3f} max, cross-validated {:.3f}; written to {}\n",
+        fit.map.model->name(), used, dots.size(), fit.map.residual_rms_px, fit.map.residual_max_px,
+        fit.map.held_out_rms_px, arguments.out.string());
 }
 
 /// Refuses an image that the map is not for, or whose plate it does not make straight.
@@ -271,6 +303,12 @@ CommandResult rectify_command(const RectifyArguments& arguments, Console& consol
     if (!a.images.empty() && !a.points && !a.test_grid_mm) forget(a);
     if (a.stages && (!a.plate || a.method != rectification::Method::paper))
       throw BadInput(Reason::usage, "rectify: --stages is of IMAGE --plate --method paper");
+    if (!a.xmalab.empty()) {
+      if (!a.images.empty() || a.plate || a.map || a.points || a.test_grid_mm || a.size.empty())
+        throw BadInput(Reason::usage, "rectify: --xmalab INPTS BSPTS goes with --size and without an image");
+      return map_grid(a, console);
+    }
+    if (!a.size.empty()) throw BadInput(Reason::usage, "rectify: --size is of --xmalab");
     if (a.model && (!a.plate || a.method == rectification::Method::paper))
       throw BadInput(Reason::usage, "rectify: --model is of IMAGE --plate --method best");
     if (a.field && (a.images.empty() || a.test_grid_mm))
@@ -282,7 +320,7 @@ CommandResult rectify_command(const RectifyArguments& arguments, Console& consol
       return rectify_image(a, console);
     throw BadInput(Reason::usage,
                    "rectify: give IMAGE --plate, or IMAGE... --map, or --map --points, or IMAGE --map "
-                   "--test-grid (see --help)");
+                   "--test-grid, or --xmalab (see --help)");
   });
 }
 
@@ -304,6 +342,14 @@ void add_rectify(CLI::App& app, Action& action) {
   command->add_flag("--inverse", a.inverse, "The points are rectified pixels; return raw ones");
   command->add_option("--test-grid", a.test_grid_mm, "Pitch of the test grid, mm: report Eq. 14-15")
       ->check(within(0.1, 1000));
+  command
+      ->add_option("--xmalab", a.xmalab,
+                   "NAME_INPTS.csv and NAME_BSPTS.csv, as XMALab exports them with its look-up table: the "
+                   "map into its undistorted image")
+      ->expected(2);
+  command->add_option("--size", a.size, "With --xmalab: columns and rows of the image")
+      ->expected(2)
+      ->check(within(1, 16384));
   command
       ->add_option("--out", a.out,
                    "Folder for rectified.dcm (of several images NAME_rectified.dcm), inpainted.dcm, "

@@ -11,6 +11,7 @@
 #include "helicarm/core/statistics.h"
 #include "helicarm/rectification/models/monomials.h"
 #include "helicarm/rectification/models/polynomial.h"
+#include "helicarm/rectification/pixel_map.h"
 
 namespace helicarm::rectification {
 namespace {
@@ -137,10 +138,9 @@ std::optional<Eigen::Affine2d> rectified_from_plate(const PlateDots& dots, const
   return similarity;
 }
 
-}  // namespace
-
-Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int height,
-                         const MapOptions& options) {
+/// `is_in_pixels`: places are rectified already.
+Expected<MapFit> fitted_map(const std::vector<Correspondence>& dots, int width, int height,
+                            const MapOptions& options, bool is_in_pixels) {
   MapFit fit;
   fit.used.assign(dots.size(), true);
   const ModelKind* kind = model_kind(options.model.empty() ? "polynomial" : options.model);
@@ -164,7 +164,8 @@ Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int
   PlateDots data = gather(dots, places, normalised, fit.used);
   if (data.raw.rows() < term_count(least_order) + 2) return too_few();
   const Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
-  const auto similarity = rectified_from_plate(data, middle);
+  const auto similarity =
+      is_in_pixels ? std::optional(Eigen::Affine2d::Identity()) : rectified_from_plate(data, middle);
   if (!similarity) return too_few();
 
   // Then in rectified pixels: raw scale and no rotation at the image centre.
@@ -196,6 +197,18 @@ Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int
   fit.map.residual_rms_px = std::sqrt(sum / count);
   fit.map.held_out_rms_px = std::sqrt(fitted.held_out.squaredNorm() / double(fitted.held_out.size()));
   return fit;
+}
+
+}  // namespace
+
+Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int height,
+                         const MapOptions& options) {
+  return fitted_map(dots, width, height, options, false);
+}
+
+Expected<MapFit> fit_pixel_map(const std::vector<Correspondence>& dots, int width, int height,
+                               const MapOptions& options) {
+  return fitted_map(dots, width, height, options, true);
 }
 
 }  // namespace helicarm::rectification
