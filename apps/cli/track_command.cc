@@ -23,8 +23,18 @@ struct TrackArguments {
   std::optional<double> butterworth_hz;
   int butterworth_order = track::Butterworth{}.order;
   bool resume = false;
+  std::filesystem::path picks, points;  ///< of XMALab; empty: the case's picks
+  track::PointsFile counting;           ///< of either
 };
 namespace {
+
+std::optional<track::PointsFile> points_file(const TrackArguments& arguments) {
+  if (arguments.picks.empty() && arguments.points.empty()) return std::nullopt;
+  track::PointsFile file = arguments.counting;
+  file.of_all_frames = arguments.picks.empty();
+  file.file = file.of_all_frames ? arguments.points : arguments.picks;
+  return file;
+}
 
 std::string summary_of(const track::Sequence& sequence, const track::TrackCase& the_case) {
   std::array<int, 4> counts{};
@@ -64,7 +74,7 @@ CommandResult track_command(const TrackArguments& arguments, Console& console) {
       }
       throw BadInput(failure);
     };
-    auto the_case = track::read_track_case(arguments.folder, range);
+    auto the_case = track::read_track_case(arguments.folder, range, points_file(arguments));
     if (!the_case) refuse(the_case.error());
     if (!arguments.axes.empty())
       the_case->axes = value_or_throw(track::read_body_axes(arguments.axes, *the_case));
@@ -153,6 +163,27 @@ void add_track(CLI::App& app, Action& action) {
       "backwards, for comparison; the case states frame_rate_hz");
   command->add_option("--butterworth-order", a.butterworth_order, "Of both passes together: 2 or 4")
       ->capture_default_str();
+  auto* picks = command->add_option("--picks", a.picks,
+                                    "XMALab's 2-D points (NAME_cam1_X, ...; cam1 is the case's first view): "
+                                    "those of the first frame are the picks");
+  auto* points = command->add_option(
+      "--points", a.points,
+      "XMALab's 2-D points of all frames, which are placed as they are: no image is read");
+  picks->excludes(points);
+  command
+      ->add_option("--points-first", a.counting.first_frame,
+                   "With --picks or --points: frame of the file's first row")
+      ->capture_default_str();
+  command->add_flag("--points-from-one", a.counting.from_one, "The file counts pixels from 1");
+  command->add_flag("--points-y-up", a.counting.y_up, "The file counts rows upwards");
+  command->add_flag("--points-undistorted", a.counting.undistorted,
+                    "The file's points were undistorted by XMALab");
+  command
+      ->add_option("--points-sigma", a.counting.sigma_px,
+                   fmt::format("With --points: standard deviation of a point per axis, px, before the rays "
+                               "show it (default {:g})",
+                               track::TrackCase{}.point_sigma_px))
+      ->check(CLI::Range(0.01, 10.0));
   command->add_flag("--resume", a.resume, "Go on after the frames that an interrupted run left in --out");
 }
 

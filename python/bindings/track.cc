@@ -26,15 +26,28 @@ std::unique_ptr<Tracked> tracked(const std::filesystem::path& folder, const std:
                                  const std::optional<std::filesystem::path>& out, bool resume,
                                  const std::optional<std::filesystem::path>& axes,
                                  std::optional<double> butterworth_hz, int butterworth_order,
-                                 const py::object& progress) {
+                                 const std::optional<std::filesystem::path>& picks,
+                                 const std::optional<std::filesystem::path>& points, int points_first,
+                                 bool points_from_one, bool points_y_up, bool points_undistorted,
+                                 std::optional<double> points_sigma, const py::object& progress) {
+  std::optional<track::PointsFile> of_points;
+  if (picks || points)
+    of_points = track::PointsFile{points ? *points : *picks,
+                                  points.has_value(),
+                                  points_first,
+                                  points_from_one,
+                                  points_y_up,
+                                  points_undistorted,
+                                  checked(points_sigma, {0.01, 10}, "points_sigma")};
   const py::object nothing = py::none();
   const RunHooks hooks = run_hooks(nothing);
   return value_or_raise(without_gil([&] {
     return guarded([&] {
+      if (picks && points) throw BadInput(Reason::usage, "picks and points: only one of them");
       if (out && !resume) track::forget_track(*out);
       const auto range = value_or_throw(case_registration::frame_range_from(frames));
       auto made = std::make_unique<Tracked>();
-      made->the_case = value_or_throw(track::read_track_case(folder, range));
+      made->the_case = value_or_throw(track::read_track_case(folder, range, of_points));
       if (butterworth_hz) made->the_case.butterworth = track::Butterworth{*butterworth_hz, butterworth_order};
       track::check_butterworth(made->the_case, range.step);
       if (axes) made->the_case.axes = value_or_throw(track::read_body_axes(*axes, made->the_case));
@@ -308,16 +321,24 @@ void add_track(py::module_& module) {
              py::arg("butterworth_hz") = py::none(),
              py::arg("butterworth_order") = track::Butterworth{}.order, py::arg("progress") = py::none());
   const track::TrackOptions usual;
+  const track::PointsFile counting;
   module.def("track", &tracked, py::arg("case"), py::kw_only(), py::arg("frames"),
              py::arg("out") = py::none(), py::arg("resume") = usual.resume, py::arg("axes") = py::none(),
              py::arg("butterworth_hz") = py::none(),
-             py::arg("butterworth_order") = track::Butterworth{}.order, py::arg("progress") = py::none(),
+             py::arg("butterworth_order") = track::Butterworth{}.order, py::arg("picks") = py::none(),
+             py::arg("points") = py::none(), py::arg("points_first") = counting.first_frame,
+             py::arg("points_from_one") = counting.from_one, py::arg("points_y_up") = counting.y_up,
+             py::arg("points_undistorted") = counting.undistorted, py::arg("points_sigma") = py::none(),
+             py::arg("progress") = py::none(),
              R"(Follows markers and bodies through a sequence, as `helicarm track` does.
 
 case: folder that holds case.json. frames: "A-B" or "A-B:STEP"; the markers are picked in frame A. out: folder for all
 files, whose rows are written as they are computed. resume: go on after the frames of an interrupted run in `out`.
 axes: CSV body,axis,x,y,z of two bodies or more, or 3D Slicer's markups: joint angles against the first one. butterworth_hz, butterworth_order
 (2 or 4, of both passes): cut-off of the filtered places; the case states frame_rate_hz.
+picks: path of XMALab's 2-D points, whose first frame are the picks; points: likewise, whose points of all frames are placed as they
+are, without images. points_first: frame of the file's first row; points_from_one, points_y_up, points_undistorted: how it counts;
+points_sigma: of a point per axis, px, before the rays show it (default 0.3).
 progress: called with the share of the frames that are done; an exception from it ends the run, and Ctrl-C does.
 Releases the GIL. Returns a Track.
 Raises InputError; RefusedError if the picks contradict each other or the geometry given.)");

@@ -208,7 +208,9 @@ def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, b
 
     track(case, *, frames="A-B[:STEP]", out=None, resume=False, axes=None, butterworth_hz=None, progress=None): case: folder that holds case.json; the markers
     are picked in frame A. out: folder for all files, whose rows are written as they are computed. resume: go on after the
-    frames of an interrupted run in `out`.
+    frames of an interrupted run in `out`. picks: path of XMALab's 2-D points, whose first frame are the picks; points: likewise, whose
+    points of all frames are placed as they are, without images; points_first, points_from_one, points_y_up, points_undistorted,
+    points_sigma: as the program's options.
 
     track(views={name: (images, camera)}, picks={marker: {view: (u, v)}}, diameter_mm=...): in memory.
       images: (n, height, width) array, or a list of arrays, XrayImages, paths or pydicom datasets, as many in every view,
@@ -225,6 +227,8 @@ def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, b
     progress: called with the share of the frames that are done; an exception from it ends the run, and Ctrl-C does.
     Releases the GIL. Returns a Track. Raises InputError; RefusedError if the picks contradict each other or the geometry.
     """
+    if case is not None and isinstance(picks, (str, os.PathLike)):
+        options["picks"], picks = picks, None
     given = {"views": views, "picks": picks, "diameter_mm": diameter_mm, "bodies": bodies, "frame_rate_hz": frame_rate_hz,
              "camera_covariance": camera_covariance}
     _one_of("track", case, given)

@@ -45,8 +45,10 @@ def sweep(folder: None = None, *, images: Sequence[_Image], calibrator: Union[Ca
           path: Optional[str] = None, check: Optional[str] = None, wire: Optional[Sequence[Sequence[float]]] = None,
           against: Optional[_Path] = None, threads: int = 0, progress: _Progress = None) -> Sweep: ...
 @overload
-def track(case: _Path, *, frames: str, out: Optional[_Path] = None, resume: bool = False,
-          progress: _Progress = None) -> Track: ...
+def track(case: _Path, *, frames: str, out: Optional[_Path] = None, resume: bool = False, axes: Optional[_Path] = None,
+          butterworth_hz: Optional[float] = None, butterworth_order: int = ..., picks: Optional[_Path] = None,
+          points: Optional[_Path] = None, points_first: int = ..., points_from_one: bool = ..., points_y_up: bool = ...,
+          points_undistorted: bool = ..., points_sigma: Optional[float] = None, progress: _Progress = None) -> Track: ...
 @overload
 def track(case: None = None, *, views: _Views, picks: Mapping[str, Mapping[str, ArrayLike]], diameter_mm: float,
           bodies: Optional[Mapping[str, Union[Sequence[str], Mapping[str, ArrayLike]]]] = None,

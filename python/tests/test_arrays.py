@@ -244,6 +244,14 @@ def test_markers_are_tracked_in_arrays(tmp_path):
     assert motion.smoothed["bone"][-1, :3, 3] == pytest.approx([1.5, 0, 0.75], abs=0.1)
     assert (tmp_path / "out/markers.csv").exists() and (tmp_path / "out/bone.tra").exists()
     assert motion.joint_angles == {} == motion.joint_covariances
+    for name, (_, camera) in views.items():
+        (tmp_path / f"{name}.json").write_text(json.dumps({"K": camera.K.tolist(), "R": camera.R.tolist(), "t": camera.t.tolist()}))
+    (tmp_path / "case.json").write_text(json.dumps({
+        "format": "helicarm-case/2", "bodies": [{"name": "bone", "markers": names}],
+        "views": [{"name": name, "image": f"{name}.avi", "camera": f"{name}.json"} for name in views]}))
+    placed = helicarm.track(tmp_path, frames="1-4", points=tmp_path / "out/points2d.csv")
+    assert placed.places == pytest.approx(motion.places, abs=0.1)
+    refused("usage", "only one of them", helicarm.track, tmp_path, frames="1-4", points="a.csv", picks="b.csv")
     refused("bad_value", '"hip" is no body', helicarm.track, views=views, picks=picks, diameter_mm=3, bodies={"bone": names}, axes={"hip": np.eye(3)})
     refused("bad_value", "axes of 1 body, a joint has two", helicarm.track, views=views, picks=picks, diameter_mm=3, bodies={"bone": names},
             axes={"bone": np.eye(3)})

@@ -100,6 +100,27 @@ std::vector<ImageKeys> kept_keys(const fs::path& folder, const TrackCase& the_ca
   return text ? image_keys_from(*text, names_of_views(the_case), numbers) : std::vector<ImageKeys>{};
 }
 
+/// From the points of a file instead of images.
+Sequence placed_sequence(const TrackCase& the_case, const std::vector<int>& numbers,
+                         const TrackOptions& options, const OnFrame& on_frame) {
+  const auto begun = std::chrono::steady_clock::now();
+  if (options.resume)
+    throw BadInput(Reason::usage, "resume: the points of a file are placed again as quickly: leave it out");
+  std::vector<FrameSights> sights;
+  for (std::size_t f = 0; f < numbers.size(); ++f) {
+    FrameSights& frame = sights.emplace_back(FrameSights{numbers[f], {}, 0});
+    frame.of.resize(the_case.markers.size());
+    for (std::size_t i = 0; i < the_case.points[f].size(); ++i) {
+      auto& image = frame.of[i / the_case.views.size()].emplace_back();
+      if (const auto& uv_raw = the_case.points[f][i]) image = MarkerImage{*uv_raw, the_case.point_sigma_px};
+    }
+  }
+  Sequence sequence = estimate_sequence(the_case, sights);
+  if (on_frame) on_frame(int(numbers.size()));
+  sequence.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  return sequence;
+}
+
 }  // namespace
 
 Expected<Sequence> run_track(const TrackCase& the_case, const case_registration::FrameRange& frames,
@@ -107,6 +128,7 @@ Expected<Sequence> run_track(const TrackCase& the_case, const case_registration:
   return guarded([&] {
     const auto begun = std::chrono::steady_clock::now();
     const std::vector<int> numbers = frames.numbers();
+    if (!the_case.points.empty()) return placed_sequence(the_case, numbers, options, on_frame);
     const SequenceImages images = value_or_throw(open_images(the_case, frames));
     const std::string identity = identity_of(the_case, frames);
     std::vector<FrameSights> kept;

@@ -20,11 +20,11 @@ struct TrackOptions {
 /// Called after each frame, with the number of frames done.
 using OnFrame = std::function<void(int done)>;
 
-/// Follows the markers of a case through its frames and estimates bodies and smooth motion. Rows are written
-/// to `out` frame by frame: sights.csv, markers.csv and bodies.csv as far as they are known until then. With
-/// `resume` the frames in sights.csv are not looked at again, up to one whose image has changed, and the
-/// result is that of a run without an interruption; bad_value where they are of another case. Fails as
-/// `SequenceImages` and `Tracker::begin`.
+/// Follows the markers of a case through its frames, or takes its points, and estimates bodies and smooth
+/// motion. Rows are written to `out` frame by frame: sights.csv, markers.csv and bodies.csv as far as they
+/// are known until then. With `resume` the frames in sights.csv are not looked at again, up to one whose
+/// image has changed, and the result is that of a run without an interruption; bad_value where they are of
+/// another case. Fails as `SequenceImages` and `Tracker::begin`.
 Expected<Sequence> run_track(const TrackCase& the_case, const case_registration::FrameRange& frames,
                              const TrackOptions& options = {}, const OnFrame& on_frame = {});
 

@@ -50,6 +50,21 @@ struct TrackCase {
   std::optional<Butterworth> butterworth;  ///< places filtered as laboratories do, for comparison
   std::vector<BodyAxes> axes;  ///< the first body is the reference of the others; empty: no joint angles
   std::vector<Warning> warnings;
+  /// [frame][marker * views + view], raw pixels: instead of images; empty: images.
+  std::vector<std::vector<std::optional<Eigen::Vector2d>>> points = {};
+  double point_sigma_px = 0.3;  ///< of `points`, per axis, before their ray gaps show it
+};
+
+/// A file of XMALab's 2-D points instead of the case's picks. As XMALab writes it by default: counting from
+/// 0, y downwards, raw (distorted) pixels.
+struct PointsFile {
+  std::filesystem::path file;
+  bool of_all_frames = false;  ///< no image is read, the file's points are the markers'; else those of the
+                               ///< first frame are picks
+  int first_frame = 1;         ///< of the file's first row
+  bool from_one = false, y_up = false;
+  bool undistorted = false;             ///< by XMALab: refused for a view with a distortion map
+  std::optional<double> sigma_px = {};  ///< as `point_sigma_px`
 };
 
 /// Refuses a filter without a frame rate, of another order than 2 or 4, or with a cut-off that is not below
@@ -58,9 +73,12 @@ void check_butterworth(const TrackCase& the_case, int step);
 
 /// Reads a case with "markers", picks of the range's first frame and "bodies". Views have "camera" or
 /// "calibration", or are calibrated by the case's calibrator in their first image. No later image is read.
-/// Fails as `read_case`, `import_matrix`, `saved_calibration_from_json` and `calibrate_case`; bad_value for
-/// picks of another frame and for bodies of unknown markers.
+/// Fails as `read_case`, `import_matrix`, `saved_calibration_from_json`, `calibrate_case` and
+/// `read_xmalab_points2d`; bad_value for picks of another frame, for bodies of unknown markers, and for
+/// frames that `points` does not have; residual_too_large where the rays of points of all frames miss each
+/// other.
 Expected<TrackCase> read_track_case(const std::filesystem::path& path,
-                                    const case_registration::FrameRange& frames);
+                                    const case_registration::FrameRange& frames,
+                                    const std::optional<PointsFile>& points = {});
 
 }  // namespace helicarm::track
