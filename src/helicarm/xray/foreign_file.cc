@@ -36,6 +36,8 @@ constexpr std::array signatures = {
     Signature{4, "ftypavif"sv, "an AVIF image", save_as_png},
     Signature{4, "ftyp"sv, "an MP4 or QuickTime film", export_frames, "mov"},
     Signature{4, "moov"sv, "a QuickTime film", export_frames, "mov"},
+    Signature{4, "wide"sv, "a QuickTime film", export_frames, "mov"},
+    Signature{4, "mdat"sv, "a QuickTime film", export_frames, "mov"},
     Signature{0, "\x1A\x45\xDF\xA3"sv, "a Matroska or WebM film", export_frames, "matroska"},
     Signature{0, "\x30\x26\xB2\x75\x8E\x66\xCF\x11"sv, "a Windows Media film", export_frames, "asf"},
     Signature{0, "\0\0\1\xBA"sv, "an MPEG film", export_frames, "mpeg"},

@@ -18,6 +18,9 @@ TEST(ForeignFile, IsNamedByItsFirstBytes) {
                                     {"\0\0\0\x18"
                                      "ftypheic"s,
                                      "HEIC"},
+                                    {"\0\0\0\x08"
+                                     "wide"s,
+                                     "QuickTime"},
                                     {"\x1F\x8B\x08\0"s, "gzip"},
                                     {"NRRD0005\n"s, "NRRD"},
                                     {"\x1C\2\0\0n+2\0\r\n\x1A\n"s, "NIfTI"},
@@ -32,6 +35,17 @@ TEST(ForeignFile, IsNamedByItsFirstBytes) {
     EXPECT_NE(name->find(word), std::string::npos) << *name;
     EXPECT_NE(name->find(';'), std::string::npos) << *name;
   }
+}
+
+TEST(ForeignFile, ContainersOfFilmsAreThoseOfFfmpeg) {
+  EXPECT_EQ(film_container("RIFF\x10\0\0\0AVI LIST"s), "avi");
+  EXPECT_EQ(film_container("\0\0\0\x18"
+                           "ftypqt  "s),
+            "mov");
+  EXPECT_EQ(film_container("\0\0\0\x18"
+                           "ftypheic"s),
+            "");
+  EXPECT_EQ(film_container("plain words"), "");
 }
 
 TEST(ForeignFile, UnknownBytesHaveNoName) {
