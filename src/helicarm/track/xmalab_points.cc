@@ -49,9 +49,9 @@ std::size_t offset_word(std::string_view name) {
 }
 
 XmalabTable read_table(const fs::path& file) {
-  constexpr std::uintmax_t most_bytes = std::uintmax_t(256) << 20;
+  constexpr std::uintmax_t most_table_bytes = std::uintmax_t(256) << 20;
   XmalabTable table;
-  table.text = value_or_throw(read_file(file, most_bytes));
+  table.text = value_or_throw(read_file(file, most_table_bytes));
   table.origin = file.filename().string();
   std::string_view rest = table.text;
   if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
