@@ -17,6 +17,7 @@
 #include "helicarm/report/earlier_results.h"
 #include "helicarm/track/model_sequence.h"
 #include "interruption.h"
+#include "measure_landmarks.h"
 #include "measuring.h"
 #include "progress_line.h"
 #include "resumed_sequence.h"
@@ -57,6 +58,7 @@ void print(const RegisteredModel& model, std::ostream& out) {
                        point.place.in_calibrator.x(), point.place.in_calibrator.y(),
                        point.place.in_calibrator.z(),
                        localization::length_at_95(point.place.covariance_in_calibrator));
+  for (const measures::InBone& measure : model.measures) print_lines(measure, "    ", out);
   if (const report::Table in_bone = case_registration::tunnels_in_bone_table({model}); !in_bone.rows.empty())
     out << report::text_of(report::without_empty_columns(in_bone));
 }

@@ -4,6 +4,7 @@
 #include "arrays.h"
 #include "checks.h"
 #include "held_calibration.h"
+#include "helicarm/case_registration/bone_measures.h"
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/localization/pick_checks.h"
 #include "helicarm/measures/measure_json.h"
@@ -90,6 +91,50 @@ py::dict measure(const std::string& word, const std::map<std::string, Doubles>& 
   return result;
 }
 
+using Coordinates = std::map<std::string, std::optional<Doubles>>;
+
+measures::LandmarkSet landmark_set(const std::string& word, const Coordinates& landmarks,
+                                   const std::string& model, double sigma_mm) {
+  std::vector<std::string_view> words;
+  std::vector<measures::Kind> kinds;
+  for (const measures::KindInfo& info : measures::kinds())
+    if (!info.components.empty()) words.push_back(info.word), kinds.push_back(info.kind);
+  measures::LandmarkSet set{word, model, kinds[checked_word(word, words, "kind")]};
+  for (const auto& [name, at] : landmarks) {
+    measures::TableLandmark each{name, {}, "landmarks"};
+    if (at)
+      each.landmark =
+          measures::Landmark{name, row_of<3>(*at, name), sigma_mm * sigma_mm * Eigen::Matrix3d::Identity()};
+    set.landmarks.push_back(std::move(each));
+  }
+  return set;
+}
+
+py::dict measure_landmarks(const std::string& word, const Coordinates& landmarks, double sigma_mm,
+                           const py::object& registration, const std::optional<std::string>& model,
+                           const HeldCalibration* calibration, const Points& points,
+                           const std::optional<std::filesystem::path>& zones) {
+  checked(sigma_mm, not_negative, "sigma_mm");
+  case_registration::BoneScene scene;
+  scene.zones = value_or_raise(measures::zones_of(zones));
+  if (!registration.is_none())
+    scene.models =
+        value_or_raise(case_registration::posed_models_from(json_from(registration), "registration"));
+  if (!model && scene.models.size() > 1)
+    raise({Reason::usage, "model is required: the registration has several models", {}, {}});
+  const std::string name = model ? *model : scene.models.empty() ? "" : scene.models.front().name;
+  measures::LandmarkSet set = landmark_set(word, landmarks, name, sigma_mm);
+  for (const auto& [point, value] : points) {
+    if (!landmarks.contains(point)) set.landmarks.push_back({point, {}, "points"});
+    scene.located[point] = {row_of<3>(value.first, point),
+                            checked_covariance(matrix_of(value.second, 3, 3, point), point)};
+  }
+  if (calibration != nullptr)
+    for (const calibration::CalibratedView& view : calibration->views)
+      scene.views.push_back({view.name, view.view});
+  return python_from(measures::to_json(value_or_raise(measured_in_bone(set, scene))));
+}
+
 }  // namespace
 
 void add_measures(py::module_& module) {
@@ -114,6 +159,23 @@ clicks are raw pixels. Returns {"kind", "depth_mm", "quantities": [{"name", "uni
 [{"point", "percent": {component: value}, "covariance_percent2", "warnings": [outside_reference]}], "notes":
 [pixels_taken_as_rectified]}. Raises InputError: usage, bad_value (clicks missing,
 unknown, or that do not determine the measure); RefusedError: behind_source, not_seen.)");
+  module.def(
+      "measure_landmarks", &measure_landmarks, py::arg("kind"), py::arg("landmarks"), py::kw_only(),
+      py::arg("sigma_mm") = 0.0, py::arg("registration") = py::none(), py::arg("model") = py::none(),
+      py::arg("calibration") = nullptr, py::arg("points") = Points{}, py::arg("zones") = py::none(),
+      R"(Quadrants and the tibial per cent from landmarks in a bone's CT, in three dimensions, as `helicarm measure --landmarks`.
+
+kind: femoral_quadrants, tibia_ap or tibia_ml. landmarks: {name: (3,) mm in the model (a CT: LPS), or None: a point of the
+model's plan in registration, or one of points}; names as of measure, and axis_medial, axis_lateral: points that coincide
+in a true lateral image (not of tibia_ml). Other names are points, given in per cent. sigma_mm: of a coordinate per axis.
+registration: the content of registration.json, such as register returns; model: one of its models, the only one if not
+given. points: {name: (xyz_mm (3,), covariance_mm2 (3, 3))} in the calibrator frame, carried into the model with the
+registration's error. calibration: its views within 30 degrees of a lateral one are compared with it. zones: a zones.json in
+place of the built-in published positions.
+Returns {"name", "model", "view": None, "kind", "depth_mm": None, "quantities", "positions": [{"point", "percent",
+"covariance_percent2", "zones": [{"name", "source", "from_centre_percent", "outside"}], "warnings"}], "laterals": [{"view",
+"off_deg", "apart_mm", "is_lateral", "message", "positions"}], "clicked": [], "missing": []}. Raises InputError: usage,
+bad_value (landmarks missing, unknown, or that do not determine the measure; a point that is not known), and as a file's.)");
 }
 
 }  // namespace helicarm::python

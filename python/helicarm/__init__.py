@@ -14,7 +14,7 @@ if _os.path.exists(_dictionary := _os.path.join(_os.path.dirname(__file__), "dic
 from ._helicarm import (  # noqa: F401
     CArmPrior, Calibration, Calibrator, Camera, DistortionMap, IntrinsicsPrior, LocatedPoint, MeasuredPhantom, Plate,
     Rectification, Result, ResultPoint, Surface, Sweep, Track, ViewPoints, Volume, XrayImage, __commit__, __version__, bundle,
-    add_to_c_arm, c_arm_report, calibrate, check_c_arm, detect, import_camera, import_transform, label, measure, measure_phantom, new_case,
+    add_to_c_arm, c_arm_report, calibrate, check_c_arm, detect, import_camera, import_transform, label, measure, measure_landmarks, measure_phantom, new_case,
     read_image, read_surface, read_volume, rectify, run_case, schema, simulate_case, verify_phantom)
 from .arrays import as_camera, as_image, as_surface, as_volume  # noqa: F401
 from .cameras import solve  # noqa: F401
@@ -30,7 +30,7 @@ __all__ = [
     "LocatedPoint", "MeasuredPhantom", "Plate", "Record", "Rectification", "RefusedError", "Result", "ResultPoint", "Session",
     "Surface", "Sweep", "Track", "ViewPoints", "Volume", "XrayImage", "as_camera", "as_image", "as_surface", "as_volume",
     "add_to_c_arm", "bundle", "c_arm_report", "calibrate", "check_c_arm", "detect", "drr", "figures", "import_camera", "import_transform",
-    "label", "measure", "measure_phantom", "migration", "new_case", "read_image", "read_surface", "read_volume", "rectify",
+    "label", "measure", "measure_landmarks", "measure_phantom", "migration", "new_case", "read_image", "read_surface", "read_volume", "rectify",
     "register", "register_sequence", "run_case", "schema", "segment", "simulate_case", "solve", "sweep", "track", "verify_phantom"]
 
 

@@ -310,6 +310,10 @@ def measure(kind: str, clicks: Mapping[str, ArrayLike], *, calibration: Optional
             view: Optional[_View] = None, sigma_px: Optional[float] = None, raw: bool = False,
             depth_mm: Optional[float] = None, depth_sigma_mm: float = 0.0, at: Optional[ArrayLike] = None,
             points: Mapping[str, Tuple[ArrayLike, ArrayLike]] = ...) -> _Dict: ...
+def measure_landmarks(kind: str, landmarks: Mapping[str, Optional[ArrayLike]], *, sigma_mm: float = 0.0,
+                      registration: Optional[_Dict] = None, model: Optional[str] = None,
+                      calibration: Optional[Calibration] = None, points: Mapping[str, Tuple[ArrayLike, ArrayLike]] = ...,
+                      zones: Optional[_Path] = None) -> _Dict: ...
 def run_case(folder: _Path, *, method: str = "best", max_error_mm: Optional[float] = None,
              motion_sigma_mm: float = 0, search_mm: float = ..., search_deg: float = ..., threads: int = 0,
              history: Optional[_Path] = None, cache: Union[bool, _Path] = True,

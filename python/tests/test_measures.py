@@ -71,3 +71,44 @@ def test_position_outside_the_landmarks_is_warned_of():
     assert warning["figures"]["percent"] == pytest.approx(-25)
     assert '"X" with "medial" (20.0 %)' in warning["message"]
     assert found["notes"] == []
+
+
+LANDMARKS = {"axis_medial": (-45, -25, -20), "axis_lateral": (5, -25, -20), "blumensaat_posterior": (0, -20, 0),
+             "blumensaat_anterior": (-3, 20, 0), "inferior": (8, 3, -25), "posterior": (6, -25, -10), "anterior": (7, 25, -4)}
+
+
+def test_landmarks_of_a_ct_give_quadrants_with_zones():
+    found = helicarm.measure_landmarks("femoral_quadrants", {**LANDMARKS, "P": (-20, -12.5, -7)}, sigma_mm=0.5)
+    (position,) = found["positions"]
+    assert position["percent"] == pytest.approx({"depth": 25, "height": 28})
+    assert position["zones"][0]["from_centre_percent"]["depth"] == pytest.approx(0.2)
+    assert found["laterals"] == [] and found["missing"] == []
+
+
+def test_points_of_the_world_are_carried_into_the_model_and_views_judged(pair, tmp_path):
+    calibration = pair.calibration()
+    rotation, translation = pair.pose["LAT"]
+    # The bone's x axis lies along the ray to its origin, at the balls' middle: LAT is a true lateral image of it.
+    along = pair.xyz.mean(axis=0) + rotation.T @ translation
+    along /= np.linalg.norm(along)
+    second = np.cross(along, (0, 0, 1))
+    second /= np.linalg.norm(second)
+    pose = np.eye(4)
+    pose[:3, :3] = np.array([along, second, np.cross(along, second)]).T
+    pose[:3, 3] = pair.xyz.mean(axis=0)
+    model = {"name": "femur", "decision": "accept", "world_from_model": pose.tolist(), "covariance": (1e-6 * np.eye(6)).tolist(),
+             "centre_mm": pose[:3, 3].tolist(), "points": []}
+    world = pose[:3, :3] @ (-20, -12.5, -7) + pose[:3, 3]
+    landmarks = {**LANDMARKS, "axis_medial": (-25, 0, 0), "axis_lateral": (25, 0, 0)}
+    found = helicarm.measure_landmarks("femoral_quadrants", landmarks, registration={"models": [model]}, calibration=calibration,
+                                       points={"P": (world, 0.01 * np.eye(3))})
+    assert found["model"] == "femur"
+    assert found["positions"][0]["percent"] == pytest.approx({"depth": 25, "height": 28})
+    (view,) = [each for each in found["laterals"] if each["view"] == "LAT"]
+    assert view["is_lateral"] and view["off_deg"] < 0.01
+    # Perspective: the landmarks' depths differ by up to 13 mm of 800.
+    assert view["positions"][0]["percent"] == pytest.approx({"depth": 25, "height": 28}, abs=3)
+    with pytest.raises(helicarm.InputError, match="no registered model"):
+        helicarm.measure_landmarks("femoral_quadrants", {**landmarks, "Q": None})
+    with pytest.raises(helicarm.InputError, match="kind"):
+        helicarm.measure_landmarks("distance", landmarks)

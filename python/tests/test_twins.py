@@ -17,7 +17,7 @@ TWINS = {
     "new": ["new_case"],
     "run": ["run_case"],
     "predict": ["Calibration.predict", "Calibration.tre_map"],
-    "measure": ["measure"],
+    "measure": ["measure", "measure_landmarks"],
     "bundle": ["bundle"],
     "schema": ["schema"],
     "demo": ["simulate_case", "run_case"],

@@ -23,7 +23,7 @@ Expected<CaseRegistration> register_models(Equipment& equipment, const std::vect
         }};
     return value_or_throw(case_registration::register_loaded(
         the_case, case_registration::views_of_calibration(the_case, *equipment.measurement->calibration),
-        options, progress));
+        options, progress, case_registration::located_points_of(*equipment.measurement)));
   });
 }
 

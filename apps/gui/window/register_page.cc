@@ -111,6 +111,7 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
                    [this] { emit slices_wanted(std::size_t(std::max(0, model_->currentIndex()))); });
   ct_->setToolTip(tr("The chosen model's CT in three directions, with its planned tunnels"));
   points_ = add_table(case_registration::points_table({}), "modelPointTable");
+  measures_ = add_table(case_registration::measures_table({}), "modelMeasureTable");
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
@@ -210,6 +211,9 @@ void RegisterPage::show_state(const ApplicationState& state) {
   std::vector<RegisteredModel> models = listed_models(state);
   models_->fill(table_of_models(state, models));
   points_->fill(case_registration::points_table(models));
+  const report::Table measures = case_registration::measures_table(models);
+  measures_->fill(measures);
+  measures_->setVisible(!measures.rows.empty());
   tunnels_->fill(case_registration::tunnels_in_bone_table(models));
   listed_ = std::move(models);
   drawn_.first = -1;

@@ -43,7 +43,7 @@ class RegisterPage : public Page {
 
   QPushButton *register_, *from_here_, *ct_;
   QLabel* says_;
-  PageTable *models_, *tunnels_, *points_;
+  PageTable *models_, *tunnels_, *points_, *measures_;
   QLabel* slices_;  ///< of the selected tunnel, or the first
   std::vector<case_registration::RegisteredModel> listed_;
   std::pair<int, int> drawn_{-1, 0};  ///< row, and width of the page, of the slices that are shown

@@ -50,8 +50,9 @@ Expected<Measurement> measure_case(const pipeline::Case& the_case, const Registe
   return guarded([&] {
     auto done = value_or_throw(pipeline::measure(the_case, options.run, progress.of_views()));
     if (done.failure || the_case.models.empty()) return Measurement{std::move(done), {}};
-    auto registration = value_or_throw(
-        register_loaded(the_case, views_of_calibration(the_case, *done.calibration), options, progress));
+    auto registration =
+        value_or_throw(register_loaded(the_case, views_of_calibration(the_case, *done.calibration), options,
+                                       progress, located_points_of(done)));
     pipeline::Result result = with_models(std::move(done), registration);
     return Measurement{std::move(result), std::move(registration)};
   });

@@ -213,7 +213,8 @@ Expected<CaseRegistration> register_case(const pipeline::Case& the_case, const R
 }
 
 Expected<CaseRegistration> register_loaded(const pipeline::Case& the_case, LoadedViews loaded,
-                                           const RegisterOptions& options, const Progress& progress) {
+                                           const RegisterOptions& options, const Progress& progress,
+                                           const WorldPoints& located) {
   return guarded([&] {
     CaseRegistration result;
     result.bones = the_case.bones;
@@ -222,9 +223,12 @@ Expected<CaseRegistration> register_loaded(const pipeline::Case& the_case, Loade
     result.warnings.insert(result.warnings.end(), result.loaded.warnings.begin(),
                            result.loaded.warnings.end());
     const auto plans = read_plans(the_case);
+    const auto measures = read_measures(the_case, plans);
     const Registrar registrar(the_case, options, progress, result.loaded);
-    for (std::size_t i = 0; i < the_case.models.size(); ++i)
-      result.models.push_back(registrar.registered(the_case.models[i], plans[i]));
+    for (std::size_t i = 0; i < the_case.models.size(); ++i) {
+      RegisteredModel& model = result.models.emplace_back(registrar.registered(the_case.models[i], plans[i]));
+      model.measures = measures_of(measures[i], located, the_case, result.loaded, model);
+    }
     return result;
   });
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "helicarm/case_registration/bone_measures.h"
 #include "helicarm/case_registration/load.h"
 #include "helicarm/case_registration/plan.h"
 #include "helicarm/core/json.h"
@@ -64,6 +65,7 @@ struct RegisteredModel {
   /// Of each tunnel; nothing: the model has no outline.
   std::vector<std::optional<registration::BoneCheck>> bone_checks = {};
   std::vector<std::optional<TunnelSlices>> tunnel_slices = {};  ///< in the model's files
+  std::vector<measures::InBone> measures = {};                  ///< of the model's table of landmarks
   std::vector<geometry::View> views;  ///< as used: of a tracked bone at the first acquisition
   /// For overlays, per view: outlines of the model at its pose, rectified px.
   std::vector<std::vector<Eigen::Vector2d>> outlines;
@@ -92,9 +94,11 @@ std::vector<std::vector<Eigen::Vector2d>> outlines(const registration::Model& mo
 Expected<CaseRegistration> register_case(const pipeline::Case& the_case, const RegisterOptions& options,
                                          const Progress& progress = {});
 
-/// Registers every model to views that are loaded already. Fails as `register_case`.
+/// Registers every model to views that are loaded already. `located`: points for the models' measures. Fails
+/// as `register_case`.
 Expected<CaseRegistration> register_loaded(const pipeline::Case& the_case, LoadedViews loaded,
-                                           const RegisterOptions& options, const Progress& progress = {});
+                                           const RegisterOptions& options, const Progress& progress = {},
+                                           const WorldPoints& located = {});
 
 /// registration.json (docs/formats.md).
 Json to_json(const CaseRegistration& result);

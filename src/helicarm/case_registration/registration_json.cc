@@ -131,6 +131,12 @@ std::vector<CheckedTunnel> tunnels_of(const RegisteredModel& model) {
   return tunnels;
 }
 
+std::vector<Json> measures_json(const RegisteredModel& model) {
+  std::vector<Json> list;
+  for (const measures::InBone& measure : model.measures) list.push_back(measures::to_json(measure));
+  return list;
+}
+
 template <class Output>
 void describe_model(Output& output, const RegisteredModel& model, const std::vector<guidance::Bone>& bones) {
   const Registration& found = model.registration;
@@ -164,6 +170,10 @@ void describe_model(Output& output, const RegisteredModel& model, const std::vec
             "bone_check", planned.bone_check, "[the tunnel against the bone](#bone_check), see below",
             [](auto& check, const registration::BoneCheck& of) { guidance::describe_bone_check(check, of); });
       });
+  output.value(
+      "measures", [&] { return measures_json(model); },
+      "of the model's table of landmarks, each as `helicarm measure --landmarks` prints it, see "
+      "[measures](#measures-in-a-bone)");
   output.value("seconds", found.seconds, "wall-clock time");
 }
 

@@ -76,6 +76,7 @@ std::string model_section(const RegisteredModel& model) {
     html += fmt::format("<p>Landmarks: FRE {:.2f} mm, FLE {:.2f} mm (rms).</p>\n", model.landmarks->fre_mm,
                         model.landmarks->fle_mm);
   if (!model.points.empty()) html += html_of(points_table({model}));
+  if (!model.measures.empty()) html += html_of(report::without_empty_columns(measures_table({model})));
   const report::Table in_bone = report::without_empty_columns(tunnels_in_bone_table({model}));
   return in_bone.rows.empty() ? html : html + html_of(in_bone) + slices_html(model);
 }

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/measures/measure_json.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/tables.h"
 
@@ -108,6 +109,73 @@ report::Table points_table(const std::vector<RegisteredModel>& models) {
        coordinate("x, mm", 0),
        coordinate("y, mm", 1),
        coordinate("z, mm", 2)},
+      rows);
+}
+
+namespace {
+
+struct MeasureRow {
+  std::string measure, point, where, position, published;
+  bool is_bad = false;
+};
+
+std::string without_point(measures::Kind kind, const measures::Position& position) {
+  return measures::sentence_of(kind, position).substr(position.point.size() + 1);
+}
+
+MeasureRow row_in_space(const measures::InBone& of, std::size_t i, const std::string& measure) {
+  const measures::Position& position = of.measure.positions[i];
+  MeasureRow row{measure, position.point, "in space", without_point(of.measure.kind, position), ""};
+  for (const measures::ZoneFit& fit : of.zones[i]) {
+    row.published += (row.published.empty() ? "" : "; ") + measures::sentence_of(fit, of.measure.kind);
+    row.is_bad = row.is_bad || fit.is_outside;
+  }
+  for (const Warning& warning : position.warnings) {
+    row.published += (row.published.empty() ? "" : "; ") + warning.message;
+    row.is_bad = true;
+  }
+  return row;
+}
+
+void add_rows(const measures::InBone& of, std::vector<MeasureRow>& rows) {
+  const measures::Kind kind = of.measure.kind;
+  const std::string measure = fmt::format("{} ({}, {})", of.name, measures::info_of(kind).label, of.model);
+  for (std::size_t i = 0; i < of.measure.positions.size(); ++i) rows.push_back(row_in_space(of, i, measure));
+  for (const measures::LateralView& view : of.laterals) {
+    rows.push_back({measure, "", view.view, "", measures::sentence_of(view), !view.is_lateral});
+    for (const measures::Position& position : view.projected)
+      rows.push_back({measure, position.point, view.view + ", images of the landmarks",
+                      without_point(kind, position), ""});
+  }
+  for (const measures::InImage& image : of.clicked)
+    for (const measures::Position& position : image.positions)
+      rows.push_back({measure, position.point, image.view + ", clicked", without_point(kind, position), ""});
+  for (const std::string& name : of.missing) rows.push_back({measure, name, "", "not located", "", true});
+}
+
+}  // namespace
+
+report::Table measures_table(const std::vector<RegisteredModel>& models) {
+  std::vector<MeasureRow> rows;
+  for (const RegisteredModel& model : models)
+    for (const measures::InBone& measure : model.measures) add_rows(measure, rows);
+  const auto shown = [](std::string MeasureRow::*text) {
+    return [text](const MeasureRow& row) { return report::Cell{row.*text}; };
+  };
+  return report::table_of<MeasureRow>(
+      "Quadrants and per cent",
+      {{{"Measure", "Name in the table of landmarks, what is measured, and the model"},
+        shown(&MeasureRow::measure)},
+       {{"Point", "Planned or located point"}, shown(&MeasureRow::point)},
+       {{"Where",
+         "In space: in the parallel projection along the bone's axis. A view: in its image, of the "
+         "landmarks' images or as clicked"},
+        shown(&MeasureRow::where)},
+       {{"Position", "Per cent with their standard deviations"}, shown(&MeasureRow::position)},
+       {{"Remarks", "Published positions and their sources; whether the view is a lateral one"},
+        [](const MeasureRow& row) {
+          return report::Cell{row.published, row.is_bad};
+        }}},
       rows);
 }
 

@@ -23,4 +23,7 @@ report::Table points_table(const std::vector<RegisteredModel>& models);
 /// The plans' tunnels against the bones of all models.
 report::Table tunnels_in_bone_table(const std::vector<RegisteredModel>& models);
 
+/// The models' measures in their bones: a row for each position and projection.
+report::Table measures_table(const std::vector<RegisteredModel>& models);
+
 }  // namespace helicarm::case_registration

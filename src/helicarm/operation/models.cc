@@ -116,7 +116,8 @@ Expected<Digests> keep_models(OperationPlan& plan, const fs::path& session) {
     for (std::size_t i = 0; i < plan.models.size(); ++i) {
       pipeline::CaseModel& model = plan.models[i];
       const std::string into = std::to_string(i + 1);
-      for (auto* file : {&model.volume, &model.surface, &model.mask, &model.landmarks, &model.plan})
+      for (auto* file : {&model.volume, &model.surface, &model.mask, &model.landmarks, &model.plan,
+                         &model.measures, &model.zones})
         if (*file) *file = folder.kept(**file, into);
       value_or_throw(case_registration::load_model(model));
     }
@@ -136,7 +137,7 @@ Expected<CaseRegistration> register_models(const OperationPlan& plan, const pipe
     const pipeline::Case with_models = with_models_of(plan, the_case);
     return value_or_throw(case_registration::register_loaded(
         with_models, case_registration::views_of_calibration(with_models, *measured.calibration),
-        measuring_options(plan), progress));
+        measuring_options(plan), progress, case_registration::located_points_of(measured)));
   });
 }
 

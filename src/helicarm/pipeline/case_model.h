@@ -32,6 +32,8 @@ struct CaseModel {
   std::optional<std::filesystem::path> landmarks;            ///< start: CSV of points that are also picked
   std::optional<std::filesystem::path> plan;                 ///< Slicer markups
   std::optional<int> mask_label;                             ///< of the mask; nothing: it has only one
+  std::optional<std::filesystem::path> measures = {};  ///< table of landmarks for measures in the bone
+  std::optional<std::filesystem::path> zones = {};     ///< published positions; nothing: those built in
 };
 
 /// Bird et al. (2011): the least bridge of bone between a tunnel and the bone's surface, mm.

@@ -111,6 +111,12 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
       "path of 3D Slicer's markups: `.mrk.json` (point lists give points, lines give tunnels; "
       "`coordinateSystem` LPS, RAS or LAS, `coordinateUnits` of length are converted) or `.fcsv` (points; "
       "its `#` lines must state `CoordinateSystem`, LPS, RAS, LAS, 0 or 1, and `columns`)");
+  codec.file("measures", model.measures, folder,
+             "path of a [table of landmarks](howto.md#measure-quadrants-in-the-ct) in the model: quadrants "
+             "and the tibial "
+             "per cent of planned and of located points; rows of other models are left out");
+  codec.file("zones", model.zones, folder,
+             "path of a `zones.json` that replaces the built-in published positions");
   codec.check([&](JsonReader& reader) {
     const auto refuse = [&](const char* key, const char* problem) {
       reader.refuse(Reason::bad_value, key, problem);
@@ -118,6 +124,7 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
     if (model.volume && model.surface) refuse("surface", "cannot be combined with \"volume\"");
     if (model.mask && !model.volume) refuse("mask", "needs a \"volume\"");
     if (model.mask_label && !model.mask) refuse("mask_label", "needs a \"mask\"");
+    if (model.zones && !model.measures) refuse("zones", "needs \"measures\"");
     if (model.window_hu && !(model.window_hu->x() < model.window_hu->y()))
       refuse("window_hu", "must be two increasing numbers");
     if (model.window_hu && !model.volume) refuse("window_hu", "needs a \"volume\"");

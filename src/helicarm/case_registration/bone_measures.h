@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "helicarm/core/json.h"
+#include "helicarm/measures/in_bone.h"
+#include "helicarm/measures/landmark_table.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/registration/motion.h"
+
+namespace helicarm::pipeline {
+struct Result;
+}
+
+namespace helicarm::case_registration {
+
+struct RegisteredModel;
+struct LoadedViews;
+struct MarkupPlan;
+
+/// A located point of the world (the calibrator's frame), mm.
+struct WorldPoint {
+  Eigen::Vector3d at;
+  Eigen::Matrix3d covariance_mm2;
+};
+using WorldPoints = std::map<std::string, WorldPoint>;
+
+/// A registered model as a measure needs it.
+struct PosedModel {
+  std::string name;
+  geometry::RigidTransform world_from_model;
+  registration::RigidCovariance covariance;
+  Eigen::Vector3d centre;                               ///< of the covariance, in the world
+  std::map<std::string, Eigen::Vector3d> planned = {};  ///< points of its plan, in the model, exact
+};
+
+/// Of registration.json, without the models that were refused. Fails as JsonReader.
+Expected<std::vector<PosedModel>> posed_models_from(const Json& registration, const std::string& origin);
+/// Those of result.json that have a position and a covariance. Fails as JsonReader.
+Expected<WorldPoints> located_points_from(const Json& result, const std::string& origin);
+WorldPoints located_points_of(const pipeline::Result& result);
+
+/// A world point in the model, with the errors of both.
+measures::Landmark in_model(const std::string& name, const WorldPoint& point, const PosedModel& model);
+
+/// What a measure in a bone takes its points from.
+struct BoneScene {
+  std::vector<PosedModel> models;
+  WorldPoints located;
+  std::vector<measures::NamedView> views;
+  std::vector<measures::Zone> zones;
+};
+
+/// A point without coordinates is one of the model's plan, or a located one carried into the model. Refuses
+/// (bad_value) a point that is neither and a model that is not registered, and as `measure_in_bone`. A set
+/// whose landmarks all have coordinates needs no model; without one it has no lateral views.
+Expected<measures::InBone> measured_in_bone(const measures::LandmarkSet& set, const BoneScene& scene);
+
+/// A model's table of landmarks and zones.
+struct ModelMeasures {
+  std::vector<measures::LandmarkSet> sets;  ///< of this model
+  std::vector<measures::Zone> zones;
+};
+
+/// For each model of the case. Throws BadInput: as `read_landmark_table` and `zones_from`, bad_value for a
+/// point without coordinates that is neither in the plan nor a pick, and landmarks that determine no measure.
+std::vector<ModelMeasures> read_measures(const pipeline::Case& the_case,
+                                         std::span<const std::optional<MarkupPlan>> plans);
+
+/// Of a registered model, none if it was refused. Points that were not located are named in `missing`; a set
+/// that is not determined is a note of the registration. Where all landmarks of a set are picked in one view,
+/// the per cent of that image stand beside.
+std::vector<measures::InBone> measures_of(const ModelMeasures& wanted, const WorldPoints& located,
+                                          const pipeline::Case& the_case, const LoadedViews& loaded,
+                                          RegisteredModel& model);
+
+}  // namespace helicarm::case_registration
