@@ -172,7 +172,7 @@ class Track(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         for name in ("markers.csv", "bodies.csv", "smoothed.csv", "points2d.csv"):
             self.assertEqual((self.root / "film-out" / name).read_bytes(), (self.root / "out" / name).read_bytes(), name)
-        done = self.track(folder, "refused", f"2-{FRAMES + 1}")
+        done = self.track(folder, "refused", f"1-{FRAMES + 1}")
         self.assertEqual(done.returncode, 2)
         self.assertIn(f"A.avi has the frames 1 to {FRAMES}", done.stderr)
         film = folder / "B.mov"
@@ -217,6 +217,9 @@ class Track(unittest.TestCase):
         done = self.track(folder, "points-up-out", f"1-{FRAMES}", "--points", other, "--points-y-up", "--points-from-one")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.check_places(self.root / "points-up-out")
+        other.write_text(names + "\n" + "".join(  # upwards in the second camera alone
+            ",".join(text if text == "NaN" or i % 4 != 3 else repr(SIZE - 1 - float(text))
+                     for i, text in enumerate(row.split(","))) + "\n" for row in rows))
         done = self.track(folder, "refused", f"1-{FRAMES}", "--points", other)
         self.assertEqual(done.returncode, 3, done.stderr)
         self.assertIn("residual_too_large: other.csv: the rays of its points miss each other", done.stderr)
