@@ -129,6 +129,28 @@ class Frames(unittest.TestCase):
         self.assertEqual([(m["name"], m["warned"]) for m in summary["models"]], [("first", 3), ("second", 3)])
         self.assertIn("second against first", (self.root / "out" / "report.html").read_text())
 
+    def test_distortion_map_beside_a_camera_is_used(self):
+        shift = 3.0  # of undistorted pixels to raw ones
+        grid = [(u, v) for v in range(-16, SIZE + 17, 8) for u in range(-16, SIZE + 17, 8)]
+        (self.root / "raw.csv").write_text("".join(f"{u + shift},{v}\n" for u, v in grid))
+        (self.root / "straight.csv").write_text("".join(f"{u},{v}\n" for u, v in grid))
+        done = run("rectify", "--xmalab", self.root / "raw.csv", self.root / "straight.csv", "--size", SIZE, SIZE,
+                   "--out", self.root / "map")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        case = json.loads(json.dumps(self.case))
+        for view in case["views"]:
+            camera = json.loads((self.root / view["camera"]).read_text())
+            camera["K"][0][2] -= shift
+            view["camera"] = "undistorted_" + view["camera"]
+            (self.root / view["camera"]).write_text(json.dumps(camera))
+            view["map"] = "map/map.json"
+        done = self.register(case, "--frames", "0-2", "--search-mm", 4, "--search-deg", 4)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for row in self.table("registration.csv"):
+            for key, expected in zip(("m14", "m24", "m34"), shift_at(int(row["frame"]))):
+                self.assertAlmostEqual(float(row[key]), expected, delta=0.3)
+        self.assertIn("Seq_Frame0001_secondToWorldTransform = ", (self.root / "out" / "smoothed.seq.mha").read_text())
+
     def test_interrupted_and_resumed_gives_the_same_bytes(self):
         names = ("frames.jsonl", "registration.csv", "bodies.csv", "smoothed.csv", "relative.csv", "report.html")
         options = ("--frames", "0-2", "--search-mm", 4, "--search-deg", 4)

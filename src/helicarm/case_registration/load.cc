@@ -113,12 +113,14 @@ void take_patient(std::string& known, const xray::XrayImage& image) {
                    fmt::format("{} is of another patient than the images before it", image.name));
 }
 
-void add_view(LoadedViews& loaded, xray::XrayImage image, const exchange::ImportedMatrix& camera) {
+void add_view(LoadedViews& loaded, xray::XrayImage image, const exchange::ImportedMatrix& camera,
+              std::optional<rectification::DistortionMap> map = {}) {
   take_patient(loaded.patient_key, image);
   if (camera.image_size) check_size(image.name, "the camera is for", *camera.image_size, image.pixels);
+  if (map) check_size(image.name, "\"map\" is for", {map->width, map->height}, image.pixels);
   loaded.views.push_back(view_of(image, image.name, camera.view));
-  loaded.views.back().grey = std::move(image.pixels);
-  loaded.maps.emplace_back();
+  loaded.views.back().grey = map ? rectification::resample(image, *map) : std::move(image.pixels);
+  loaded.maps.push_back(std::move(map));
   // The camera states what the pixels measure.
   std::ranges::copy_if(image.warnings, std::back_inserter(loaded.warnings),
                        [](const Warning& warning) { return warning.reason != Reason::spacing_missing; });
@@ -126,9 +128,14 @@ void add_view(LoadedViews& loaded, xray::XrayImage image, const exchange::Import
 
 LoadedViews views_of_cameras(const pipeline::Case& the_case) {
   LoadedViews loaded;
-  for (const pipeline::CaseView& view : the_case.views)
+  for (const pipeline::CaseView& view : the_case.views) {
+    std::optional<rectification::DistortionMap> map;
+    if (view.map)
+      map = value_or_throw(rectification::distortion_map_from_json(value_or_throw(read_json(*view.map)),
+                                                                   view.map->filename().string()));
     add_view(loaded, value_or_throw(pipeline::image_of(view)),
-             value_or_throw(exchange::import_matrix(*view.camera)));
+             value_or_throw(exchange::import_matrix(*view.camera)), std::move(map));
+  }
   return loaded;
 }
 

@@ -62,7 +62,8 @@ void describe_images(Codec& codec, View& view, const std::filesystem::path& fold
       "camera", view.camera, folder,
       "of `helicarm register` and `helicarm track`: path of a [camera of another "
       "program](#projections-of-other-programs), for all views or for none; the image is taken as free of "
-      "distortion. Then `calibrator` and `plate` may be left out, and the world is the cameras'");
+      "distortion, or `map` leads to the camera's pixels. Then `calibrator` and `plate` may be left out, and "
+      "the world is the cameras'");
   check_track(codec, "calibration", purpose);
   codec.file("calibration", view.calibration, folder,
              "of [`helicarm track`](motion.md#run-it): path of a result.json that holds this view's camera");
