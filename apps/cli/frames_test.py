@@ -6,7 +6,9 @@ import csv
 import json
 import math
 import pathlib
+import shutil
 import struct
+import subprocess
 import tempfile
 import unittest
 import zlib
@@ -128,6 +130,22 @@ class Frames(unittest.TestCase):
         summary = json.loads((self.root / "out" / "sequence.json").read_text())
         self.assertEqual([(m["name"], m["warned"]) for m in summary["models"]], [("first", 3), ("second", 3)])
         self.assertIn("second against first", (self.root / "out" / "report.html").read_text())
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_films_give_the_poses_of_their_frames(self):
+        options = ("--frames", "0-2", "--search-mm", 4, "--search-deg", 4)
+        self.assertEqual(self.register(self.case, *options).returncode, 0)
+        expected = [(self.root / "out" / name).read_bytes() for name in ("registration.csv", "smoothed.csv")]
+        case = json.loads(json.dumps(self.case))
+        for view in case["views"]:
+            film = f"{view['name']}.mkv"
+            subprocess.run(["ffmpeg", "-v", "error", "-nostdin", "-y", "-start_number", "0", "-i",
+                            self.root / f"{view['name']}_%02d.png", "-c:v", "ffv1", "-pix_fmt", "gray16le", self.root / film],
+                           check=True)
+            view.update(image=film, frame_offset=1)  # a film begins at 1
+        done = self.register(case, *options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual([(self.root / "out" / name).read_bytes() for name in ("registration.csv", "smoothed.csv")], expected)
 
     def test_distortion_map_beside_a_camera_is_used(self):
         shift = 3.0  # of undistorted pixels to raw ones
