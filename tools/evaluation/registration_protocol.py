@@ -308,6 +308,9 @@ class Protocol:
             row["mtre_mm"] = float(np.linalg.norm(errors, axis=1).mean())
             if result.get("covariance"):
                 covariance, centre = np.array(result["covariance"]), np.array(result["centre_mm"])
+                row["rms_mm"] = float(np.sqrt((errors**2).sum(axis=1).mean()))
+                row["predicted_mm"] = float(np.sqrt(np.mean([np.trace(self.of_point(covariance, p - centre))
+                                                             for p in placed(found, targets)])))
                 row["inside"] = float(np.mean([e @ np.linalg.solve(self.of_point(covariance, p - centre), e) < CHI2_95
                                                for e, p in zip(errors, placed(found, targets))]))
         return row
@@ -352,6 +355,10 @@ def right_table(right):
     refused = sorted(row["code"] for row in right if row["decision"] == "refuse")
     counts = ", ".join(f"{code} {refused.count(code)}" for code in dict.fromkeys(refused))
     warned = sum(row["decision"] == "warn" for row in right)
+    stated = [row for row in right if row["decision"] != "refuse" and "predicted_mm" in row]
+    if stated:
+        rms, predicted = (np.sqrt(np.mean([row[key] ** 2 for row in stated])) for key in ("rms_mm", "predicted_mm"))
+        lines += ["", f"Errors of the targets, rms: {rms:.3f} mm; predicted: {predicted:.3f} mm."]
     return lines + ["", f"Capture range: {capture_range_mm(right)} mm; of the poses found, refused or not: "
                         f"{capture_range_mm(right, True)} mm. Warned: {warned}. Refused: {counts or 'none'}.", ""]
 

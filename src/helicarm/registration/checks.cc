@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
@@ -18,8 +19,9 @@ using Eigen::Vector3d;
 
 constexpr double strain_prior = 0.05;
 constexpr double no_strain = 1e-6;
-constexpr int xx = 0, xy = 3, xz = 4;                        // of a strain
-constexpr int least_patches = 8, least_contour_points = 12;  // of a view
+constexpr double least_edge_ratio = 1e-4, most_edge_ratio = 16;  // of variances
+constexpr int xx = 0, xy = 3, xz = 4;                            // of a strain
+constexpr int least_patches = 8, least_contour_points = 12;      // of a view
 constexpr double least_patch_score = 0.4;
 constexpr double least_contour_score = 0.6;
 constexpr double least_mirrored_ratio = 1.02;  // of a nearly symmetric bone 1.05 to 1.1
@@ -100,7 +102,10 @@ Disagreement disagreement_of(const std::vector<RegistrationView>& views, const V
   return result;
 }
 
-Deformation deformation_of(const Observation& observation, const ErrorModel& errors, const Vector3d& centre) {
+namespace {
+
+/// Pose and strain, the strain under its prior. Its unit of information is that of the comparisons' weights.
+Problem pose_and_strain(const Observation& observation, const ErrorModel& errors, const Vector3d& centre) {
   const Linearised plain = linearised(observation, {}, errors.correlation_px);
   const double unit = geometry::solve_spd(plain.information, plain.meat).solution.trace() / 6;
   Problem problem{{}, MatrixXd(affine_parameters, 12), MatrixXd::Zero(12, 12)};
@@ -113,6 +118,46 @@ Deformation deformation_of(const Observation& observation, const ErrorModel& err
       problem.prior(6 + along_ray, 6 + along_ray) = unit / (no_strain * no_strain);
   }
   problem.map << affine_from_rigid(), affine_from_strain(axes);
+  return problem;
+}
+
+}  // namespace
+
+double edge_variance_ratio(const Observation& observation, const ErrorModel& errors, const Vector3d& centre) {
+  const Problem problem = pose_and_strain(observation, errors, centre);
+  const Linearised both = linearised(observation, problem, errors.correlation_px);
+  const auto of_strain = [](const MatrixXd& covariance) -> Eigen::Matrix<double, 6, 6> {
+    return covariance.bottomRightCorner<6, 6>();
+  };
+  const Eigen::VectorXd step = geometry::solve_spd(both.information, both.gradient).solution;
+  const Eigen::Matrix<double, 6, 1> strain = step.tail<6>();
+  Eigen::Matrix<double, 6, 1> size = Eigen::Matrix<double, 6, 1>::Zero();
+  size.head<3>().setConstant(errors.scale_sigma);
+  const Eigen::Matrix<double, 6, 6> other = of_strain(both.covariance()) +
+                                            of_strain(errors.of_cameras(observation, centre, problem)) +
+                                            size * size.transpose();
+  const Eigen::Matrix<double, 6, 6> edges = of_strain(errors.of_edges(observation, centre, problem));
+  constexpr int steps = 60;
+  std::vector<double> ratios, logs;
+  for (int i = 0; i <= steps; ++i) {
+    const double ratio = least_edge_ratio * std::pow(most_edge_ratio / least_edge_ratio, double(i) / steps);
+    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> root(other + ratio * edges);
+    if (root.info() != Eigen::Success) return 1;
+    const Eigen::Matrix<double, 6, 1> white = root.matrixL().solve(strain);
+    ratios.push_back(ratio);
+    logs.push_back(-root.matrixLLT().diagonal().array().log().sum() - white.squaredNorm() / 2);
+  }
+  double sum = 0, weights = 0;
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    const double weight = std::exp(logs[i] - *std::ranges::max_element(logs));
+    sum += weight * ratios[i];
+    weights += weight;
+  }
+  return weights > 0 ? sum / weights : 1;
+}
+
+Deformation deformation_of(const Observation& observation, const ErrorModel& errors, const Vector3d& centre) {
+  const Problem problem = pose_and_strain(observation, errors, centre);
   const Linearised both = linearised(observation, problem, errors.correlation_px);
   const Eigen::VectorXd step = geometry::solve_spd(both.information, both.gradient).solution;
   Eigen::Matrix3d strain;

@@ -27,6 +27,12 @@ Disagreement disagreement_of(const std::vector<RegistrationView>& views, const E
 Deformation deformation_of(const Observation& observation, const ErrorModel& errors,
                            const Eigen::Vector3d& centre);
 
+/// Variance of the bias common to a view's edges, in units of the stated one (`EdgeSigma`): its mean given
+/// the strains that the images require, which such a bias causes as it causes errors of the pose. Beforehand
+/// each size from 0.01 to 4 times the stated one is as likely as another. Needs two or more views.
+double edge_variance_ratio(const Observation& observation, const ErrorModel& errors,
+                           const Eigen::Vector3d& centre);
+
 /// Sets decision, failure, warnings and notes from the figures.
 void decide(const Model& model, const std::vector<geometry::RigidTransform>& starts,
             const RegistrationOptions& options, Registration& result);

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/checks.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/core/random.h"
+
+namespace helicarm::registration {
+namespace checks_test {
+
+using Eigen::Vector3d;
+
+constexpr double radius_mm = 40;
+constexpr EdgeSigma stated{0.08, 0.04};
+
+/// Two views from 900 mm at a right angle about z.
+std::vector<RegistrationView> two_views() {
+  std::vector<RegistrationView> views(2);
+  for (int i = 0; i < 2; ++i) {
+    geometry::View& view = views[std::size_t(i)].view;
+    view.intrinsics = {4000, 4000, 512, 512};
+    const Vector3d z = i == 0 ? Vector3d::UnitX() : Vector3d::UnitY(), y = -Vector3d::UnitZ();
+    view.camera_from_world.rotation << y.cross(z).transpose(), y.transpose(), z.transpose();
+    view.camera_from_world.translation = {0, 0, 900};
+  }
+  return views;
+}
+
+/// Edges in all directions of a body in the origin that is `growth_mm` larger in the images than its model,
+/// with errors of about 0.1 px.
+Observation edges_of_body(const std::vector<RegistrationView>& views, double growth_mm) {
+  Observation observation;
+  RandomStream random(1, 0);
+  for (const RegistrationView& view : views) {
+    ViewObservation& seen = observation.views.emplace_back();
+    for (int i = 0; i < 300; ++i) {
+      const double x = random.normal(), y = random.normal(), z = random.normal();
+      const Vector3d at = radius_mm * Vector3d(x, y, z).normalized();
+      const double angle = EIGEN_PI * random.uniform();
+      const Eigen::RowVector2d normal(std::cos(angle), std::sin(angle));
+      Eigen::Matrix<double, 2, 3> by_point;
+      for (int k = 0; k < 3; ++k)
+        by_point.col(k) = (view.view.project(at + 1e-4 * Vector3d::Unit(k)) -
+                           view.view.project(at - 1e-4 * Vector3d::Unit(k))) /
+                          2e-4;
+      const Eigen::RowVector3d along = normal * by_point;
+      Gradient jacobian = Gradient::Zero();
+      jacobian.head<3>() = along;
+      for (int row = 0; row < 3; ++row) jacobian.segment<3>(3 + 3 * row) = along[row] * at;
+      jacobian[edge_offset] = 1;
+      const double residual = growth_mm / radius_mm * along.dot(at) + 0.1 * random.normal();
+      Comparison& comparison = seen.comparisons.emplace_back();
+      comparison.pixel = view.view.project(at);
+      comparison.information = jacobian * jacobian.transpose();
+      comparison.gradient = residual * jacobian;
+      comparison.weight = 1;
+    }
+  }
+  return observation;
+}
+
+double ratio_of(double growth_mm, double scale_sigma = 0) {
+  const auto views = two_views();
+  const ErrorModel errors{views, radius_mm, Eigen::MatrixXd::Zero(22, 22), {5, 5}, stated, scale_sigma};
+  return edge_variance_ratio(edges_of_body(views, growth_mm), errors, Vector3d::Zero());
+}
+
+TEST(EdgeVariance, IsSmallWhereTheImagesRequireNoStrain) { EXPECT_LT(ratio_of(0), 0.3); }
+
+TEST(EdgeVariance, IsThatOfTheStrainWhichTheImagesRequire) {
+  EXPECT_GT(ratio_of(0.04), ratio_of(0));
+  EXPECT_GT(ratio_of(0.15), 1);
+  EXPECT_LE(ratio_of(4), 16);
+}
+
+TEST(EdgeVariance, AStrainThatTheSizeExplainsIsNoneOfTheEdges) {
+  EXPECT_LT(ratio_of(0.15, 0.01), ratio_of(0.15));
+}
+
+}  // namespace checks_test
+}  // namespace helicarm::registration
