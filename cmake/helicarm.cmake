@@ -5,7 +5,7 @@ add_library(helicarm_flags INTERFACE)
 # definition goes with the libraries to their users, so that a library with AVX2 serves a program without.
 set(helicarm_abi EIGEN_MAX_STATIC_ALIGN_BYTES=32 EIGEN_MAX_ALIGN_BYTES=32)
 target_compile_definitions(helicarm_flags INTERFACE ${helicarm_abi})
-target_compile_options(helicarm_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wno-aggressive-loop-optimizations)
+target_compile_options(helicarm_flags INTERFACE -Wall -Wextra -Wpedantic)
 # Nobody reads errno or floating-point flags: without them loops with a root or a comparison become vectors.
 target_compile_options(helicarm_flags INTERFACE -fno-math-errno -fno-trapping-math)
 # For all units, as programs and the Python module share libraries and precompiled headers. Functions may still be
@@ -18,7 +18,13 @@ if(HELICARM_WERROR)
 endif()
 # GCC collects garbage only above this many kB: up to a fifth of a large unit's time.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  target_compile_options(helicarm_flags INTERFACE "SHELL:--param ggc-min-heapsize=1000000")
+  target_compile_options(helicarm_flags INTERFACE -Wshadow -Wno-aggressive-loop-optimizations
+                         "SHELL:--param ggc-min-heapsize=1000000")
+endif()
+# A header precompiled by Clang holds the time unless told not to, and ccache then serves no unit that reads it. Its
+# -Wshadow would also name what other files of a unity unit declare.
+if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+  target_compile_options(helicarm_flags INTERFACE "SHELL:-Xclang -fno-pch-timestamp")
 endif()
 if(NOT HELICARM_PORTABLE)
   target_compile_options(helicarm_flags INTERFACE -march=x86-64-v3)

@@ -208,7 +208,7 @@ void HypothesisFilter::gather_starts(const std::array<int, 3>& candidates, const
   for (int i = 0; i < 3; ++i)
     scales[i] = scales_.data() + static_cast<std::size_t>(candidates[i]) * balls_.size();
   const auto holds = [](const std::array<float, 2>& scale, float mm_per_px) {
-    return (scale[0] <= mm_per_px) & (mm_per_px <= scale[1]);
+    return static_cast<int>(scale[0] <= mm_per_px) & static_cast<int>(mm_per_px <= scale[1]);
   };
   std::size_t kept = 0;
   for (std::size_t ball = 0; ball < balls_.size(); ++ball) {
