@@ -171,9 +171,10 @@ Raises InputError: bad_size, bad_value, not_finite.)")
       .def("__repr__", [](const xray::XrayImage& i) {
         return fmt::format("<XrayImage {}: {} x {} pixels>", i.name, i.pixels.width(), i.pixels.height());
       });
-  module.def("read_image", &image_at, py::arg("path"), py::kw_only(), py::arg("frame") = py::none(),
-             py::arg("name") = py::none(),
-             R"(Reads a DICOM, PNG, TIFF, JPEG or BMP X-ray image, or a frame of a film by ffmpeg; the content decides which.
+  module.def(
+      "read_image", &image_at, py::arg("path"), py::kw_only(), py::arg("frame") = py::none(),
+      py::arg("name") = py::none(),
+      R"(Reads a DICOM, PNG, TIFF, JPEG or BMP X-ray image, or a frame of a film by ffmpeg; the content decides which.
 
 pixel_mm and source_detector_mm may stand in a sidecar NAME.json, of DICOM NAME.dcm.json. frame: 1-based, needed only where the
 file holds several. name: of the view; the file's stem where not given. Releases the GIL.

@@ -162,7 +162,8 @@ TEST(FilmWithoutFfmpeg, IsNamedWithItsWayOut) {
   ::setenv("PATH", before.c_str(), 1);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::not_an_image);
-  EXPECT_NE(refused.error().message.find("ffmpeg -i FILE -vsync passthrough frame_%04d.png"), std::string::npos);
+  EXPECT_NE(refused.error().message.find("ffmpeg -i FILE -vsync passthrough frame_%04d.png"),
+            std::string::npos);
 }
 
 }  // namespace film_test
