@@ -224,6 +224,18 @@ class Track(unittest.TestCase):
         self.assertEqual(done.returncode, 3, done.stderr)
         self.assertIn("residual_too_large: other.csv: the rays of its points miss each other", done.stderr)
 
+    def test_points_that_mirror_the_world_contradict_a_known_geometry(self):
+        def known(case, folder):
+            case["picks"] = []
+            shutil.copyfile(self.root / "out" / "points3d.csv", folder / "known.csv")
+            case["bodies"][0]["geometry"] = "known.csv"
+        folder = self.changed("mirrored", known)
+        points = self.root / "out" / "points2d.csv"
+        self.assertEqual(self.track(folder, "known-points", f"1-{FRAMES}", "--points", points).returncode, 0)
+        done = self.track(folder, "refused", f"1-{FRAMES}", "--points", points, "--points-y-up")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn('the markers of the body "jaw" differ from its geometry by', done.stderr)
+
     def test_first_points_of_xmalab_are_picks(self):
         points = self.root / "out" / "points2d.csv"
         folder = self.of_points("xmalab-picks")

@@ -11,10 +11,9 @@
 #include "helicarm/case_registration/load.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
-#include "helicarm/core/statistics.h"
 #include "helicarm/exchange/import_matrix.h"
-#include "helicarm/geometry/ray.h"
 #include "helicarm/pipeline/case_frames.h"
+#include "helicarm/track/case_points.h"
 #include "helicarm/track/first_markers.h"
 #include "helicarm/track/xmalab_points.h"
 
@@ -22,8 +21,6 @@ namespace helicarm::track {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t most_markers = 200;
 
 /// Cameras of files, or of saved calibrations.
 void read_cameras(TrackCase& read, const pipeline::Case& the_case, const std::string& origin) {
@@ -175,92 +172,6 @@ void read_bodies(TrackCase& read, const std::vector<pipeline::CaseBody>& bodies,
   }
 }
 
-/// A point of the file in raw pixels from 0, y downwards.
-Eigen::Vector2d raw_point(Eigen::Vector2d at, const TrackView& view, const PointsFile& points,
-                          const std::string& origin) {
-  if (points.from_one) at.array() -= 1;
-  if (points.y_up) {
-    if (!view.image_size)
-      throw BadInput(Reason::bad_value, fmt::format("{}: y upwards: the camera of {} states no image size",
-                                                    origin, view.images.name));
-    at.y() = view.image_size->y() - 1 - at.y();
-  }
-  return at;
-}
-
-/// Median of what the rays of each marker and frame miss each other by, against the first view.
-std::optional<double> median_gap_mm(const TrackCase& read) {
-  std::vector<double> gaps;
-  const std::size_t views = read.views.size();
-  const auto ray = [&](std::size_t view, const Eigen::Vector2d& raw) {
-    const auto& map = read.views[view].map;
-    return geometry::ray_through(read.views[view].camera,
-                                 map ? map->rectified_from_raw(raw).value_or(raw) : raw);
-  };
-  for (const auto& frame : read.points)
-    for (std::size_t i = 0; i < frame.size(); i += views)
-      for (std::size_t k = 1; k < views; ++k)
-        if (frame[i] && frame[i + k])
-          gaps.push_back(geometry::gap_between(ray(0, *frame[i]), ray(k, *frame[i + k])));
-  if (gaps.empty()) return std::nullopt;
-  return median(std::move(gaps));
-}
-
-void check_points_meet(const TrackCase& read, const std::string& origin) {
-  constexpr double most_mm = 2;
-  const auto gap = median_gap_mm(read);
-  if (!gap)
-    throw BadInput(Reason::not_seen,
-                   fmt::format("{}: no marker has a point in two views of a frame", origin));
-  if (*gap > most_mm)
-    throw BadInput(
-        {Reason::residual_too_large,
-         fmt::format(
-             "{}: the rays of its points miss each other by {:.2f} mm (median), limit {:g} mm: the views' "
-             "order or cameras are others, or the file counts y upwards, has undistorted points, or begins "
-             "at another frame in one view",
-             origin, *gap, most_mm),
-         {},
-         {{"gap_mm", *gap}}});
-}
-
-/// Markers, picks and points of the file.
-void take_points(TrackCase& read, const PointsFile& points, const case_registration::FrameRange& frames) {
-  const std::string origin = points.file.filename().string();
-  const XmalabPoints2d given = value_or_throw(read_xmalab_points2d(points.file, read.views.size()));
-  if (points.undistorted)
-    for (const TrackView& view : read.views)
-      if (view.map)
-        throw BadInput(
-            Reason::bad_value,
-            fmt::format("{}: XMALab's undistorted points are not those of the distortion map of {}: export "
-                        "the distorted ones",
-                        origin, view.images.name));
-  const int last = points.first_frame + int(given.rows.size()) - 1;
-  const std::vector<int> numbers = points.of_all_frames ? frames.numbers() : std::vector{frames.first};
-  for (const int number : {numbers.front(), numbers.back()})
-    if (number < points.first_frame || number > last)
-      throw BadInput(Reason::bad_value,
-                     fmt::format("{}: has a row for each of the frames {} to {}, but frame {} is asked for",
-                                 origin, points.first_frame, last, number));
-  for (const std::string& name : given.markers) marker_named(read, name);
-  for (const int number : numbers) {
-    auto row = given.rows[std::size_t(number - points.first_frame)];
-    for (std::size_t i = 0; i < row.size(); ++i)
-      if (row[i]) row[i] = raw_point(*row[i], read.views[i % read.views.size()], points, origin);
-    if (number == numbers.front())
-      for (std::size_t i = 0; i < row.size(); ++i)
-        if (row[i]) read.picks.push_back({i / read.views.size(), i % read.views.size(), *row[i]});
-    if (points.of_all_frames) read.points.push_back(std::move(row));
-  }
-  if (points.of_all_frames) {
-    read.point_sigma_px = points.sigma_px.value_or(read.point_sigma_px);
-    check_points_meet(read, origin);
-  } else if (read.picks.empty()) {
-    throw BadInput(Reason::bad_value, fmt::format("{}: has no point in frame {}", origin, frames.first));
-  }
-}
-
 }  // namespace
 
 void check_butterworth(const TrackCase& the_case, int step) {
@@ -322,6 +233,7 @@ Expected<TrackCase> read_track_case(const fs::path& path, const case_registratio
     if (points) take_points(read, *points, frames);
     if (!is_placed) complete_picks(read, frames);
     read_bodies(read, base.bodies, points || !base.picks.empty(), origin);
+    if (is_placed) check_geometry_of_points(read, points->file.filename().string());
     return read;
   });
 }
