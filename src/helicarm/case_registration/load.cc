@@ -80,15 +80,26 @@ volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& case_m
   return value_or_throw(volume::tiff_stack(path, *case_model.voxel_mm, offset_hu));
 }
 
-std::string list_of_segments(const std::map<int, std::string>& segments) {
-  constexpr std::size_t most_named = 20;
-  std::string list;
-  std::size_t named = 0;
-  for (const auto& [number, label] : segments) {
-    if (named++ == most_named) return list + "; ...";
-    list += fmt::format("{} {} \"{}\"", list.empty() ? "; its segments:" : ",", number, label);
-  }
-  return list;
+/// The body's mask, 0 outside, and whether slices without it may be missing (a DICOM segmentation).
+struct LoadedMask {
+  volume::Volume volume;
+  bool may_be_part = false;
+};
+
+LoadedMask mask_of(const pipeline::CaseModel& case_model) {
+  const fs::path& path = *case_model.mask;
+  const std::string origin = fmt::format("models: \"{}\": {}", case_model.name, path.filename().string());
+  std::optional<volume::Volume> segment = value_or_throw(volume::read_segment(
+      path, {case_model.mask_label, case_model.mask_segment, case_model.mask_threshold}));
+  if (segment) return {*std::move(segment), true};
+  for (const auto& [is_given, key] : {std::pair(case_model.mask_segment.has_value(), "mask_segment"),
+                                      std::pair(case_model.mask_threshold.has_value(), "mask_threshold")})
+    if (is_given)
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{} is no DICOM segmentation: it takes no \"{}\"", origin, key));
+  LoadedMask mask{volume_at(path, case_model, 0)};
+  value_or_throw(volume::choose_label(mask.volume, case_model.mask_label, origin, "\"mask_label\""));
+  return mask;
 }
 
 bool has_voxels_of(const volume::Volume& volume, const Eigen::Vector3d& voxel_mm) {
@@ -249,22 +260,17 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,
                                  case_model.name, case_model.volume->filename().string()));
     const volume::Volume volume = volume_at(*case_model.volume, case_model, case_model.tiff_offset_hu);
     std::optional<volume::Volume> mask;
-    std::optional<std::map<int, std::string>> segments;
+    bool may_be_part = false;
     if (case_model.mask) {
-      segments = value_or_throw(volume::segments_in(*case_model.mask));
-      mask = volume_at(*case_model.mask, case_model, 0);
-      auto chosen = volume::choose_label(
-          *mask, case_model.mask_label,
-          fmt::format("models: \"{}\": {}", case_model.name, case_model.mask->filename().string()),
-          "\"mask_label\"");
-      if (!chosen && segments) chosen.error().message += list_of_segments(*segments);
-      value_or_throw(chosen);
+      LoadedMask loaded_mask = mask_of(case_model);
+      mask = std::move(loaded_mask.volume);
+      may_be_part = loaded_mask.may_be_part;
     }
     // A stack has no frame of its own: a mask drawn on it in another program brings that program's.
     if (mask && case_model.voxel_mm && has_voxels_of(*mask, *case_model.voxel_mm))
       mask->patient_from_voxel = volume.patient_from_voxel;
     // Another grid is refused with the model; a segmentation's empty slices may be missing.
-    if (mask) volume::onto_grid(*mask, volume, segments.has_value());
+    if (mask) volume::onto_grid(*mask, volume, may_be_part);
     std::optional<registration::HuWindow> window;
     if (case_model.window_hu) window = {case_model.window_hu->x(), case_model.window_hu->y()};
     registration::Model model =

@@ -117,11 +117,26 @@ TEST_F(LoadSegmentation, TheChosenSegmentIsTheBody) {
   EXPECT_NEAR(load_model(model_)->model->centre.x(), 15.5, 0.7);
 }
 
+TEST_F(LoadSegmentation, ASegmentIsChosenByItsLabel) {
+  write(4);
+  model_.mask_segment = "Tibia";
+  EXPECT_NEAR(load_model(model_)->model->centre.x(), 15.5, 0.7);
+  model_.mask_threshold = 0.5;
+  EXPECT_THAT(load_model(model_).error().message, HasSubstr("takes no \"mask_threshold\""));
+}
+
+TEST_F(LoadLabelMap, ALabelMapTakesNoSegment) {
+  model_.mask_segment = "Tibia";
+  EXPECT_THAT(load_model(model_).error().message,
+              HasSubstr("is no DICOM segmentation: it takes no \"mask_segment\""));
+}
+
 TEST_F(LoadSegmentation, SeveralSegmentsWithoutAChoiceAreNamed) {
   write(4);
   const auto refused = load_model(model_);
   ASSERT_FALSE(refused);
-  EXPECT_THAT(refused.error().message, HasSubstr("\"mask_label\"; its segments: 3 \"Femur\", 8 \"Tibia\""));
+  EXPECT_THAT(refused.error().message,
+              HasSubstr("\"mask_label\" or \"mask_segment\"; its segments: 3 \"Femur\", 8 \"Tibia\""));
 }
 
 TEST_F(LoadSegmentation, OneThatLeavesTheCtIsRefused) {

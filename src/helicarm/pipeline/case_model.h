@@ -32,6 +32,8 @@ struct CaseModel {
   std::optional<std::filesystem::path> landmarks;            ///< start: CSV of points that are also picked
   std::optional<std::filesystem::path> plan;                 ///< Slicer markups
   std::optional<int> mask_label;                             ///< of the mask; nothing: it has only one
+  std::optional<std::string> mask_segment = {};  ///< the same by the label of a DICOM segmentation's segment
+  std::optional<double> mask_threshold = {};     ///< of a fractional DICOM segmentation: share from which on
   std::optional<std::filesystem::path> measures = {};  ///< table of landmarks for measures in the bone
   std::optional<std::filesystem::path> zones = {};     ///< published positions; nothing: those built in
 };

@@ -83,6 +83,11 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
   codec.integer("mask_label", model.mask_label, 1, volume_label_limit,
                 "label of the body where the mask is a label map, or the segment's number in a DICOM "
                 "segmentation; with several of them it must be given");
+  codec.text("mask_segment", model.mask_segment,
+             "the same by the segment's label in a DICOM segmentation, such as `\"Femur\"`");
+  codec.number("mask_threshold", model.mask_threshold, {0.01, 1},
+               "share from which a voxel of a fractional DICOM segmentation is of the body. It must be given "
+               "of such a one, and only of it");
   codec.vector(
       "window_hu", model.window_hu, hu_range,
       "`[low, high]`: the body's voxels, within the mask if there is one. Without mask and window the "
@@ -124,6 +129,10 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
     if (model.volume && model.surface) refuse("surface", "cannot be combined with \"volume\"");
     if (model.mask && !model.volume) refuse("mask", "needs a \"volume\"");
     if (model.mask_label && !model.mask) refuse("mask_label", "needs a \"mask\"");
+    if (model.mask_segment && !model.mask) refuse("mask_segment", "needs a \"mask\"");
+    if (model.mask_segment && model.mask_label)
+      refuse("mask_segment", "cannot be combined with \"mask_label\"");
+    if (model.mask_threshold && !model.mask) refuse("mask_threshold", "needs a \"mask\"");
     if (model.zones && !model.measures) refuse("zones", "needs \"measures\"");
     if (model.window_hu && !(model.window_hu->x() < model.window_hu->y()))
       refuse("window_hu", "must be two increasing numbers");

@@ -11,6 +11,9 @@
 #include "helicarm/volume/read_volume.h"
 #include "helicarm/volume/voxels.h"
 #include "helicarm/xray/dicom_tags.h"
+#include "helicarm/xray/frame_fragments.h"
+#include "helicarm/xray/rle.h"
+#include "helicarm/xray/transfer_syntax.h"
 
 namespace helicarm::volume {
 namespace {
@@ -21,6 +24,8 @@ using xray::DicomTag;
 
 constexpr std::string_view segmentation_class = "1.2.840.10008.5.1.4.1.1.66.4";
 constexpr DicomTag segmentation_type{0x00620001, "Segmentation Type"};
+constexpr DicomTag fractional_type{0x00620010, "Segmentation Fractional Type"};
+constexpr DicomTag fractional_maximum{0x0062000E, "Maximum Fractional Value"};
 constexpr DicomTag segment_sequence{0x00620002, "Segment Sequence"};
 constexpr DicomTag segment_number{0x00620004, "Segment Number"};
 constexpr DicomTag segment_label{0x00620005, "Segment Label"};
@@ -94,17 +99,26 @@ SegmentFrame frame_of(const DicomElements& frame, const DicomElements& shared) {
   return segment_frame;
 }
 
-/// Refuses what is no BINARY segmentation of uncompressed bits.
-void check_kind(const DicomElements& elements) {
-  if (const auto type = elements.text(segmentation_type); type != "BINARY")
+bool is_fractional(const DicomElements& elements) {
+  const auto type = elements.text(segmentation_type);
+  if (type != "BINARY" && type != "FRACTIONAL")
     elements.refuse(
         Reason::unsupported, segmentation_type,
-        fmt::format("is {}, must be BINARY: export the segmentation as binary, or as a label map in "
-                    "NRRD or NIfTI",
+        fmt::format("is {}, must be BINARY or FRACTIONAL: export the segmentation as binary, or as a label "
+                    "map in NRRD or NIfTI",
                     xray::quote(type)));
-  if (const int bits = word_in(elements, xray::tags::bits_allocated, 1); bits != 1)
-    elements.refuse(Reason::unsupported, xray::tags::bits_allocated, fmt::format("is {}, must be 1", bits));
-  if (!elements.fragments.empty())
+  return type == "FRACTIONAL";
+}
+
+/// Refuses values that are no bits (BINARY) or bytes (FRACTIONAL), and other compression than RLE of bytes.
+void check_kind(const DicomElements& elements) {
+  const int needed = is_fractional(elements) ? 8 : 1;
+  if (const int bits = word_in(elements, xray::tags::bits_allocated, 1); bits != needed)
+    elements.refuse(Reason::unsupported, xray::tags::bits_allocated,
+                    fmt::format("is {}, must be {}", bits, needed));
+  const xray::TransferSyntax* syntax = xray::transfer_syntax(elements.transfer_syntax);
+  const bool is_rle = syntax != nullptr && syntax->coding == xray::Coding::rle;
+  if (!elements.fragments.empty() && !(is_rle && needed == 8))
     elements.refuse(Reason::unsupported, xray::tags::pixel_data,
                     "is compressed: decompress the file, for example with dcmconv or gdcmconv --raw");
   if (!elements.find(xray::tags::pixel_data))
@@ -189,22 +203,59 @@ Vector3d place_frames(std::vector<SegmentFrame>& frames, const std::string& orig
   return along;
 }
 
-/// Adds the bits of a frame, `first` among those of all. Bits are packed from the least significant one on.
-void add_frame(Volume& volume, const SegmentFrame& frame, std::string_view bits, std::size_t first,
-               const std::string& origin) {
-  const std::size_t area = std::size_t(volume.size.x()) * std::size_t(volume.size.y());
-  float* voxels = volume.voxels.data() + area * std::size_t(frame.slice);
-  const auto label = static_cast<float>(frame.segment);
-  for (std::size_t i = 0; i < area; ++i) {
-    const std::size_t bit = first + i;
-    if ((static_cast<unsigned char>(bits[bit / 8]) >> (bit % 8) & 1U) == 0) continue;
-    if (voxels[i] != 0 && voxels[i] != label)
-      throw BadInput(Reason::unsupported,
-                     fmt::format("{}: segments {} and {} overlap in slice {}: export them to one file each",
-                                 origin, voxels[i], frame.segment, frame.slice + 1));
-    voxels[i] = label;
+/// Which voxels of each frame belong to its segment.
+class Frames {
+ public:
+  /// `threshold`: of a FRACTIONAL segmentation.
+  Frames(const DicomElements& elements, std::size_t area, std::size_t count, std::optional<double> threshold)
+      : elements_(elements), area_(area), is_fractional_(is_fractional(elements)) {
+    if (is_fractional_) least_ = *threshold * word_in(elements, fractional_maximum, 1);
+    if (!elements.fragments.empty()) {
+      compressed_ = xray::fragments_of_frames(elements, int(count)).frames;
+      return;
+    }
+    values_ = elements.find(xray::tags::pixel_data)->value;
+    const std::size_t needed = is_fractional_ ? area * count : (area * count + 7) / 8;
+    if (values_.size() < needed)
+      elements.refuse(
+          Reason::truncated, xray::tags::pixel_data,
+          fmt::format("has {} bytes, {} frames of {} x {} {} need {}", values_.size(), count,
+                      word_in(elements, xray::tags::columns, 1), word_in(elements, xray::tags::rows, 1),
+                      is_fractional_ ? "bytes" : "bits", needed));
   }
-}
+
+  /// Calls `take(i)` for each such voxel of a frame.
+  template <class Take>
+  void for_each_inside(std::size_t frame, const Take& take) const {
+    const std::string unpacked = compressed_.empty() ? std::string() : decoded(frame);
+    const std::size_t first = compressed_.empty() ? frame * area_ : 0;
+    const std::string_view values = compressed_.empty() ? values_ : std::string_view(unpacked);
+    for (std::size_t i = 0; i < area_; ++i)
+      if (is_fractional_ ? static_cast<unsigned char>(values[first + i]) >= least_ : bit(values, first + i))
+        take(i);
+  }
+
+ private:
+  /// Bits are packed from the least significant one on.
+  static bool bit(std::string_view bits, std::size_t at) {
+    return (static_cast<unsigned char>(bits[at / 8]) >> (at % 8) & 1U) != 0;
+  }
+
+  std::string decoded(std::size_t frame) const {
+    std::string bytes;
+    for (std::size_t i = compressed_[frame].first; i < compressed_[frame].last; ++i)
+      bytes += elements_.fragments[i];
+    return value_or_throw(
+        xray::decode_rle(bytes, area_, 1, fmt::format("{}: frame {}", elements_.origin, frame + 1)));
+  }
+
+  const DicomElements& elements_;
+  std::size_t area_;
+  bool is_fractional_;
+  double least_ = 0;
+  std::string_view values_;
+  std::vector<xray::FrameFragments> compressed_;
+};
 
 /// Before the file is walked.
 bool may_be_segmentation(std::string_view bytes) {
@@ -217,6 +268,79 @@ bool is_segmentation_class(const DicomElements& elements) {
   return elements.text(xray::tags::sop_class) == segmentation_class;
 }
 
+/// Frames in the order of their slices, and an empty volume of these.
+struct Segmentation {
+  Volume volume;
+  std::vector<SegmentFrame> frames;
+  std::vector<std::size_t> stored_at;  ///< of each frame, in the file
+
+  std::size_t area() const { return std::size_t(volume.size.x()) * std::size_t(volume.size.y()); }
+  float* voxels_of(std::size_t frame) {
+    return volume.voxels.data() + area() * std::size_t(frames[frame].slice);
+  }
+};
+
+Segmentation segmentation_of(const DicomElements& elements) {
+  check_kind(elements);
+  const std::vector<SegmentFrame> frames = frames_of(elements);
+  Segmentation made;
+  made.stored_at.resize(frames.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) made.stored_at[i] = i;
+  const Vector3d normal = frames[0].normal();
+  std::ranges::stable_sort(made.stored_at, {}, [&](std::size_t i) { return frames[i].along(normal); });
+  for (const std::size_t i : made.stored_at) made.frames.push_back(frames[i]);
+  const Vector3d step = place_frames(made.frames, elements.origin);
+  const Vector3d size(word_in(elements, xray::tags::columns, 1), word_in(elements, xray::tags::rows, 1),
+                      made.frames.back().slice + 1);
+  made.volume.voxels.resize(value_or_throw(voxel_count(size, elements.origin)));
+  made.volume.size = size.cast<int>();
+  made.volume.patient_from_voxel.linear() << made.frames[0].axes, step;
+  made.volume.patient_from_voxel.translation() = made.frames[0].corner;
+  return made;
+}
+
+std::string list_of(const std::map<int, std::string>& segments) {
+  constexpr std::size_t most_named = 20;
+  std::string list;
+  std::size_t named = 0;
+  for (const auto& [number, label] : segments) {
+    if (named++ == most_named) return list + "; ...";
+    list += fmt::format("{} {} \"{}\"", list.empty() ? "" : ",", number, label);
+  }
+  return list;
+}
+
+/// The number of the segment that is meant.
+int chosen_segment(const std::map<int, std::string>& segments, const SegmentChoice& choice,
+                   const std::string& origin) {
+  const auto refuse = [&](const std::string& problem) {
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: {}; its segments:{}", origin, problem, list_of(segments)));
+  };
+  if (choice.number && !segments.contains(*choice.number))
+    refuse(fmt::format("has no segment {}", *choice.number));
+  if (choice.number) return *choice.number;
+  std::vector<int> found;
+  for (const auto& [number, label] : segments)
+    if (!choice.label || label == *choice.label) found.push_back(number);
+  if (found.size() == 1) return found.front();
+  if (choice.label)
+    refuse(fmt::format("{} labelled \"{}\"", found.empty() ? "has no segment" : "has several segments",
+                       *choice.label));
+  refuse("has several segments, choose one by \"mask_label\" or \"mask_segment\"");
+  return 0;
+}
+
+void check_threshold(const DicomElements& elements, const SegmentChoice& choice) {
+  if (is_fractional(elements) == choice.threshold.has_value()) return;
+  elements.refuse(Reason::bad_value, segmentation_type,
+                  choice.threshold
+                      ? std::string("is BINARY: it takes no \"mask_threshold\"")
+                      : fmt::format("is FRACTIONAL ({}): state by \"mask_threshold\" from which share on a "
+                                    "voxel belongs to the body, such as 0.5",
+                                    without_control_characters(std::string(elements.text(fractional_type)))));
+}
+
 }  // namespace
 
 std::optional<Volume> read_segmentation(const std::filesystem::path& path, std::string_view bytes) {
@@ -224,31 +348,44 @@ std::optional<Volume> read_segmentation(const std::filesystem::path& path, std::
   const std::string origin = path.string();
   const DicomElements elements = value_or_throw(xray::walk_dicom(bytes, origin));
   if (!is_segmentation_class(elements)) return std::nullopt;
-  check_kind(elements);
-  std::vector<SegmentFrame> frames = frames_of(elements);
-  std::vector<std::size_t> order(frames.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  const Vector3d normal = frames[0].normal();
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return frames[i].along(normal); });
-  std::vector<SegmentFrame> sorted;
-  for (const std::size_t i : order) sorted.push_back(frames[i]);
+  if (is_fractional(elements))
+    elements.refuse(Reason::unsupported, segmentation_type,
+                    "is FRACTIONAL, which is read as a model's mask, with \"mask_threshold\"");
+  Segmentation made = segmentation_of(elements);
+  const Frames values(elements, made.area(), made.frames.size(), {});
+  for (std::size_t f = 0; f < made.frames.size(); ++f) {
+    float* voxels = made.voxels_of(f);
+    const SegmentFrame& frame = made.frames[f];
+    values.for_each_inside(made.stored_at[f], [&](std::size_t i) {
+      if (voxels[i] != 0 && voxels[i] != float(frame.segment))
+        throw BadInput(Reason::unsupported,
+                       fmt::format("{}: segments {} and {} overlap in slice {}: choose one by "
+                                   "\"mask_label\", or export them to one file each",
+                                   origin, voxels[i], frame.segment, frame.slice + 1));
+      voxels[i] = float(frame.segment);
+    });
+  }
+  return std::move(made.volume);
+}
 
-  Volume volume;
-  const Vector3d step = place_frames(sorted, origin);
-  const Vector3d size(word_in(elements, xray::tags::columns, 1), word_in(elements, xray::tags::rows, 1),
-                      sorted.back().slice + 1);
-  volume.voxels.resize(value_or_throw(voxel_count(size, origin)));
-  volume.size = size.cast<int>();
-  volume.patient_from_voxel.linear() << sorted[0].axes, step;
-  volume.patient_from_voxel.translation() = sorted[0].corner;
-  const auto area = std::size_t(size.x() * size.y());
-  const std::string_view bits = elements.find(xray::tags::pixel_data)->value;
-  if (bits.size() < (area * frames.size() + 7) / 8)
-    elements.refuse(Reason::truncated, xray::tags::pixel_data,
-                    fmt::format("has {} bytes, {} frames of {} x {} bits need {}", bits.size(), frames.size(),
-                                size.x(), size.y(), (area * frames.size() + 7) / 8));
-  for (std::size_t i = 0; i < order.size(); ++i) add_frame(volume, sorted[i], bits, order[i] * area, origin);
-  return volume;
+Expected<std::optional<Volume>> read_segment(const std::filesystem::path& path, const SegmentChoice& choice) {
+  return guarded([&]() -> std::optional<Volume> {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
+    const std::string bytes = read_volume_file(path);
+    if (!may_be_segmentation(bytes)) return std::nullopt;
+    const DicomElements elements = value_or_throw(xray::walk_dicom(bytes, path.string()));
+    if (!is_segmentation_class(elements)) return std::nullopt;
+    const int segment = chosen_segment(segments_of(elements), choice, elements.origin);
+    check_threshold(elements, choice);
+    Segmentation made = segmentation_of(elements);
+    const Frames values(elements, made.area(), made.frames.size(), choice.threshold);
+    for (std::size_t f = 0; f < made.frames.size(); ++f)
+      if (made.frames[f].segment == segment)
+        values.for_each_inside(made.stored_at[f],
+                               [voxels = made.voxels_of(f)](std::size_t i) { voxels[i] = 1; });
+    return std::move(made.volume);
+  });
 }
 
 Expected<std::optional<std::map<int, std::string>>> segments_in(const std::filesystem::path& path) {

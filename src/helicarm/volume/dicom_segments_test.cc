@@ -123,9 +123,76 @@ TEST_F(Segments, GapsAreEmptySlicesWhereTheSpacingIsStated) {
   EXPECT_EQ(thick->patient_from_voxel.linear().col(2), Vector3d(0, 0, 3));
 }
 
+/// Shares in hundredths in slices of 3 x 3 voxels: the first segment in both slices, the second in the first
+/// one, where they have a voxel in common.
+DicomBuilder shares() {
+  auto builder = two_segments();
+  builder.text(0x00620001, "CS", "FRACTIONAL").text(0x00620010, "CS", "PROBABILITY");
+  builder.word(0x0062000E, 100).word(0x00280100, 8).word(0x00280101, 8).word(0x00280102, 7);
+  builder.raw(0x52009230, "SQ",
+              items_of({frame(1, "-3\\4\\10"), frame(2, "-3\\4\\10"), frame(1, "-3\\4\\12")}));
+  std::string values(28, '\0');
+  values[0] = 100, values[1] = 50, values[2] = 49, values[9] = 100, values[18] = 10;
+  return builder.raw(0x7FE00010, "OB", values);
+}
+
+TEST_F(Segments, AFractionalOneIsCutAtTheStatedShare) {
+  put("seg.dcm", shares().bytes());
+  const auto of = [&](double threshold) { return **read_segment(folder_ / "seg.dcm", {1, {}, threshold}); };
+  EXPECT_THAT(of(0.5).voxels, ElementsAre(1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0));
+  EXPECT_THAT(of(0.1).voxels, ElementsAre(1, 1, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0));
+  EXPECT_THAT(read_segment(folder_ / "seg.dcm", {1, {}, {}}).error().message,
+              HasSubstr("is FRACTIONAL (PROBABILITY): state by \"mask_threshold\""));
+  put("bits.dcm", two_segments().bytes());
+  EXPECT_THAT(read_segment(folder_ / "bits.dcm", {1, {}, 0.5}).error().message,
+              HasSubstr("is BINARY: it takes no \"mask_threshold\""));
+}
+
+TEST_F(Segments, OneOfThemIsReadWhereTheyOverlap) {
+  put("seg.dcm", shares().bytes());
+  const auto second = read_segment(folder_ / "seg.dcm", {{}, "Tibia", 0.5});
+  ASSERT_TRUE(second) << second.error().message;
+  EXPECT_THAT((*second)->voxels, ElementsAre(1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0));
+}
+
+TEST_F(Segments, AChoiceThatFitsNoneOrSeveralListsThem) {
+  put("seg.dcm", two_segments().bytes());
+  const auto refusal = [&](const SegmentChoice& choice) {
+    return read_segment(folder_ / "seg.dcm", choice).error().message;
+  };
+  const std::string list = "; its segments: 1 \"Femur\", 2 \"Tibia\"";
+  EXPECT_THAT(refusal({}), HasSubstr(list));
+  EXPECT_THAT(refusal({3, {}, {}}), HasSubstr("has no segment 3" + list));
+  EXPECT_THAT(refusal({{}, "Patella", {}}), HasSubstr("no segment labelled \"Patella\"" + list));
+  auto alike = two_segments();
+  alike.raw(0x00620002, "SQ", items_of({segment(1, "Bone"), segment(2, "Bone")}));
+  put("seg.dcm", alike.bytes());
+  EXPECT_THAT(refusal({{}, "Bone", {}}), HasSubstr("several segments labelled \"Bone\""));
+}
+
+TEST_F(Segments, SharesInRleAreDecoded) {
+  // A header of 64 bytes, a literal run, and a repetition of 0.
+  const auto rle = [](std::initializer_list<int> literal) {
+    std::string frame = DicomBuilder::number(1, 4) + DicomBuilder::number(64, 4) + std::string(56, '\0');
+    frame += char(literal.size() - 1);
+    for (const int value : literal) frame += char(value);
+    frame += char(1 - (9 - int(literal.size())));
+    frame += '\0';
+    return frame;
+  };
+  auto packed = shares();
+  packed.syntax("1.2.840.10008.1.2.5").fragments({rle({100, 50, 49}), rle({100}), rle({10})});
+  put("seg.dcm", packed.bytes());
+  const auto first = read_segment(folder_ / "seg.dcm", {1, {}, 0.5});
+  ASSERT_TRUE(first) << first.error().message;
+  EXPECT_THAT((*first)->voxels, ElementsAre(1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0));
+}
+
 TEST_F(Segments, WhatIsNotReadIsNamed) {
   expect_refused(two_segments().text(0x00620001, "CS", "FRACTIONAL"), Reason::unsupported,
-                 "Segmentation Type (0062,0001) is \"FRACTIONAL\", must be BINARY");
+                 "is FRACTIONAL, which is read as a model's mask");
+  expect_refused(two_segments().text(0x00620001, "CS", "LABELMAP"), Reason::unsupported,
+                 "is \"LABELMAP\", must be BINARY or FRACTIONAL");
   expect_refused(two_segments().word(0x00280100, 8), Reason::unsupported,
                  "Bits Allocated (0028,0100) is 8, must be 1");
   expect_refused(two_segments().syntax("1.2.840.10008.1.2.5").fragments({"ab"}), Reason::unsupported,

@@ -24,6 +24,19 @@ Expected<std::optional<std::filesystem::path>> other_of_pair(const std::filesyst
 /// Numbers and labels of the segments of a DICOM segmentation; nothing for another file or a folder.
 Expected<std::optional<std::map<int, std::string>>> segments_in(const std::filesystem::path& path);
 
+/// Which segment of a DICOM segmentation is meant.
+struct SegmentChoice {
+  std::optional<int> number = {};
+  std::optional<std::string> label = {};
+  std::optional<double> threshold = {};  ///< share from which a voxel of a FRACTIONAL one belongs to it
+};
+
+/// The mask of one segment (1 inside, 0 elsewhere; slices without a segment may be missing), also where it
+/// overlaps others; nothing for another file or a folder. BINARY or FRACTIONAL, uncompressed, deflated, or
+/// FRACTIONAL in RLE. Refuses (bad_value) a choice that fits no or several segments, none of several, and a
+/// threshold that is missing or not needed; the segments are listed. Fails as `read_volume`.
+Expected<std::optional<Volume>> read_segment(const std::filesystem::path& path, const SegmentChoice& choice);
+
 /// Whether a file is named as the voxels of a NIfTI pair (.img, .img.gz).
 bool is_named_as_voxels(const std::filesystem::path& path);
 
