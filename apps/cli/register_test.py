@@ -52,6 +52,41 @@ class Register(SimulatedCase):
         self.assertEqual(json.loads((self.root / "run-models/result.json").read_text()), result)
         self.assertEqual(json.loads((self.root / "run-models/registration.json").read_text())["status"], "ok")
 
+    def test_measures_of_a_model_are_those_of_measure(self):
+        folder, case = self.case_with_landmarks("measures")
+        located = case["picks"][0]["name"]
+        rows = ["axis_medial,-135,0,50", "axis_lateral,-65,0,50", "anterior,-100,20,50", "posterior,-100,-25,50", "planned_start,,,",
+                f"{located},,,"]
+        (folder / "m.csv").write_text("measure,kind,model,name,x_mm,y_mm,z_mm\n" + "".join(f"t,tibia_ap,body,{row}\n" for row in rows))
+        case["models"][0] |= {"plan": "plan.mrk.json", "measures": "m.csv"}
+        (folder / "case.json").write_text(json.dumps(case))
+        out = self.root / "measured"
+        self.assertEqual(run("run", folder, "--out", out, "--no-report").returncode, 0)
+        (of_run,) = json.loads((out / "registration.json").read_text())["models"][0]["measures"]
+        done = run("measure", "--landmarks", folder / "m.csv", "--registration", out / "registration.json",
+                   "--calibration", out / "result.json", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        (alone,) = json.loads(done.stdout)["measures"]
+        self.assertEqual([p["point"] for p in of_run["positions"]], ["planned_start", located])
+        for one, other in zip(of_run["positions"], alone["positions"]):
+            self.assertAlmostEqual(one["percent"]["from_anterior"], other["percent"]["from_anterior"], delta=1e-6)
+            self.assertEqual([zone["name"] for zone in one["zones"]], [zone["name"] for zone in other["zones"]])
+        self.assertEqual([each["message"] for each in of_run["laterals"]], [each["message"] for each in alone["laterals"]])
+        done = run("register", folder, "--out", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(f"{located}: not located", done.stdout)
+        (of_register,) = json.loads((out / "registration.json").read_text())["models"][0]["measures"]
+        self.assertEqual(of_register["missing"], [located])
+        self.assertIn("Quadrants and per cent", (out / "report.html").read_text())
+
+    def test_a_dicom_registration_needs_a_dicom_ct(self):
+        folder, case = self.case_with_landmarks("no-dicom")
+        (folder / "case.json").write_text(json.dumps(case))
+        done = run("register", folder, "--out", self.root / "no-dicom-out", "--dicom")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("Frame of Reference UID", done.stderr)
+        self.assertEqual(run("register", folder, "--frames", "1-2", "--dicom").returncode, 2)
+
     def test_run_export_and_register_take_the_same_options(self):
         folder, case = self.case_with_landmarks("options")
         case["models"][0]["plan"] = "plan.mrk.json"

@@ -3,6 +3,7 @@
 #include <variant>
 
 #include "arrays.h"
+#include "helicarm/case_registration/dicom_registrations.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -19,21 +20,27 @@ namespace {
 using registration::Registration;
 
 py::object register_models(const std::filesystem::path& folder,
-                           const std::optional<std::filesystem::path>& out, const std::string& method,
-                           std::optional<double> max_error_mm, double motion_sigma_mm, double search_mm,
-                           double search_deg, unsigned threads,
+                           const std::optional<std::filesystem::path>& out, bool dicom,
+                           const std::string& method, std::optional<double> max_error_mm,
+                           double motion_sigma_mm, double search_mm, double search_deg, unsigned threads,
                            const std::optional<std::filesystem::path>& history, const py::object& cache,
                            const py::object& progress) {
+  if (dicom && !out) raise({Reason::usage, "register: dicom=True requires out", {}, {}});
   const auto options = measuring_options("register", method, max_error_mm, motion_sigma_mm, search_mm,
                                          search_deg, threads, history, cache);
   const RunHooks hooks = run_hooks(progress);
   const auto result = value_or_raise(without_gil([&] {
+    pipeline::Case the_case;
     return pipeline::read_case(folder, pipeline::Purpose::registration)
-        .and_then([&](const pipeline::Case& given) {
-          return case_registration::register_case(given, options, progress_of(hooks));
+        .and_then([&](pipeline::Case given) {
+          the_case = std::move(given);
+          return case_registration::register_case(the_case, options, progress_of(hooks));
         })
         .and_then([&](case_registration::CaseRegistration made) {
-          const auto written = out ? case_registration::write_registration(made, *out) : Expected<void>{};
+          auto written = out ? case_registration::write_registration(made, *out) : Expected<void>{};
+          if (written && dicom)
+            written =
+                case_registration::write_dicom_registrations(the_case, made, *out).map([](const auto&) {});
           return written.map([&] { return std::move(made); });
         });
   }));
@@ -184,8 +191,8 @@ void add_registration(py::module_& module) {
   const case_registration::RegisterOptions defaults;
   module.def(
       "register", &register_models, py::arg("folder"), py::kw_only(), py::arg("out") = py::none(),
-      py::arg("method") = std::string(word(defaults.run.method)), py::arg("max_error_mm") = py::none(),
-      py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
+      py::arg("dicom") = false, py::arg("method") = std::string(word(defaults.run.method)),
+      py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = defaults.run.motion_sigma_mm,
       py::arg("search_mm") = defaults.search.shift_mm, py::arg("search_deg") = defaults.search.turn_deg,
       py::arg("threads") = defaults.run.threads, py::arg("history") = py::none(), py::arg("cache") = true,
       py::arg("progress") = py::none(),
@@ -195,7 +202,10 @@ void add_registration(py::module_& module) {
       "(6 x 6: rotation vector, rad, then translation, mm, world axes, about centre_mm), decision, "
       "warnings,\n"
       "points and tunnels of its plan. World: the calibrator's frame, or that of the views' cameras.\n\n"
-      "out: folder for registration.json, report.html and overlays, or None. method, motion_sigma_mm,\n"
+      "out: folder for registration.json, report.html and overlays, or None. dicom: also\n"
+      "MODEL_registration.dcm, a DICOM Spatial Registration with the patient and study of the CT (a folder "
+      "of a\n"
+      "DICOM series). method, motion_sigma_mm,\n"
       "history: as run_case, the history is only read. max_error_mm: refuse where a point of the model or "
       "its\n"
       "plan may be off by more (95 %). search_mm, search_deg: searched about each start, per axis. threads: "

@@ -115,7 +115,7 @@ def _cameras_of(views, covariance):
 def register(folder=None, *, models=None, views=None, starts=None, camera_covariance=None, usable=None, **options):
     """Registers CT volumes and surfaces to X-ray images: of a case, or of arrays.
 
-    register(folder, *, out=None, method="best", max_error_mm=None, motion_sigma_mm=0, search_mm, search_deg, threads=0,
+    register(folder, *, out=None, dicom=False, method="best", max_error_mm=None, motion_sigma_mm=0, search_mm, search_deg, threads=0,
     history=None, cache=True, progress=None): the models of a case, as `helicarm register` does.
 
     register(models={name: model}, views={name: (image, camera)}, starts={name: world_from_model}, ...): in memory.

@@ -18,19 +18,29 @@ void add_overlays(const Json& views, std::vector<std::string>& files) {
       files.push_back(overlay_name(view["name"].get<std::string>(), i));
 }
 
-/// Overlays that a result.json or registration.json belongs to.
+/// Overlays and DICOM registrations that a result.json or registration.json belongs to.
 std::vector<std::string> overlays_of(const fs::path& json_file) {
   std::vector<std::string> files;
   const auto json = read_json(json_file);
   if (!json || !json->is_object()) return files;
   if (json->contains("views")) add_overlays((*json)["views"], files);
-  if (json->contains("models") && (*json)["models"].is_array())
-    for (const Json& model : (*json)["models"])
+  if (json->contains("models") && (*json)["models"].is_array()) {
+    const Json& models = (*json)["models"];
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      const Json& model = models[i];
       if (model.is_object() && model.contains("views")) add_overlays(model["views"], files);
+      if (model.is_object() && model.value("name", Json()).is_string())
+        files.push_back(dicom_registration_name(model["name"].get<std::string>(), i));
+    }
+  }
   return files;
 }
 
 }  // namespace
+
+std::string dicom_registration_name(const std::string& model, std::size_t index) {
+  return file_stem(model, index) + "_registration.dcm";
+}
 
 void forget_registration(const fs::path& folder) {
   std::error_code ignored;

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/dicom_registrations.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/temporary_folder.h"
+#include "helicarm/xray/dicom_builder.h"
+#include "helicarm/xray/dicom_tags.h"
+
+namespace helicarm::case_registration {
+namespace dicom_registrations_test {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// A femur in a DICOM series, a tibia in another file.
+struct Knee {
+  TemporaryFolder folder;
+  pipeline::Case the_case;
+  CaseRegistration result;
+
+  Knee() {
+    xray::DicomBuilder slice;
+    slice.text(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.2").text(0x00080018, "UI", "1.2.3.4");
+    slice.text(0x00200052, "UI", "1.2.3.6");
+    EXPECT_TRUE(write_file(folder.path() / "ct" / "1.dcm", slice.bytes()));
+    for (const char* name : {"femur", "tibia"}) {
+      the_case.models.emplace_back().name = name;
+      result.models.emplace_back().registration.name = name;
+    }
+    the_case.models[0].volume = folder.path() / "ct";
+    the_case.models[1].volume = folder.path() / "ct.nrrd";
+    result.models[0].registration.world_from_model.translation = {1, 2, 3};
+  }
+};
+
+TEST(DicomRegistrations, AreOfTheModelsInADicomSeries) {
+  const Knee knee;
+  const auto files = write_dicom_registrations(knee.the_case, knee.result, knee.folder.path());
+  ASSERT_TRUE(files) << files.error().message;
+  EXPECT_THAT(*files, ElementsAre(knee.folder.path() / "femur_registration.dcm"));
+  const std::string bytes = *read_file(files->front(), 1 << 20);
+  EXPECT_THAT(bytes, HasSubstr("1\\0\\0\\1\\0\\1\\0\\2\\0\\0\\1\\3\\0\\0\\0\\1"));
+}
+
+TEST(DicomRegistrations, ARefusedModelHasNone) {
+  Knee knee;
+  knee.result.models[0].registration.failure = Failure{Reason::wrong_model, "", "", {}};
+  EXPECT_TRUE(write_dicom_registrations(knee.the_case, knee.result, knee.folder.path())->empty());
+}
+
+TEST(DicomRegistrations, WithoutASeriesTheyAreRefused) {
+  Knee knee;
+  knee.the_case.models[0].volume = knee.folder.path();
+  EXPECT_THAT(write_dicom_registrations(knee.the_case, knee.result, knee.folder.path()).error().message,
+              HasSubstr("Frame of Reference UID (0020,0052)"));
+}
+
+}  // namespace dicom_registrations_test
+}  // namespace helicarm::case_registration

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/xray/spatial_registration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <vector>
+
+#include <Eigen/LU>
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dctk.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/private_files.h"
+#include "helicarm/xray/dicom_check.h"
+#include "helicarm/xray/dicom_tags.h"
+#include "helicarm/xray/dicom_time.h"
+#include "helicarm/xray/uid.h"
+
+namespace helicarm::xray {
+namespace {
+
+constexpr std::uintmax_t most_ct_slice_bytes = std::uintmax_t{64} << 20;
+
+std::optional<CtFrame> ct_frame_in(const std::filesystem::path& file) {
+  const auto bytes = read_file(file, most_ct_slice_bytes);
+  if (!bytes || !looks_like_dicom(*bytes)) return std::nullopt;
+  const auto elements = walk_dicom(*bytes, file.string());
+  if (!elements || elements->text(tags::sop_class) != ct_class) return std::nullopt;
+  CtFrame frame{std::string(elements->text(tags::frame_of_reference)), {}};
+  if (frame.frame_of_reference_uid.empty()) return std::nullopt;
+  for (const DicomTag tag : tags::patient_study)
+    if (const std::string_view value = elements->text(tag); !value.empty())
+      frame.patient_study.elements.emplace(tag.number, value);
+  frame.patient_study.sop_class_uid = elements->text(tags::sop_class);
+  frame.patient_study.sop_instance_uid = elements->text(tags::sop_instance);
+  return frame;
+}
+
+void put_in(DcmItem& item, const DcmTagKey& tag, const std::string& value) {
+  if (item.putAndInsertString(tag, value.c_str()).bad())
+    throw BadInput(Reason::cannot_write, fmt::format("DICOM: {} cannot be stored", tag.toString().c_str()));
+}
+
+DcmItem& item_in(DcmItem& item, const DcmTagKey& sequence, signed long at = 0) {
+  DcmItem* made = nullptr;
+  if (item.findOrCreateSequenceItem(sequence, made, at).bad())
+    throw BadInput(Reason::cannot_write, "DICOM: a sequence cannot be stored");
+  return *made;
+}
+
+/// A DS has at most sixteen characters.
+std::string decimals_of(const std::array<double, 16>& matrix) {
+  return fmt::format("{:.9g}", fmt::join(matrix, "\\"));
+}
+
+void put_frame(DcmDataset& dataset, int at, const std::string& frame_uid,
+               const std::array<double, 16>& matrix) {
+  DcmItem& registered = item_in(dataset, DCM_RegistrationSequence, at);
+  put_in(registered, DCM_FrameOfReferenceUID, frame_uid);
+  DcmItem& step = item_in(registered, DCM_MatrixRegistrationSequence);
+  step.insertEmptyElement(DCM_RegistrationTypeCodeSequence);
+  DcmItem& transform = item_in(step, DCM_MatrixSequence);
+  put_in(transform, DCM_FrameOfReferenceTransformationMatrixType, "RIGID");
+  put_in(transform, DCM_FrameOfReferenceTransformationMatrix, decimals_of(matrix));
+}
+
+void check_rigid(const SpatialRegistration& registration) {
+  const Eigen::Matrix4d matrix =
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(registration.frame_from_ct.data());
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+  const bool is_rigid = matrix.allFinite() && matrix.row(3) == Eigen::RowVector4d(0, 0, 0, 1) &&
+                        (rotation * rotation.transpose()).isIdentity(1e-6) && rotation.determinant() > 0;
+  if (!is_rigid) throw BadInput(Reason::bad_value, "frame_from_ct: is not a rigid matrix");
+}
+
+void put_registration(DcmDataset& dataset, const SpatialRegistration& registration) {
+  const std::string content = text_key(fmt::format(
+      "{} {} {} {}", registration.ct.patient_study.sop_instance_uid, registration.frame_of_reference_uid,
+      decimals_of(registration.frame_from_ct), registration.description));
+  const std::string now = dicom_date_time(double(std::time(nullptr)));
+  put_in(dataset, DCM_SpecificCharacterSet, "ISO_IR 192");
+  put_in(dataset, DCM_SOPClassUID, UID_SpatialRegistrationStorage);
+  put_in(dataset, DCM_SOPInstanceUID, uid_of(content));
+  put_in(dataset, DCM_SeriesInstanceUID, uid_of(text_key(content + " series")));
+  put_in(dataset, DCM_Modality, "REG");
+  put_in(dataset, DCM_SeriesNumber, "1");
+  put_in(dataset, DCM_InstanceNumber, "1");
+  put_in(dataset, DCM_Manufacturer, "helicarm");
+  put_in(dataset, DCM_SoftwareVersions, HELICARM_VERSION);
+  put_in(dataset, DCM_SeriesDescription, registration.description);
+  put_in(dataset, DCM_ContentDate, now.substr(0, 8));
+  put_in(dataset, DCM_ContentTime, now.substr(8, 6));
+  put_in(dataset, DCM_ContentLabel, "REGISTRATION");
+  put_in(dataset, DCM_ContentDescription, registration.description);
+  put_in(dataset, DCM_FrameOfReferenceUID, registration.frame_of_reference_uid);
+  for (const auto& [number, value] : registration.ct.patient_study.elements)
+    put_in(dataset, {static_cast<Uint16>(number >> 16), static_cast<Uint16>(number & 0xFFFF)}, value);
+  for (const DcmTagKey& tag :
+       {DCM_PatientName, DCM_PatientID, DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyDate, DCM_StudyTime,
+        DCM_StudyID, DCM_AccessionNumber, DCM_ReferringPhysicianName, DCM_ContentCreatorName,
+        DCM_PositionReferenceIndicator, DCM_Laterality})
+    if (!dataset.tagExists(tag)) dataset.insertEmptyElement(tag);
+  if (!dataset.tagExists(DCM_StudyInstanceUID))
+    put_in(dataset, DCM_StudyInstanceUID, uid_of(text_key(content + " study")));
+  put_frame(dataset, 0, registration.ct.frame_of_reference_uid, registration.frame_from_ct);
+  put_frame(dataset, 1, registration.frame_of_reference_uid,
+            {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
+}
+
+}  // namespace
+
+Expected<std::optional<CtFrame>> ct_frame_of(const std::filesystem::path& folder) {
+  return guarded([&]() -> std::optional<CtFrame> {
+    std::error_code error;
+    if (!std::filesystem::is_directory(folder, error)) return std::nullopt;
+    std::vector<std::filesystem::path> files;
+    for (const auto& entry : std::filesystem::directory_iterator(folder))
+      if (entry.is_regular_file()) files.push_back(entry.path());
+    std::ranges::sort(files);
+    for (const auto& file : files)
+      if (auto frame = ct_frame_in(file)) return frame;
+    return std::nullopt;
+  });
+}
+
+Expected<void> write_spatial_registration(const std::filesystem::path& path,
+                                          const SpatialRegistration& registration) {
+  return guarded([&] {
+    check_rigid(registration);
+    DcmFileFormat file;
+    put_registration(*file.getDataset(), registration);
+    value_or_throw(write_file_with(path, [&](const std::filesystem::path& aside) -> Expected<void> {
+      if (auto created = make_private_file(aside); !created) return created;
+      const OFCondition status = file.saveFile(aside.c_str(), EXS_LittleEndianExplicit);
+      if (status.good()) return {};
+      return fail(Reason::cannot_write,
+                  fmt::format("{}: cannot be written: {}", path.string(), status.text()));
+    }));
+  });
+}
+
+}  // namespace helicarm::xray
