@@ -14,10 +14,10 @@ namespace {
 
 /// The same for the same cameras.
 std::string frame_uid_of(const CaseRegistration& result) {
-  std::string cameras;
+  std::string cameras = "frame of cameras";
   for (const registration::RegistrationView& view : result.loaded.views) {
     const Eigen::Matrix<double, 3, 4> projection = view.view.projection();
-    for (const double value : projection.reshaped()) cameras += fmt::format("{:.9g} ", value);
+    for (const double value : projection.reshaped()) cameras += fmt::format(" {:.9g}", value);
   }
   return xray::uid_of(xray::text_key(cameras));
 }
