@@ -120,7 +120,8 @@ function(helicarm_module name)
       set_target_properties(${name}_test PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
     endif()
     # GCC 12 sees string literals overrun where std::string moves them (GCC bug 105329).
-    target_compile_options(${name}_test PRIVATE -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow)
+    target_compile_options(${name}_test PRIVATE
+                           "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-restrict;-Wno-stringop-overflow>")
     list(TRANSFORM ARG_TESTS_TOGETHER APPEND ".*" OUTPUT_VARIABLE together)
     list(JOIN together ":" together)
     gtest_discover_tests(${name}_test TEST_PREFIX ${name}. TEST_FILTER "-${together}" DISCOVERY_TIMEOUT 60)

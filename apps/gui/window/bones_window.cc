@@ -147,7 +147,7 @@ void BonesWindow::run(const QString& doing, std::function<std::function<void()>(
   });
 }
 
-void BonesWindow::open(const fs::path& file, std::vector<CtTunnel> tunnels) {
+void BonesWindow::open_ct(const fs::path& file, std::vector<CtTunnel> tunnels) {
   file_ = file;
   setWindowTitle(tr("CT: %1").arg(text(file.filename().string())));
   run(tr("%1 is read.").arg(text(file.string())), [this, file, tunnels = std::move(tunnels)] {

@@ -144,13 +144,13 @@ void MainWindow::open_sequence(const fs::path& folder) {
   auto* sequence = findChild<SequenceWindow*>("sequence");
   if (sequence == nullptr || sequence->is_busy()) sequence = new SequenceWindow(this);
   show_beside(sequence);
-  sequence->open(folder, all_frames(folder));
+  sequence->open_case(folder, all_frames(folder));
 }
 
 void MainWindow::open_ct(const fs::path& file, std::vector<CtTunnel> tunnels) {
   auto* bones = new BonesWindow(this);
   show_beside(bones);
-  bones->open(file, std::move(tunnels));
+  bones->open_ct(file, std::move(tunnels));
 }
 
 void MainWindow::open_ct_of(std::size_t model) {

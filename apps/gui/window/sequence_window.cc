@@ -87,7 +87,7 @@ QString all_frames(const fs::path& folder) {
 
 SequenceWindow::~SequenceWindow() { *stopped_ = true; }
 
-void SequenceWindow::open(const fs::path& folder, const QString& frames) {
+void SequenceWindow::open_case(const fs::path& folder, const QString& frames) {
   folder_ = folder;
   frames_->setText(frames);
   setWindowTitle(tr("Sequence: %1").arg(text(folder.string())));

@@ -58,7 +58,7 @@ class SequenceWindow : public QDialog {
   ~SequenceWindow() override;
 
   /// A case whose case.json has "markers". `frames` as A-B or A-B:STEP.
-  void open(const std::filesystem::path& folder, const QString& frames);
+  void open_case(const std::filesystem::path& folder, const QString& frames);
   bool is_busy() const { return busy_ || reading_; }
   const std::shared_ptr<const FollowedSequence>& shown() const { return shown_; }
   /// Of the shown frames, from 0.
