@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <span>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -50,6 +51,23 @@ std::string slices_html(const RegisteredModel& model) {
   return html;
 }
 
+/// The measures in the bone, in the words of the program.
+std::string measures_html(const RegisteredModel& model) {
+  std::string html = "<h3>Quadrants and per cent</h3>\n";
+  for (const measures::InBone& measure : model.measures) {
+    const std::vector<measures::Line> lines = measures::lines_of(measure);
+    html += fmt::format("<p>{}</p>\n<ul>\n", report::escaped(lines.front().text));
+    for (const measures::Line& line : std::span(lines).subspan(1))
+      html += fmt::format("<li class=\"{}\">{}</li>\n",
+                          line.is_warning  ? "bad"
+                          : line.depth > 1 ? "soft"
+                                           : "",
+                          report::escaped(line.text));
+    html += "</ul>\n";
+  }
+  return html;
+}
+
 std::string model_section(const RegisteredModel& model) {
   const Registration& r = model.registration;
   std::string html =
@@ -76,7 +94,7 @@ std::string model_section(const RegisteredModel& model) {
     html += fmt::format("<p>Landmarks: FRE {:.2f} mm, FLE {:.2f} mm (rms).</p>\n", model.landmarks->fre_mm,
                         model.landmarks->fle_mm);
   if (!model.points.empty()) html += html_of(points_table({model}));
-  if (!model.measures.empty()) html += html_of(report::without_empty_columns(measures_table({model})));
+  if (!model.measures.empty()) html += measures_html(model);
   const report::Table in_bone = report::without_empty_columns(tunnels_in_bone_table({model}));
   return in_bone.rows.empty() ? html : html + html_of(in_bone) + slices_html(model);
 }

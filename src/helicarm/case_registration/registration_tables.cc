@@ -150,7 +150,7 @@ void add_rows(const measures::InBone& of, std::vector<MeasureRow>& rows) {
   for (const measures::InImage& image : of.clicked)
     for (const measures::Position& position : image.positions)
       rows.push_back({measure, position.point, image.view + ", clicked", without_point(kind, position), ""});
-  for (const std::string& name : of.missing) rows.push_back({measure, name, "", "not located", "", true});
+  for (const std::string& name : of.missing) rows.push_back({measure, name, "", "", "not located", true});
 }
 
 }  // namespace
