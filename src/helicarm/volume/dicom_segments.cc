@@ -280,7 +280,7 @@ struct Segmentation {
   }
 };
 
-Segmentation segmentation_of(const DicomElements& elements) {
+Segmentation whole_segmentation(const DicomElements& elements) {
   check_kind(elements);
   const std::vector<SegmentFrame> frames = frames_of(elements);
   Segmentation made;
@@ -351,7 +351,7 @@ std::optional<Volume> read_segmentation(const std::filesystem::path& path, std::
   if (is_fractional(elements))
     elements.refuse(Reason::unsupported, segmentation_type,
                     "is FRACTIONAL, which is read as a model's mask, with \"mask_threshold\"");
-  Segmentation made = segmentation_of(elements);
+  Segmentation made = whole_segmentation(elements);
   const Frames values(elements, made.area(), made.frames.size(), {});
   for (std::size_t f = 0; f < made.frames.size(); ++f) {
     float* voxels = made.voxels_of(f);
@@ -378,7 +378,7 @@ Expected<std::optional<Volume>> read_segment(const std::filesystem::path& path, 
     if (!is_segmentation_class(elements)) return std::nullopt;
     const int segment = chosen_segment(segments_of(elements), choice, elements.origin);
     check_threshold(elements, choice);
-    Segmentation made = segmentation_of(elements);
+    Segmentation made = whole_segmentation(elements);
     const Frames values(elements, made.area(), made.frames.size(), choice.threshold);
     for (std::size_t f = 0; f < made.frames.size(); ++f)
       if (made.frames[f].segment == segment)
