@@ -8,7 +8,7 @@
 
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/core/failure.h"
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/candidates.h"
 #include "helicarm/fiducials/label_fiducials.h"
@@ -132,8 +132,7 @@ void calibrate_views(benchmark::State& state) {
       fiducial.centre_in_calibrator = ball.centre_in_calibrator;
       fiducial.status = fiducials::FiducialStatus::used;
       fiducial.sigma_px = 0.05;
-      fiducial.uv =
-          view.project(ball.centre_in_calibrator) + 0.05 * Eigen::Vector2d(random.normal(), random.normal());
+      fiducial.uv = view.project(ball.centre_in_calibrator) + 0.05 * normal_2(random);
     }
   }
   for (auto _ : state) benchmark::DoNotOptimize(calibration::calibrate(views, options));

@@ -8,7 +8,7 @@
 #include <Eigen/SparseCore>
 #include <opencv2/imgproc.hpp>
 
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/image/opencv.h"
 
 namespace helicarm::study {
@@ -141,7 +141,7 @@ BallScene ball_scene(double diameter_mm, Companion companion, int squares, std::
     tile.left = margin_px + i % squares * BallScene::side_px;
     tile.top = margin_px + i / squares * BallScene::side_px;
     const Vector2d pixel = Vector2d(tile.left, tile.top) + Vector2d::Constant(0.5 * BallScene::side_px) +
-                           Vector2d(random.uniform(-1, 1), random.uniform(-1, 1));
+                           in_box(random, Vector2d(-1, -1), Vector2d(1, 1));
     const double angle = random.uniform(0, 2 * std::numbers::pi);
     tile.ball = point_at(scene.view, pixel, depth_mm);
     tile.bodies.push_back(simulation::steel("ball", {simulation::sphere(tile.ball, diameter_mm / 2)}));

@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/geometry/ray.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
@@ -64,8 +64,7 @@ void write_biplane_case(const std::filesystem::path& folder, const simulation::S
     for (const auto* points : {&view.balls, &view.targets})
       for (const simulation::TruePoint& point : *points)
         json["picks"].push_back(pipeline::to_json(pipeline::Pick{
-            point.name, view.true_view.name,
-            point.raw + options.click_sigma_px * Eigen::Vector2d(random.normal(), random.normal()),
+            point.name, view.true_view.name, point.raw + options.click_sigma_px * normal_2(random),
             pipeline::Snap::none, 3, options.click_sigma_px, "femur"}));
   }
   value_or_throw(write_file(folder / "case.json", to_text(json) + "\n"));

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/measure.h"
 #include "helicarm/report/chart.h"
@@ -36,9 +36,7 @@ phantom::Calibrator design_of(const CalibrationStudyOptions& options) {
 
 /// The calibrator as made.
 phantom::Calibrator manufactured(phantom::Calibrator calibrator, double tolerance_mm, RandomStream& random) {
-  const auto off = [&]() -> Eigen::Vector3d {
-    return tolerance_mm * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
-  };
+  const auto off = [&]() -> Eigen::Vector3d { return tolerance_mm * normal_3(random); };
   for (phantom::CalibratorBall& ball : calibrator.balls) ball.centre_in_calibrator += off();
   for (phantom::CalibratorTarget& target : calibrator.targets) target.point_in_calibrator += off();
   return calibrator;
@@ -50,8 +48,7 @@ void click_targets(pipeline::Case& the_case, const simulation::SimulatedCase& si
   the_case.calibrator.targets.clear();
   for (const simulation::SimulatedView& view : simulated.views)
     for (const simulation::TruePoint& target : view.targets)
-      the_case.picks.push_back({target.name, view.true_view.name,
-                                target.raw + sigma_px * Eigen::Vector2d(random.normal(), random.normal()),
+      the_case.picks.push_back({target.name, view.true_view.name, target.raw + sigma_px * normal_2(random),
                                 pipeline::Snap::none, 3, sigma_px, std::nullopt});
 }
 

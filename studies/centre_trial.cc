@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/core/statistics.h"
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
@@ -132,8 +132,8 @@ class TileFit {
  private:
   detection::Dot predicted(const simulation::Body& body, RandomStream& random) const {
     detection::Dot dot;
-    dot.centre_px = scene_.view.project(body.solids.front().world_from_unit.translation()) +
-                    pose_px * Vector2d(random.normal(), random.normal());
+    dot.centre_px =
+        scene_.view.project(body.solids.front().world_from_unit.translation()) + pose_px * normal_2(random);
     dot.radius_px = scene_.radius_px();
     return dot;
   }

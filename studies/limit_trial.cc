@@ -10,7 +10,7 @@
 
 #include "helicarm/calibration/c_arm_history.h"
 #include "helicarm/calibration/calibrate.h"
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/localization/locate.h"
 #include "helicarm/phantom/conical_helix.h"
@@ -81,7 +81,7 @@ calibration::ViewFiducials pictured(const char* name, const geometry::View& view
     fiducials::Fiducial fiducial{fmt::format("P{}", seen.fiducials.size() + 1), ball};
     fiducial.status = fiducials::FiducialStatus::used;
     fiducial.sigma_px = sigma;
-    fiducial.uv = view.project(ball) + sigma * Eigen::Vector2d(random.normal(), random.normal());
+    fiducial.uv = view.project(ball) + sigma * normal_2(random);
     seen.fiducials.push_back(fiducial);
   }
   seen.prior = {px_per_mm * focal_mm, Eigen::Vector2d(middle_px, middle_px), px_per_mm};
@@ -192,8 +192,7 @@ LimitOutcomes try_once(const LimitSetting& setting, const std::vector<Vector3d>&
     const Vector3d truth = centre + limit_places[k / 2].off_centre_mm;
     const double sigma = k % 2 ? exact_px : setting.sigma_px;
     std::array<Eigen::Vector2d, 2> pixels;
-    for (std::size_t i = 0; i < 2; ++i)
-      pixels[i] = views[i].project(truth) + sigma * Eigen::Vector2d(random.normal(), random.normal());
+    for (std::size_t i = 0; i < 2; ++i) pixels[i] = views[i].project(truth) + sigma * normal_2(random);
     LimitOutcome& outcome = outcomes[k];
     if (const auto point = located(pixels, sigma, calibration)) {
       const Vector3d error = point->point_in_anchor - truth;

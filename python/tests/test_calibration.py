@@ -35,7 +35,7 @@ def test_pose_agrees_with_opencv(pair):
     uv = pair.pixels("AP", pair.xyz) + 0.2 * random.standard_normal((12, 2))
     k = np.diag([2500.0, 2500, 1])
     k[:2, 2] = 330, 215
-    prior = helicarm.IntrinsicsPrior(focal_px=2500, principal_px=(330, 215), aspect=(1, 1e-9))
+    prior = helicarm.IntrinsicsPrior(focal_px=2500, principal_px=(330, 215), aspect=(1, 1e-8))
     arm = helicarm.CArmPrior(focal=(1e-3, 1e-6), principal=(1e-3, 1e-6))
     views = [helicarm.ViewPoints("AP", pair.xyz, uv, sigma_px=0.2, prior=prior)]
     calibration = helicarm.calibrate(views, c_arm=arm, rejection_probability=0, largest_rms_px=100)

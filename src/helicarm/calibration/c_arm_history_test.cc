@@ -9,6 +9,7 @@
 
 #include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/calibration/views_test.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/core/temporary_folder.h"
 
 namespace helicarm::calibration {
@@ -33,7 +34,7 @@ ViewFiducials acquisition_with(const Vector3d& intrinsics_mm, bool mirrored, Ran
 }
 
 Vector3d scattered_about(const Vector3d& mean, const Vector3d& sigma, RandomStream& random) {
-  return mean + sigma.cwiseProduct(Vector3d(random.normal(), random.normal(), random.normal()));
+  return mean + sigma.cwiseProduct(normal_3(random));
 }
 
 TEST(HistoryEntryOf, EstimateIsConsistentWithTheTruthWithoutThePrior) {

@@ -11,6 +11,7 @@
 
 #include "helicarm/calibration/centred_view.h"
 #include "helicarm/calibration/views_test.h"
+#include "helicarm/core/random_vectors.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -58,13 +59,15 @@ TEST_P(ScatterWithTolerance, EqualsTheJointCovariance) {
     const Eigen::Vector3d per_axis_mm = tolerance_mm * Eigen::Vector3d(1, 2, 0.5);
     if (tolerance_mm > 0) options.common.ball_covariance_mm2.assign(12, per_axis_mm.cwiseAbs2().asDiagonal());
     const auto near = [&](double value, double sigma) { return value + sigma * random.normal(); };
-    const Eigen::Vector2d middle(near(512, 8), near(512, 8));
+    const auto near_pixel = [&](const Eigen::Vector2d& pixel, double sigma) {
+      return Eigen::Vector2d(pixel + sigma * normal_2(random));
+    };
+    const Eigen::Vector2d middle = near_pixel({512, 512}, 8);
     for (auto& view : views)
-      view.prior = {near(6000 + common, 3), Eigen::Vector2d(near(middle.x(), 4), near(middle.y(), 4)), 1,
+      view.prior = {near(6000 + common, 3), near_pixel(middle, 4), 1,
                     geometry::NormalPrior{near(1, 1e-3), 1e-3}, geometry::NormalPrior{near(0, 1e-3), 1e-3}};
     for (std::size_t k = 0; k < 12; ++k) {
-      const Eigen::Vector3d off =
-          per_axis_mm.cwiseProduct(Eigen::Vector3d(random.normal(), random.normal(), random.normal()));
+      const Eigen::Vector3d off = per_axis_mm.cwiseProduct(normal_3(random));
       for (auto& view : views) view.fiducials[k].centre_in_calibrator += off;
     }
     const auto result = calibrate(views, options);
@@ -241,8 +244,7 @@ std::vector<ViewFiducials> views_of_deviating_calibrator(
     views[i].prior = {6000, Eigen::Vector2d(512, 512), 1 / 0.15, geometry::NormalPrior{1, 1e-3},
                       geometry::NormalPrior{0, 1e-12}};
     for (std::size_t k = 0; k < places.size(); ++k)
-      views[i].fiducials[k].uv =
-          view.project(places[k]) + sigma * Eigen::Vector2d(random.normal(), random.normal());
+      views[i].fiducials[k].uv = view.project(places[k]) + sigma * normal_2(random);
   }
   return views;
 }
@@ -261,7 +263,7 @@ TEST(Calibrate, ToleranceOfScatteredBallsIsEstimated) {
   for (std::uint64_t trial = 0; trial < 10; ++trial) {
     RandomStream random(22, 0, trial);
     const auto off = [&](const Eigen::Vector3d& place) -> Eigen::Vector3d {
-      return place + 0.1 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+      return place + 0.1 * normal_3(random);
     };
     const auto result = calibrate(views_of_deviating_calibrator(off, trial), with_c_arm_prior());
     ASSERT_TRUE(result.has_value()) << result.error().message;
@@ -299,7 +301,7 @@ TEST(Calibrate, StrainOfTheCalibratorIsWarnedOfWithItsAxis) {
 TEST(Calibrate, DeclaredToleranceIsNotedWithTheBallsOffsets) {
   RandomStream random(23, 0);
   const auto off = [&](const Eigen::Vector3d& place) -> Eigen::Vector3d {
-    return place + 0.3 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    return place + 0.3 * normal_3(random);
   };
   CalibrationOptions options = with_c_arm_prior();
   options.common.ball_covariance_mm2.assign(12, 0.09 * Eigen::Matrix3d::Identity());

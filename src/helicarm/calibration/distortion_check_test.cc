@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/calibration/views_test.h"
+#include "helicarm/core/random_vectors.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -39,7 +40,7 @@ TEST(CheckDistortion, NeitherNoiseNorDisplacedFiducialsAreADistortion) {
     EXPECT_FALSE(check_distortion(views, nominal_c_arm));
     RandomStream random(45, 0, trial);
     for (std::size_t k = 0; k < 12; ++k) {
-      const Eigen::Vector3d offset = 0.2 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+      const Eigen::Vector3d offset = 0.2 * normal_3(random);
       for (ViewFiducials& view : views) view.fiducials[k].centre_in_calibrator += offset;
     }
     EXPECT_FALSE(check_distortion(views, nominal_c_arm)) << trial;

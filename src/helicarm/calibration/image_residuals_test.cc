@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/calibration/views_test.h"
+#include "helicarm/core/random_vectors.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -45,7 +46,7 @@ TEST(ImageResiduals, ScatterAsExpectedWithTolerancesAndCorrelatedMapErrors) {
         observed_fiducials("AP", paper_view(0), sigma, random),
         observed_fiducials("LAT", paper_view(std::numbers::pi / 2), sigma, random)};
     for (ViewFiducials& view : views) {
-      const Eigen::Vector2d shift = map_sigma * Eigen::Vector2d(random.normal(), random.normal());
+      const Eigen::Vector2d shift = map_sigma * normal_2(random);
       for (std::size_t k = 0; k < 12; ++k) {
         view.fiducials[k].uv += (k % 2 == 0 ? 1 : -1) * shift;
         view.fiducials[k].sigma_px = std::hypot(sigma, map_sigma);
@@ -55,8 +56,7 @@ TEST(ImageResiduals, ScatterAsExpectedWithTolerancesAndCorrelatedMapErrors) {
       view.map_covariance_px2 = mode * mode.transpose();
     }
     for (std::size_t k = 0; k < 12; ++k) {
-      const Eigen::Vector3d offset =
-          tolerance_mm * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+      const Eigen::Vector3d offset = tolerance_mm * normal_3(random);
       for (ViewFiducials& view : views) view.fiducials[k].centre_in_calibrator += offset;
     }
     CalibrationOptions options;

@@ -9,6 +9,7 @@
 
 #include "helicarm/calibration/view_problem.h"
 #include "helicarm/calibration/views_test.h"
+#include "helicarm/core/random_vectors.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -69,8 +70,7 @@ Case with_displaced(std::uint64_t seed, int displaced) {
     views.back().prior.unit_px = 1 / 0.15;
   }
   for (int k = 0; k < displaced; ++k)
-    views[std::size_t(k) % views.size()].fiducials[std::size_t(3 + 2 * k) % 12].uv +=
-        3 * Eigen::Vector2d(random.normal(), random.normal());
+    views[std::size_t(k) % views.size()].fiducials[std::size_t(3 + 2 * k) % 12].uv += 3 * normal_2(random);
   for (const ViewFiducials& view : views) made.problems.push_back(problem_of(view, {}).value());
   return made;
 }

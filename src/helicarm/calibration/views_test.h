@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/calibrate.h"
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::calibration {
@@ -30,7 +30,7 @@ inline ViewFiducials observed_fiducials(const std::string& name, const geometry:
     fiducials::Fiducial f{fmt::format("P{}", k + 1), {radius * std::cos(t), radius * std::sin(t), 3.979 * t}};
     f.status = fiducials::FiducialStatus::used;
     f.sigma_px = sigma;
-    f.uv = view.project(f.centre_in_calibrator) + sigma * Eigen::Vector2d(random.normal(), random.normal());
+    f.uv = view.project(f.centre_in_calibrator) + sigma * normal_2(random);
     result.fiducials.push_back(f);
   }
   return result;

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::localization {
@@ -37,7 +37,7 @@ std::vector<calibration::ViewFiducials> observed_balls(double sigma, std::uint64
       fiducials::Fiducial f{fmt::format("P{}", k), {50 * std::cos(t), 50 * std::sin(t), 4 * t - 40}};
       f.status = fiducials::FiducialStatus::used;
       f.sigma_px = sigma;
-      f.uv = view.project(f.centre_in_calibrator) + sigma * Eigen::Vector2d(random.normal(), random.normal());
+      f.uv = view.project(f.centre_in_calibrator) + sigma * normal_2(random);
       seen.fiducials.push_back(f);
     }
     views.push_back(seen);

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/calibration/calibrate.h"
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/localization/error_bound.h"
 
@@ -36,7 +36,7 @@ std::vector<calibration::ViewFiducials> noisy_fiducials(double sigma, RandomStre
       fiducials::Fiducial f{fmt::format("P{}", k), {radius * std::cos(t), radius * std::sin(t), 3.979 * t}};
       f.status = fiducials::FiducialStatus::used;
       f.sigma_px = sigma;
-      f.uv = view.project(f.centre_in_calibrator) + sigma * Eigen::Vector2d(random.normal(), random.normal());
+      f.uv = view.project(f.centre_in_calibrator) + sigma * normal_2(random);
       seen.fiducials.push_back(f);
     }
     views.push_back(seen);
@@ -55,8 +55,7 @@ std::vector<PointObservation> images_of(const Eigen::Vector3d& point, double sig
   std::vector<PointObservation> observations;
   for (std::size_t i = 0; i < truth.size(); ++i)
     observations.push_back(
-        {i, truth[i].project(point) + sigma * Eigen::Vector2d(random.normal(), random.normal()),
-         sigma * sigma * Eigen::Matrix2d::Identity()});
+        {i, truth[i].project(point) + sigma * normal_2(random), sigma * sigma * Eigen::Matrix2d::Identity()});
   return observations;
 }
 
@@ -144,9 +143,8 @@ ManyViews many_views(std::size_t count, double sigma, double actual_sigma, Rando
   for (std::size_t i = 0; i < count; ++i) {
     const geometry::View view = paper_view(2.6 * double(i) / double(count - 1));
     views.calibration.views.push_back({fmt::format("V{}", i), view, {}});
-    views.observations.push_back(
-        {i, view.project(target) + actual_sigma * Eigen::Vector2d(random.normal(), random.normal()),
-         sigma * sigma * Eigen::Matrix2d::Identity()});
+    views.observations.push_back({i, view.project(target) + actual_sigma * normal_2(random),
+                                  sigma * sigma * Eigen::Matrix2d::Identity()});
   }
   return views;
 }

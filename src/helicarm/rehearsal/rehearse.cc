@@ -9,7 +9,7 @@
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/rehearsal/ct_plan.h"
@@ -106,10 +106,7 @@ operation::RobotPlan robot_plan(const robot::VirtualUr& robot,
 /// As two pivot calibrations of the drill would find it: with errors of its own standard deviation.
 operation::HandDrill calibrated_drill(const virtual_devices::HeldDrill& drill) {
   RandomStream random(drill.seed(), drill_stream);
-  const auto error = [&] {
-    return Eigen::Vector3d(drill_sigma_mm *
-                           Eigen::Vector3d(random.normal(), random.normal(), random.normal()));
-  };
+  const auto error = [&] { return Eigen::Vector3d(drill_sigma_mm * normal_3(random)); };
   const geometry::RigidTransform& marker_from_tip = drill.marker_from_tip();
   return {marker_from_tip.translation + error(), marker_from_tip * Eigen::Vector3d(0, 0, -120) + error(),
           drill_sigma_mm};

@@ -35,7 +35,8 @@ IntensifierDistortion draw_distortion(RandomStream& random, int size) {
 
 /// Uniform in a ball of this radius.
 Vector3d in_ball_of(RandomStream& random, double radius) {
-  return random_rotation(random).col(0) * radius * std::cbrt(random.uniform());
+  const double of_radius = std::cbrt(random.uniform());
+  return random_rotation(random).col(0) * radius * of_radius;
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/phantom/conical_helix.h"
 #include "helicarm/simulation/random_pose.h"
@@ -184,7 +184,7 @@ void place(TrueView& true_view, const Surroundings& at, const Matrix3d& unbent, 
 }
 
 Vector3d draw_isocentre(RandomStream& random) {
-  return Vector3d(random.uniform(-4, 4), random.uniform(-4, 4), random.uniform(34, 40));
+  return in_box(random, Vector3d(-4, -4, 34), Vector3d(4, 4, 40));
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/simulation/faults.h"
 
-#include "helicarm/core/random.h"
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/simulation/streams.h"
 
 namespace helicarm::simulation {
@@ -35,7 +35,7 @@ Scene stray_metal(const SimulationOptions& options, const phantom::Calibrator& c
   Scene scene;
   if (options.has(Fault::decoys))
     for (int i = 0; i < 2; ++i) {
-      const Vector3d position(random.uniform(-45, 45), random.uniform(-45, 45), random.uniform(5, 70));
+      const Vector3d position = in_box(random, Vector3d(-45, -45, 5), Vector3d(45, 45, 70));
       const Vector3d offset = options.calibrator
                                   ? phantom::middle_of(calibrator) - phantom::middle_of(phantom::udcsc())
                                   : Vector3d(0, 0, 0);

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "helicarm/core/random_vectors.h"
 #include "helicarm/simulation/random_pose.h"
 
 namespace helicarm::simulation {
@@ -29,7 +30,7 @@ geometry::View random_view(const phantom::Calibrator& calibrator, std::optional<
   Vector3d centre = Vector3d::Zero();
   for (const auto& ball : calibrator.balls)
     centre += ball.centre_in_calibrator / static_cast<double>(calibrator.balls.size());
-  const Vector3d place(random.uniform(-20, 20), random.uniform(-20, 20), random.uniform(550, 920));
+  const Vector3d place = in_box(random, Vector3d(-20, -20, 550), Vector3d(20, 20, 920));
   view.camera_from_world.translation = place - view.camera_from_world.rotation * centre;
   return view;
 }
@@ -63,7 +64,7 @@ SyntheticView synthetic_detections(const phantom::Calibrator& calibrator,
   for (int i = 0; i < balls; ++i) {
     if (!shown(i)) continue;
     const int k = order[i];
-    const Vector2d noisy = exact[k] + options.noise_px * Vector2d(random.normal(), random.normal());
+    const Vector2d noisy = exact[k] + options.noise_px * normal_2(random);
     int twin = 0;
     while (twin < balls &&
            (twin == i || !shown(twin) || (exact[order[twin]] - exact[k]).norm() > 0.7 * radius[k]))
@@ -76,13 +77,15 @@ SyntheticView synthetic_detections(const phantom::Calibrator& calibrator,
     }
   }
 
-  const Vector2d origin(random.uniform(0, lattice_px), random.uniform(0, lattice_px));
+  const Vector2d origin = in_box(random, Vector2d(0, 0), Vector2d(lattice_px, lattice_px));
   const double turn = random.uniform(0, std::numbers::pi / 2);
   const auto false_place = [&](int i) -> Vector2d {
     if (options.kind == OutlierKind::imitating && i == 0 && options.hidden > 0)
-      return exact[order[i]] + Vector2d(4 * random.normal(), 4 * random.normal());
+      return exact[order[i]] + 4 * normal_2(random);
     if (options.kind == OutlierKind::lattice) {
-      const Vector2d steps(static_cast<int>(random.index(9)) - 4, static_cast<int>(random.index(9)) - 4);
+      const int down = static_cast<int>(random.index(9)) - 4;
+      const int right = static_cast<int>(random.index(9)) - 4;
+      const Vector2d steps(right, down);
       return nominal.principal_px + Eigen::Rotation2Dd(turn) * (lattice_px * steps + origin);
     }
     return nominal.principal_px + in_disc(random, i % 2 == 0 ? nominal.field_radius_px : 300);

@@ -52,6 +52,11 @@ Eigen::Vector3d place_of(std::size_t marker, int frame, const Shift& shift) {
   return pose_at(body, frame) * (bodies[body][marker % 4] + shift(marker, frame));
 }
 
+Eigen::Vector2d normal_pair(std::normal_distribution<double>& normal, std::mt19937& random) {
+  const double y = normal(random), x = normal(random);
+  return {x, y};
+}
+
 std::vector<FrameSights> drawn(const TrackCase& the_case, const Shift& shift) {
   std::mt19937 random(4);
   std::normal_distribution<double> normal;
@@ -62,9 +67,9 @@ std::vector<FrameSights> drawn(const TrackCase& the_case, const Shift& shift) {
     for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
       auto& of = sights.of.emplace_back();
       for (const TrackView& view : the_case.views)
-        of.push_back(MarkerImage{view.camera.project(place_of(m, f, shift)) +
-                                     noise_px * Eigen::Vector2d(normal(random), normal(random)),
-                                 noise_px, 2, 60, 120});
+        of.push_back(
+            MarkerImage{view.camera.project(place_of(m, f, shift)) + noise_px * normal_pair(normal, random),
+                        noise_px, 2, 60, 120});
     }
   }
   return made;
@@ -117,11 +122,11 @@ std::vector<FrameSights> drawn_with_texture(const TrackCase& the_case, unsigned 
   auto sights = drawn(the_case, none);
   for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
     std::array<Eigen::Vector2d, 2> texture;
-    for (Eigen::Vector2d& off : texture) off = texture_px * Eigen::Vector2d(normal(random), normal(random));
+    for (Eigen::Vector2d& off : texture) off = texture_px * normal_pair(normal, random);
     for (std::size_t f = 0; f < sights.size(); ++f) {
       auto& of = sights[f].of[m];
       for (std::size_t k = 0; k < 2; ++k)
-        of[k]->uv_raw += texture[k] + noise_px * Eigen::Vector2d(normal(random), normal(random));
+        of[k]->uv_raw += texture[k] + noise_px * normal_pair(normal, random);
       const auto turn = f / span;
       if (turn == m || turn == m + 1) of[1].reset();
       if (turn == m + 1) of[0].reset();
