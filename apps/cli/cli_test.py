@@ -6,6 +6,9 @@ import json
 import shutil
 import unittest
 
+import cv2
+import pydicom
+
 from program import SimulatedCase, run
 
 
@@ -29,6 +32,24 @@ class CommandLine(SimulatedCase):
         self.assertEqual([shot["view"] for shot in json.loads(machine.read_text())["shots"]], ["AP", "LAT"])
         machine.write_text("{}")
         self.assertEqual(run("run", self.root / "case", "--machine", machine).returncode, 2)
+
+    def test_loss_of_jpeg_files_is_a_note_and_of_dicom_files_a_warning(self):
+        jpeg = self.root / "jpeg"
+        shutil.copytree(self.root / "case", jpeg)
+        case = json.loads((jpeg / "case.json").read_text())
+        ap, lat = case["views"]
+        image = pydicom.dcmread(jpeg / ap["image"])
+        cv2.imwrite(str(jpeg / "AP.jpg"), (image.pixel_array >> (image.BitsStored - 8)).astype("uint8"))
+        ap.update(image="AP.jpg", pixel_mm=float(image.ImagerPixelSpacing[0]))
+        lossy = pydicom.dcmread(jpeg / lat["image"])
+        lossy.LossyImageCompression = "01"
+        lossy.save_as(jpeg / lat["image"])
+        (jpeg / "case.json").write_text(json.dumps(case))
+        done = run("run", jpeg, "--out", self.root / "of_jpeg", "--no-report")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        result = json.loads((self.root / "of_jpeg/result.json").read_text())
+        for findings, view in ((result["notes"], "AP"), (result["warnings"], "LAT")):
+            self.assertEqual([each["view"] for each in findings if each["code"] == "lossy_image"], [view])
 
     def test_c_arm_is_recorded_reported_and_checked(self):
         record = self.root / "arm.json"

@@ -77,7 +77,7 @@ constexpr ReasonEntry entries[] = {
     {Reason::bone_taken_as_fixed, "bone_taken_as_fixed", refused},
     {Reason::tag_disagrees, "tag_disagrees", refused},
     {Reason::spacing_missing, "spacing_missing", refused},
-    {Reason::lossy_image, "lossy_picture", refused},
+    {Reason::lossy_image, "lossy_image", refused},
     {Reason::uid_reused, "uid_reused", refused},
     {Reason::few_fiducials, "few_fiducials", refused},
     {Reason::rules_broken, "rules_broken", refused},

@@ -21,21 +21,26 @@ void append(std::vector<Finding>& findings, const std::vector<Warning>& more, St
   }
 }
 
-bool is_note(const Warning& warning) { return warning.reason == Reason::irregular_file; }
+/// What holds for any file of its kind: a DICOM file need not be compressed with loss, a JPEG file is.
+bool is_note(const Warning& warning, const xray::XrayImage& image) {
+  const bool is_dicom = !image.acquisition.uid_key.empty();
+  return warning.reason == Reason::irregular_file || (warning.reason == Reason::lossy_image && !is_dicom);
+}
 
-/// Of the images' files: what holds whatever is measured in them.
-std::vector<Warning> notes_of(const std::vector<ViewResult>& views) {
-  std::vector<Warning> notes;
-  for (const ViewResult& view : views)
-    if (view.xray_image) std::ranges::copy_if(view.xray_image->warnings, std::back_inserter(notes), is_note);
-  return notes;
+/// Of the images' files: the notes, or all but these.
+void append_of_files(std::vector<Finding>& findings, const std::vector<ViewResult>& views, bool notes) {
+  for (const ViewResult& view : views) {
+    if (!view.xray_image) continue;
+    std::vector<Warning> chosen = view.xray_image->warnings;
+    std::erase_if(chosen, [&](const Warning& each) { return is_note(each, *view.xray_image) != notes; });
+    append(findings, chosen, Stage::read, view.name);
+  }
 }
 
 /// Of reading, rectification and labelling.
 void append_warnings(std::vector<Finding>& warnings, const std::vector<ViewResult>& views) {
+  append_of_files(warnings, views, false);
   for (const ViewResult& view : views) {
-    if (view.xray_image) append(warnings, view.xray_image->warnings, Stage::read, view.name);
-    std::erase_if(warnings, is_note);
     if (view.rectification) append(warnings, view.rectification->warnings, Stage::rectify, view.name);
     if (view.found) append(warnings, view.found->warnings, Stage::label, view.name);
   }
@@ -59,7 +64,7 @@ Result initial_result(const Case& the_case, const RunOptions& options, std::vect
   result.tool_lines = the_case.tool_lines;
   append(result.warnings, the_case.warnings, Stage::read);
   append_warnings(result.warnings, result.views);
-  append(result.notes, notes_of(result.views), Stage::read);
+  append_of_files(result.notes, result.views, true);
   append(result.warnings, reused_uids(result.views), Stage::read);
   append(result.warnings, exchanged_views(result.views), Stage::read);
   return result;
