@@ -21,6 +21,9 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 LOG = "HELICARM_BUILD_TIME_LOG"
 FOLDER = ROOT / "build" / "cold"
+# Like tools/build.sh.
+CONFIGURE = ("cmake", "--preset", "release", "-S", ROOT, "-B", FOLDER, f"-DCMAKE_CXX_COMPILER_LAUNCHER={__file__}",
+             f"-DCMAKE_CXX_COMPILER={os.environ.get('CXX') or shutil.which('clang++-16') or 'g++'}")
 
 
 def launch(command):
@@ -54,7 +57,7 @@ def build(target):
 
 def steps():
     """The steps of ./run on a machine that has the packages."""
-    yield cost("configure", "cmake", "--preset", "release", "-S", ROOT, "-B", FOLDER, f"-DCMAKE_CXX_COMPILER_LAUNCHER={__file__}")
+    yield cost("configure", *CONFIGURE)
     yield cost("build what the first result needs", *build("helicarm-first-demo"))
     yield cost("first result: simulate, measure, report", FOLDER / "bin" / "helicarm-first-demo")
     yield cost("build the other commands", *build("helicarm"))
@@ -75,8 +78,7 @@ def main():
         marked = re.compile(r"(<!-- build -->\n).*?(<!-- /build -->)", re.DOTALL)
         options.doc.write_text(marked.sub(lambda found: found[1] + "\n".join(table) + "\n" + found[2], text), encoding="utf-8")
         return 0
-    subprocess.run(["cmake", "--preset", "release", "-B", FOLDER, f"-DCMAKE_CXX_COMPILER_LAUNCHER={__file__}"], cwd=ROOT,
-                   check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([str(word) for word in CONFIGURE], check=True, stdout=subprocess.DEVNULL)
     subprocess.run(["cmake", "--build", FOLDER, "--target", *options.targets], check=True, stdout=sys.stderr,
                    env={**os.environ, LOG: str(FOLDER / "times.txt")})
     units = [line.split() for line in (FOLDER / "times.txt").read_text().splitlines()]
