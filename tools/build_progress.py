@@ -4,8 +4,8 @@
 
   tools/build_progress.py FOLDER TARGET ...
 
-A step counts by the bytes of the sources that it compiles. The time left follows from the steps that are done; where
-a compiler cache serves many, it is too long at first.
+An object that does not exist yet counts by the bytes of the sources that it compiles. The time left follows from the
+objects that are done; where a compiler cache serves many, it is too long at first.
 """
 import os
 import pathlib
@@ -15,25 +15,28 @@ import sys
 import time
 
 STEP = re.compile(r"\[(\d+)/(\d+)\] (.*)")
-LINK_BYTES = 2_000  # what a step counts that compiles nothing
+OBJECT = re.compile(r"(\S+)/CMakeFiles/([^/\s]+\.dir)/(\S+)\.o$")
 UNIT_BYTES = 20_000  # what the headers of a unit count
 
 
-def source_bytes(folder, text):
-    """Bytes of the sources of an object, as ninja's description of the step names it."""
-    words = re.search(r"CXX object (\S+?)/CMakeFiles/[^/]+\.dir/(\S+)\.o$", text)
+def weight(folder, path):
+    """Of an object: bytes of the sources that its unit includes."""
+    words = OBJECT.match(path)
     if not words:
-        return 0
-    unit = folder / words[1] / "CMakeFiles" / text.split("/CMakeFiles/")[1].split("/")[0] / words[2]
+        return UNIT_BYTES
+    unit = folder / words[1] / "CMakeFiles" / words[2] / words[3]
     if not unit.is_file():
-        file = folder.parent / words[1] / words[2]
-        return file.stat().st_size if file.is_file() else 0
-    included = re.findall(r'#include "(.+?)"', unit.read_text())
-    return sum(pathlib.Path(file).stat().st_size for file in included if pathlib.Path(file).is_file())
+        file = folder.parent / words[1] / words[3]
+        return UNIT_BYTES + (file.stat().st_size if file.is_file() else 0)
+    included = map(pathlib.Path, re.findall(r'#include "(.+?)"', unit.read_text()))
+    return UNIT_BYTES + sum(file.stat().st_size for file in included if file.is_file())
 
 
-def weight(folder, text):
-    return UNIT_BYTES + source_bytes(folder, text) if " CXX object " in text else LINK_BYTES
+def missing_objects(folder, targets):
+    """The weights of the objects that the targets need and that do not exist yet."""
+    commands = subprocess.run(["ninja", "-C", str(folder), "-t", "commands", *targets], capture_output=True, text=True).stdout
+    paths = set(re.findall(r" -o (\S+\.o) ", commands))
+    return {path: weight(folder, path) for path in paths if not (folder / path).exists()}
 
 
 def in_words(seconds):
@@ -42,23 +45,21 @@ def in_words(seconds):
 
 def main():
     folder, targets = pathlib.Path(sys.argv[1]).resolve(), sys.argv[2:]
-    ninja = ["ninja", "-C", str(folder)]
-    environment = {**os.environ, "NINJA_STATUS": "[%f/%t] "}
-    plan = subprocess.run([*ninja, "-n", *targets], capture_output=True, text=True, env=environment).stdout
-    total = sum(weight(folder, step[3]) for step in map(STEP.match, plan.splitlines()) if step)
+    missing = missing_objects(folder, targets)
+    total = sum(missing.values())
     on_screen = sys.stderr.isatty()
     begin, done = time.monotonic(), 0
-    with subprocess.Popen([*ninja, *targets], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                          env=environment) as build:
+    with subprocess.Popen(["ninja", "-C", str(folder), *targets], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          env={**os.environ, "NINJA_STATUS": "[%f/%t] "}) as build:
         for line in build.stdout:
             step = STEP.match(line)
             if not step:
-                if not line.startswith("ninja: Entering"):
+                if not line.startswith(("ninja: Entering", "ninja: no work")):
                     print(("\n" if on_screen else "") + line, end="", file=sys.stderr)
                 continue
-            done += weight(folder, step[3])
-            share = min(1.0, done / total) if total else 1.0
-            left = (time.monotonic() - begin) * (1 - share) / share
+            done += missing.pop(step[3].rsplit(" ", 1)[-1], 0)
+            share = done / total if total else int(step[1]) / max(1, int(step[2]))
+            left = (time.monotonic() - begin) * (1 - share) / max(share, 1e-9)
             rest = f", about {in_words(left)} left" if 0.05 < share < 1 else ""
             text = f"[{100 * share:3.0f} %{rest}] {step[3]}"
             if on_screen:
