@@ -16,12 +16,12 @@ skipped='^(benchmarks/|examples/|studies/small_studies.cc|cmake/precompiled.cc|f
 mapfile -t files < <(printf '%s\n' "${files[@]}" | grep '\.cc$' | grep -Ev "$skipped" || true)
 [ ${#files[@]} -eq 0 ] && exit 0
 
-# A build without GCC's precompiled headers, which clang cannot read. It is configured, never built.
-CXX=clang++-16 cmake --preset release -B build/tidy -DHELICARM_UNITY=OFF -DHELICARM_GUI=ON -DHELICARM_PYTHON=ON -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
+# A build by Clang without precompiled headers. It is configured, never built.
+cmake --preset release -B build/tidy -DCMAKE_CXX_COMPILER=clang++-16 -DHELICARM_UNITY=OFF -DHELICARM_GUI=ON -DHELICARM_PYTHON=ON -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
   >build-tidy.log 2>&1 || { cat build-tidy.log >&2; exit 1; }
 mv build-tidy.log build/tidy/configure.log
 
-# MPI's compiler flags and GCC's warnings are strange to clang.
+# MPI's compiler flags are strange to clang.
 check() { clang-tidy-16 -p build/tidy --quiet --extra-arg=-Wno-unknown-warning-option --extra-arg=-Wno-unused-command-line-argument "$1" 2>/dev/null ||
   { echo "$1: clang-tidy has findings" >&2; return 1; }; }
 export -f check
