@@ -368,14 +368,27 @@ std::optional<Volume> read_segmentation(const std::filesystem::path& path, std::
   return std::move(made.volume);
 }
 
-Expected<std::optional<Volume>> read_segment(const std::filesystem::path& path, const SegmentChoice& choice) {
-  return guarded([&]() -> std::optional<Volume> {
+namespace {
+
+/// What `take` makes of the elements of a DICOM segmentation; nothing of another file.
+template <class Take>
+auto of_segmentation(const std::filesystem::path& path, const Take& take)
+    -> Expected<std::optional<std::invoke_result_t<Take, const DicomElements&>>> {
+  return guarded([&]() -> std::optional<std::invoke_result_t<Take, const DicomElements&>> {
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
     const std::string bytes = read_volume_file(path);
     if (!may_be_segmentation(bytes)) return std::nullopt;
     const DicomElements elements = value_or_throw(xray::walk_dicom(bytes, path.string()));
     if (!is_segmentation_class(elements)) return std::nullopt;
+    return take(elements);
+  });
+}
+
+}  // namespace
+
+Expected<std::optional<Volume>> read_segment(const std::filesystem::path& path, const SegmentChoice& choice) {
+  return of_segmentation(path, [&](const DicomElements& elements) {
     const int segment = chosen_segment(segments_of(elements), choice, elements.origin);
     check_threshold(elements, choice);
     Segmentation made = whole_segmentation(elements);
@@ -389,15 +402,7 @@ Expected<std::optional<Volume>> read_segment(const std::filesystem::path& path, 
 }
 
 Expected<std::optional<std::map<int, std::string>>> segments_in(const std::filesystem::path& path) {
-  return guarded([&]() -> std::optional<std::map<int, std::string>> {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
-    const std::string bytes = read_volume_file(path);
-    if (!may_be_segmentation(bytes)) return std::nullopt;
-    const DicomElements elements = value_or_throw(xray::walk_dicom(bytes, path.string()));
-    if (!is_segmentation_class(elements)) return std::nullopt;
-    return segments_of(elements);
-  });
+  return of_segmentation(path, [](const DicomElements& elements) { return segments_of(elements); });
 }
 
 }  // namespace helicarm::volume
