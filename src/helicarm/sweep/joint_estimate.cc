@@ -239,6 +239,13 @@ std::vector<CameraMatrix> covariances_of(const Joint& joint, const Detector& det
   return covariances;
 }
 
+/// The path where its source is as far along the turn as the frame's own: how far it is, no image says.
+CameraVector path_beside(const PathPoint& point, const CameraVector& turn) {
+  const auto along = turn.head<3>();
+  if (along.isZero(0)) return point.path;
+  return point.path + turn * (along.dot((point.camera - point.path).head<3>()) / along.squaredNorm());
+}
+
 void set_best(SweepFrame& frame, const Joint& joint, std::size_t i, const CameraMatrix& covariance,
               const Detector& detector) {
   const PlacedCamera reference = joint.fit.orbit.at(joint.angles_deg[i]);
@@ -259,7 +266,7 @@ void set_best(SweepFrame& frame, const Joint& joint, std::size_t i, const Camera
   frame.best = std::move(best);
   frame.path_angle_deg = joint.angles_deg[i];
   frame.off_path_sigma = chi2_excess(point.off_path_chi2, path_dof(joint));
-  frame.flex = point.path;
+  frame.flex = path_beside(point, joint.observations[i].turn);
   frame.own = point.camera;
   constexpr double noticeable = 4;
   if (*frame.off_path_sigma > noticeable && frame.decision == Decision::accept)

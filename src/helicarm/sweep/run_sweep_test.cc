@@ -44,6 +44,9 @@ TEST(RunSweep, CamerasOfARunAreNearTheTruthAndBlankImagesAreNamed) {
     const Eigen::Vector3d off = frame.best->view.source_in_world() - truth.source_in_world();
     EXPECT_LT(off.norm(), 3);
     inside += off.dot(calibration::source_covariance(*frame.best).ldlt().solve(off)) < 11.34;  // 99 %
+    const CameraVector off_path = *frame.own - *frame.flex;
+    EXPECT_LT(off_path.head<6>().norm(), 0.5) << frame.number;
+    EXPECT_LT(off_path.tail<3>().norm(), 1e-3) << frame.number;
     ++accepted;
   }
   EXPECT_GE(inside, accepted - 2);

@@ -37,9 +37,10 @@ struct SweepFrame {
   std::optional<double> primary_angle_deg, secondary_angle_deg;
   int fiducials_used = 0;
   std::optional<calibration::CalibratedView> best, alone;
-  std::optional<double> path_angle_deg;   ///< along the path, from the first frame
-  std::optional<double> off_path_sigma;   ///< of this frame from the path of the others
-  std::optional<CameraVector> flex, own;  ///< of the path and of the camera from the reference orbit
+  std::optional<double> path_angle_deg;  ///< along the path, from the first frame
+  std::optional<double> off_path_sigma;  ///< of this frame from the path of the others
+  /// Of the path, and of the camera, from the reference orbit at one angle: that of the camera's source.
+  std::optional<CameraVector> flex, own;
 };
 
 /// The curve of source and detector.
