@@ -18,7 +18,6 @@ namespace {
 
 constexpr double chart_width = 460, chart_height = 360;  // of the frame
 constexpr double left_margin = 64, top_margin = 56, right_margin = 28, bottom_margin = 56;
-constexpr double column_width = left_margin + chart_width + right_margin;
 constexpr double legend_line = 17, legend_mark = 26;
 constexpr double letter_width = 6.5;  // of a tick name; mean width, an upper bound
 constexpr std::size_t few_dots = 50;  // more are drawn smaller and translucent
