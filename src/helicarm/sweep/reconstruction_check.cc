@@ -3,21 +3,18 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <mutex>
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/core/statistics.h"
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/exchange/run_geometry.h"
-#include "helicarm/geometry/triangulation.h"
-#include "helicarm/sweep/estimate_frame.h"
+#include "helicarm/sweep/check_boxes.h"
+#include "helicarm/sweep/check_images.h"
 #include "helicarm/sweep/path.h"
 #include "helicarm/sweep/reconstruction.h"
 #include "helicarm/sweep/sweep.h"
@@ -27,21 +24,6 @@ namespace {
 
 using geometry::View;
 namespace fs = std::filesystem;
-
-/// A box about a target, its z along the axis or the wire.
-struct CheckBox {
-  std::string name;
-  std::optional<double> diameter_mm;  ///< nothing: a wire
-  geometry::RigidTransform world_from_box;
-  std::array<int, 3> size{0, 0, 0};
-  double voxel_mm = 0;
-
-  /// Half of the box's sides, mm.
-  Eigen::Vector3d half() const { return Eigen::Vector3d(size[0], size[1], size[2]) * voxel_mm / 2; }
-};
-
-/// Cameras of the used frames.
-using Cameras = std::vector<View>;
 
 struct Geometries {
   std::vector<std::size_t> frames;  ///< of the case, that are used
@@ -55,16 +37,6 @@ Cameras circle_of(const Cameras& own, const Sweep& sweep) {
   Cameras circle;
   for (const double angle : fit.angles_deg) circle.push_back(view_of(fit.orbit.at(angle), sweep.detector));
   return circle;
-}
-
-/// A wire that the calibrator's file describes by its end.
-std::optional<Wire> wire_of(const phantom::Calibrator& calibrator) {
-  constexpr double least_mm = 5;
-  for (const phantom::CalibratorTarget& target : calibrator.targets)
-    if (target.kind == phantom::TargetKind::line_end && target.length_mm >= least_mm)
-      return Wire{target.point_in_calibrator,
-                  target.point_in_calibrator + target.length_mm * target.directions.front()};
-  return {};
 }
 
 /// By the views' names, or as many as images are accepted or in the case, in their order.
@@ -101,212 +73,6 @@ Geometries geometries_of(const Sweep& sweep, const CheckOptions& options) {
   all.cameras = {own, circle_of(own, sweep)};
   if (!options.against.empty()) all.cameras.push_back(other_cameras(options.against, sweep, all.frames));
   return all;
-}
-
-geometry::RigidTransform box_at(const Eigen::Vector3d& middle, const Eigen::Vector3d& along) {
-  return {Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), along).toRotationMatrix(), middle};
-}
-
-CheckBox box_of_wire(const Wire& wire) {
-  constexpr double side_mm = 12, voxel_mm = 0.12;
-  constexpr int across = int(side_mm / voxel_mm) + 1, slices = 5;
-  return {"wire",
-          {},
-          box_at((wire.from + wire.to) / 2, (wire.to - wire.from).normalized()),
-          {across, across, slices},
-          voxel_mm};
-}
-
-/// A ball's box, without its neighbours.
-CheckBox box_of_ball(const phantom::Calibrator& calibrator, std::size_t ball, const Eigen::Vector3d& axis) {
-  constexpr double voxels_across = 14, surroundings = 3, least_surroundings_mm = 8, gap_mm = 0.5;
-  const auto& at = calibrator.balls[ball];
-  const double d = at.diameter_mm;
-  double side = std::max(surroundings * d, d + least_surroundings_mm);
-  for (const auto& other : calibrator.balls)
-    if (&other != &at) {
-      const double free =
-          (other.centre_in_calibrator - at.centre_in_calibrator).norm() - other.diameter_mm / 2 - gap_mm;
-      side = std::min(side, free * 2 / std::sqrt(3.0));
-    }
-  const double voxel = d / voxels_across;
-  const int n = 2 * int(side / voxel / 2) + 1;
-  return {at.label, d, box_at(at.centre_in_calibrator, axis), {n, n, n}, voxel};
-}
-
-std::vector<Eigen::Vector3d> corners_of(const CheckBox& box) {
-  std::vector<Eigen::Vector3d> corners;
-  for (int k = 0; k < 8; ++k) {
-    const Eigen::Vector3d sign(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1);
-    corners.emplace_back(box.world_from_box * sign.cwiseProduct(box.half()).eval());
-  }
-  return corners;
-}
-
-bool is_inside(const CheckBox& box, const View& view, const Eigen::Vector2i& size) {
-  return std::ranges::all_of(corners_of(box), [&](const Eigen::Vector3d& corner) {
-    const Eigen::Vector2d at = view.project(corner);
-    return at.minCoeff() > 0 && at.x() < size.x() - 1 && at.y() < size.y() - 1;
-  });
-}
-
-/// Up to four balls in the field of all images and clear of their neighbours, far from each other; the first
-/// is the middle one.
-std::vector<CheckBox> boxes_of_balls(const phantom::Calibrator& calibrator, const Sweep& sweep,
-                                     const Cameras& own) {
-  constexpr std::size_t most = 4;
-  constexpr double least_side = 2;  // diameters
-  std::vector<CheckBox> free, chosen;
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
-    middle += calibrator.balls[k].centre_in_calibrator / double(calibrator.balls.size());
-    CheckBox box = box_of_ball(calibrator, k, *sweep.path->axis);
-    if (2 * box.half().x() >= least_side * *box.diameter_mm &&
-        std::ranges::all_of(
-            own, [&](const View& view) { return is_inside(box, view, sweep.detector.image_size); }))
-      free.push_back(std::move(box));
-  }
-  const auto place = [](const CheckBox& box) { return box.world_from_box.translation; };
-  while (!free.empty() && chosen.size() < most) {
-    const auto far = [&](const CheckBox& box) {
-      if (chosen.empty()) return -(place(box) - middle).norm();
-      double nearest = 1e9;
-      for (const CheckBox& other : chosen) nearest = std::min(nearest, (place(box) - place(other)).norm());
-      return nearest;
-    };
-    const auto next = std::ranges::max_element(free, {}, far);
-    chosen.push_back(*next);
-    free.erase(next);
-  }
-  return chosen;
-}
-
-/// The filter runs along rows, so rows are made to lie across the axis, and columns not mirrored.
-struct Upright {
-  bool transposed = false;
-
-  View operator()(View view) const {
-    geometry::Intrinsics& k = view.intrinsics;
-    geometry::RigidTransform& pose = view.camera_from_world;
-    if (transposed) {
-      std::swap(k.fx, k.fy);
-      std::swap(k.u0, k.v0);
-      pose.rotation.row(0).swap(pose.rotation.row(1));
-      std::swap(pose.translation.x(), pose.translation.y());
-    }
-    for (const Eigen::Index row : {0, 1})
-      if (double& f = row == 0 ? k.fx : k.fy; f < 0) {
-        f = -f;
-        pose.rotation.row(row) *= -1;
-        pose.translation[row] *= -1;
-      }
-    return view;
-  }
-  image::Image<float> operator()(image::Image<float> image) const {
-    if (!transposed) return image;
-    image::Image<float> turned(image.height(), image.width());
-    for (int v = 0; v < turned.height(); ++v)
-      for (int u = 0; u < turned.width(); ++u) turned(u, v) = image(v, u);
-    return turned;
-  }
-};
-
-Upright upright_of(const Sweep& sweep, const Cameras& own) {
-  const View& view = own[own.size() / 2];
-  const Eigen::Vector3d& middle = sweep.path->isocentre;
-  const Eigen::Vector2d along = view.project(middle + *sweep.path->axis) - view.project(middle);
-  return {std::abs(along.x()) > std::abs(along.y())};
-}
-
-/// The box where the target appears with other cameras, by their rays through its images: a circle about
-/// another centre, or another world, displaces it as a whole.
-CheckBox as_seen_by(const Cameras& cameras, CheckBox box, const Cameras& own) {
-  std::vector<geometry::Projection> projections;
-  std::vector<Eigen::Vector2d> pixels;
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    projections.push_back(cameras[i].projection());
-    pixels.push_back(own[i].project(box.world_from_box.translation));
-  }
-  box.world_from_box.translation = value_or_throw(geometry::intersect_linear(projections, pixels));
-  return box;
-}
-
-/// Rows of the images that hold a target in every geometry: of each image the first, and their number.
-struct Rows {
-  std::vector<int> first;
-  int count = 0;
-};
-
-/// `boxes`: of the target, in each geometry.
-Rows rows_of(const std::vector<CheckBox>& boxes, const Geometries& all, const Upright& upright, int height) {
-  constexpr int margin = 4;
-  std::vector<std::pair<double, double>> spans;
-  for (std::size_t i = 0; i < all.frames.size(); ++i) {
-    double lowest = height, highest = 0;
-    for (std::size_t g = 0; g < boxes.size(); ++g)
-      for (const Eigen::Vector3d& corner : corners_of(boxes[g])) {
-        const double v = upright(all.cameras[g][i]).project(corner).y();
-        lowest = std::min(lowest, v), highest = std::max(highest, v);
-      }
-    spans.emplace_back(std::max(0.0, lowest), std::min<double>(height - 1, highest));
-  }
-  Rows rows;
-  for (const auto& [lowest, highest] : spans)
-    rows.count = std::max(rows.count, int(highest - lowest) + 2 * margin);
-  rows.count = std::min(rows.count, height);
-  for (const auto& [lowest, highest] : spans)
-    rows.first.push_back(std::clamp(int((lowest + highest - rows.count) / 2), 0, height - rows.count));
-  return rows;
-}
-
-std::string frame_name(std::size_t i, const char* ending) { return fmt::format("img_{:04d}.{}", i, ending); }
-
-void write_bytes(const fs::path& file, std::string_view head, std::string_view body) {
-  std::ofstream stream(file, std::ios::binary);
-  stream << head << body;
-  stream.close();
-  if (!stream) throw BadInput(Reason::cannot_write, fmt::format("{}: cannot be written", file.string()));
-}
-
-/// PFM as plastimatch reads it: the first row first.
-void write_rows(const fs::path& file, const image::Image<float>& image, int first, int count) {
-  const auto bytes = std::size_t(count) * std::size_t(image.width()) * sizeof(float);
-  write_bytes(file, fmt::format("Pf\n{} {}\n-1\n", image.width(), count),
-              {reinterpret_cast<const char*>(image.row(first)), bytes});
-}
-
-/// Line integrals of the attenuation, up to a factor and a constant.
-image::Image<float> attenuation_of(const xray::XrayImage& xray_image) {
-  constexpr double open_share = 0.995;
-  constexpr float least = 1e-3f;  // of the open beam
-  image::Image<float> image = xray_image.pixels;
-  const auto pixels = image.pixels();
-  if (xray_image.acquisition.logarithmic.value_or(false)) {
-    for (float& value : pixels) value = xray_image.highest - value;
-    return image;
-  }
-  std::vector<float> ranked(pixels.begin(), pixels.end());
-  const auto rank = ranked.begin() + std::ptrdiff_t(open_share * double(ranked.size()));
-  std::ranges::nth_element(ranked, rank);
-  const float open = std::max(1e-6f, *rank - xray_image.lowest);
-  for (float& value : pixels) value = -std::log(std::max(least, (value - xray_image.lowest) / open));
-  return image;
-}
-
-/// Each target's rows of each image, in its folder.
-void write_images(const SweepCase& the_case, const Geometries& all, const Upright& upright,
-                  const std::vector<Rows>& rows, const fs::path& folder, unsigned threads,
-                  const std::function<void()>& done) {
-  std::mutex guard;
-  parallel_for(all.frames.size(), threads, [&](std::size_t i) {
-    const Frame& frame = the_case.frames[all.frames[i]];
-    const image::Image<float> image =
-        upright(attenuation_of(value_or_throw(rectified_image_of(frame, the_case))));
-    for (std::size_t t = 0; t < rows.size(); ++t)
-      write_rows(folder / std::to_string(t) / frame_name(i, "pfm"), image, rows[t].first[i], rows[t].count);
-    const std::lock_guard lock(guard);
-    done();
-  });
 }
 
 CheckedImage reconstructed(const CheckBox& box, const Rows& rows, const Cameras& cameras,
@@ -367,7 +133,7 @@ ReconstructionCheck checked(const SweepCase& the_case, const Sweep& sweep, const
     auto& seen = of_geometries.emplace_back(std::vector{boxes[t]});
     for (std::size_t g = 1; g < all.cameras.size(); ++g)
       seen.push_back(as_seen_by(all.cameras[g], boxes[t], all.cameras.front()));
-    rows.push_back(rows_of(seen, all, upright, upright.transposed ? size.x() : size.y()));
+    rows.push_back(rows_of(seen, all.cameras, upright, upright.transposed ? size.x() : size.y()));
     fs::create_directory(folder.path() / std::to_string(t));
   }
   const std::size_t each = all.cameras.size(), jobs = boxes.size() * each;
@@ -376,7 +142,7 @@ ReconstructionCheck checked(const SweepCase& the_case, const Sweep& sweep, const
     ++done;
     if (progress) progress(double(done) / double(all.frames.size() + jobs));
   };
-  write_images(the_case, all, upright, rows, folder.path(), options.threads, tell);
+  write_images(the_case, all.frames, upright, rows, folder.path(), options.threads, tell);
   std::vector<CheckedImage> images(jobs);
   std::mutex guard;
   parallel_for(jobs, options.threads, [&](std::size_t job) {
