@@ -121,6 +121,14 @@ class CommandLine(SimulatedCase):
         self.assertEqual([line.split(",")[:3] for line in lines[1:]], [["broken", "failed", "bad_json"], ["case", "ok", ""]])
         self.assertTrue((self.root / "both/case/report.html").exists())
 
+    def test_run_writes_a_dicom_measurement_report(self):
+        out = self.root / "dicom"
+        done = run("run", self.root / "case", "--out", out, "--dicom", "--no-report")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(b"Imaging Measurement Report", (out / "measurements.dcm").read_bytes())
+        self.assertEqual(run("run", self.root / "case", "--out", out, "--no-report").returncode, 0)
+        self.assertFalse((out / "measurements.dcm").exists())
+
     def test_export_writes_what_other_programs_read(self):
         out = self.root / "exported"
         done = run("export", self.root / "case", "--out", out, "--json")

@@ -7,6 +7,7 @@
 
 #include "findings.h"
 #include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/case_registration/dicom_measurements.h"
 #include "helicarm/pipeline/c_arm.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/map_cache.h"
@@ -62,6 +63,24 @@ void add_run_options(CLI::App* command, RunArguments& arguments, const char* mac
       ->excludes(cache);
 }
 
+void add_dicom_option(CLI::App* command, RunArguments& arguments) {
+  command->add_flag(
+      "--dicom", arguments.dicom,
+      "Also write measurements.dcm, a DICOM measurement report (SR, TID 1500) with the patient and study of "
+      "the X-ray images, and for each model MODEL_registration.dcm, a DICOM Spatial Registration with those "
+      "of its CT (a folder of a DICOM series)");
+}
+
+void write_dicom_files(const pipeline::Case& the_case, const Measurement& measured,
+                       const std::filesystem::path& out, const std::filesystem::path& registrations,
+                       Console& console) {
+  const auto written =
+      value_or_throw(case_registration::write_dicom_results(the_case, measured, out, registrations));
+  if (console.quiet) return;
+  for (const std::string& why : written.left_out)
+    console.progress << fmt::format("helicarm: note: --dicom: {}\n", why);
+}
+
 Expected<case_registration::RegisterOptions> options_of(const RunArguments& arguments, Console& console) {
   return guarded([&] {
     case_registration::RegisterOptions options = arguments.options;
@@ -100,6 +119,9 @@ Expected<Measurement> run_and_write(const RunArguments& arguments, Console& cons
       value_or_throw(calibration::check_history_file(*arguments.history));
     Measurement measured = value_or_throw(measured_case(arguments, console));
     value_or_throw(case_registration::write_models(measured.registration, arguments.out));
+    if (arguments.dicom && !measured.result.failure)
+      write_dicom_files(value_or_throw(pipeline::read_case(arguments.folder)), measured, arguments.out,
+                        arguments.out / "registration", console);
     value_or_throw(report::write_result(measured.result, arguments.out, !arguments.no_report));
     if (arguments.history && arguments.extends_history && !measured.result.failure)
       value_or_throw(add_to_c_arm_history(*arguments.history, measured.result, console));

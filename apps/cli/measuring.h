@@ -19,10 +19,20 @@ struct RunArguments {
   bool extends_history = false;  ///< by this case's acquisitions; a missing file is then a new history
   std::optional<std::filesystem::path> cache = {};  ///< of plate images' maps; nothing: the user's
   bool no_cache = false;
+  bool dicom = false;  ///< also a DICOM measurement report and registrations
 };
 
 /// `run_fields`, --machine, --cache and --no-cache.
 void add_run_options(CLI::App* command, RunArguments& arguments, const char* machine_help);
+
+/// --dicom.
+void add_dicom_option(CLI::App* command, RunArguments& arguments);
+
+/// Writes the DICOM files of a measurement of the case into `out`, those of its models into `registrations`,
+/// and says what is left out.
+void write_dicom_files(const pipeline::Case& the_case, const case_registration::Measurement& measured,
+                       const std::filesystem::path& out, const std::filesystem::path& registrations,
+                       Console& console);
 
 /// Measures a case and writes result.json, report.html and NAME_overlay.png; of a case with models also
 /// `case_registration::write_models`. A refusal also writes them and then fails with its reason; unusable

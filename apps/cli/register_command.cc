@@ -8,7 +8,7 @@
 
 #include "command_line.h"
 #include "findings.h"
-#include "helicarm/case_registration/dicom_registrations.h"
+#include "helicarm/case_registration/measure_case.h"
 #include "helicarm/case_registration/register_fields.h"
 #include "helicarm/case_registration/registration_tables.h"
 #include "helicarm/core/files.h"
@@ -30,7 +30,6 @@ struct RegisterArguments {
   RunArguments run = {.folder = {}, .out = "registration"};  ///< the C-arm's history is only read
   std::string frames;                                        ///< A-B[:STEP]; empty: one image per view
   bool resume = false;                                       ///< of a sequence
-  bool dicom = false;                                        ///< also DICOM registrations
 };
 
 namespace {
@@ -134,7 +133,7 @@ CommandResult register_command(const RegisterArguments& arguments, Console& cons
   return guarded([&] {
     if (arguments.resume && arguments.frames.empty())
       throw BadInput(Reason::usage, "--resume is for a sequence: give --frames A-B as well");
-    if (arguments.dicom && !arguments.frames.empty())
+    if (arguments.run.dicom && !arguments.frames.empty())
       throw BadInput(Reason::usage, "--dicom is for one moment: it cannot be combined with --frames");
     name_replaced_frames(arguments, console);
     if (!arguments.resume) report::forget_registration(arguments.run.out);
@@ -149,8 +148,9 @@ CommandResult register_command(const RegisterArguments& arguments, Console& cons
         value_or_throw(pipeline::read_case(arguments.run.folder, pipeline::Purpose::registration));
     const auto result = value_or_throw(case_registration::register_case(the_case, options, progress));
     value_or_throw(case_registration::write_registration(result, arguments.run.out));
-    if (arguments.dicom)
-      value_or_throw(case_registration::write_dicom_registrations(the_case, result, arguments.run.out));
+    if (arguments.run.dicom && !result.failure)
+      write_dicom_files(the_case, {case_registration::with_models({}, result), result}, arguments.run.out,
+                        arguments.run.out, console);
     print_warnings(result.warnings, console);
     for (const RegisteredModel& model : result.models) {
       print_warnings(model.registration.warnings, console);
@@ -190,10 +190,7 @@ void add_register(CLI::App& app, Action& action) {
       "Follow the models through the frames A-B[:STEP] of files with several frames, or of "
       "numbered files (\"image\": \"ap_{frame:03d}.tif\"); writes registration.csv, bodies.csv, "
       "smoothed.csv, relative.csv, sequence.json and report.html");
-  command->add_flag(
-      "--dicom", a.dicom,
-      "Also write MODEL_registration.dcm, a DICOM Spatial Registration with the patient and study "
-      "of the CT (a folder of a DICOM series)");
+  add_dicom_option(command, a.run);
   command->add_flag("--resume", a.resume, "Go on after the frames that an interrupted run left in --out");
 }
 

@@ -87,6 +87,21 @@ class Register(SimulatedCase):
         self.assertIn("Frame of Reference UID", done.stderr)
         self.assertEqual(run("register", folder, "--frames", "1-2", "--dicom").returncode, 2)
 
+    def test_dicom_of_a_plan_without_a_dicom_ct_is_a_measurement_report(self):
+        folder, case = self.case_with_landmarks("dicom")
+        case["models"][0]["plan"] = "plan.mrk.json"
+        (folder / "case.json").write_text(json.dumps(case))
+        out = self.root / "dicom-out"
+        for command in ("register", "run"):
+            done = run(command, folder, "--out", out, "--dicom")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("note: --dicom: no \"volume\" is a folder", done.stderr)
+            report = out / "measurements.dcm"
+            self.assertEqual(report.stat().st_mode & 0o777, 0o600)
+            self.assertIn(b"body: planned", report.read_bytes())
+        self.assertEqual(run("register", folder, "--out", out).returncode, 0)
+        self.assertFalse(report.exists())
+
     def test_run_export_and_register_take_the_same_options(self):
         folder, case = self.case_with_landmarks("options")
         case["models"][0]["plan"] = "plan.mrk.json"

@@ -5,7 +5,7 @@
 #include "checks.h"
 #include "held_calibration.h"
 #include "helicarm/calibration/c_arm_history_file.h"
-#include "helicarm/case_registration/measure_case.h"
+#include "helicarm/case_registration/dicom_measurements.h"
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/c_arm.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -68,11 +68,18 @@ HeldCalibration calibration_of(const pipeline::Result& result) {
   return held;
 }
 
-void write(const case_registration::Measurement& measured, const std::filesystem::path& folder) {
+void write(const case_registration::Measurement& measured, const std::filesystem::path& folder,
+           const std::optional<std::filesystem::path>& dicom) {
   const auto written = without_gil([&] {
-    return case_registration::write_models(measured.registration, folder).and_then([&] {
-      return report::write_result(measured.result, folder);
-    });
+    return case_registration::write_models(measured.registration, folder)
+        .and_then([&]() -> Expected<void> {
+          if (!dicom || measured.result.failure) return {};
+          return pipeline::read_case(*dicom).and_then([&](const pipeline::Case& the_case) {
+            return case_registration::write_dicom_results(the_case, measured, folder, folder / "registration")
+                .map([](const auto&) {});
+          });
+        })
+        .and_then([&] { return report::write_result(measured.result, folder); });
   });
   value_or_raise(written);
 }
@@ -253,10 +260,12 @@ void add_result(py::module_& module) {
       .def(
           "to_dict", [](const Measurement& m) { return python_from(pipeline::to_json(m.result)); },
           "The content of result.json.")
-      .def("write", &write, py::arg("folder"),
+      .def("write", &write, py::arg("folder"), py::kw_only(), py::arg("dicom") = py::none(),
            "result.json, report.html and an overlay PNG for each view; of a case with models also "
            "registration.json and\n"
-           "registration/. Raises InputError: cannot_write.")
+           "registration/. dicom: the case's folder: also measurements.dcm, a DICOM measurement report, and\n"
+           "DICOM registrations, as `helicarm run --dicom`. Raises InputError: cannot_write, and bad_value\n"
+           "where neither the X-ray images nor a CT are DICOM files.")
       .def("__repr__", [](const Measurement& m) {
         const pipeline::Result& r = m.result;
         if (r.failure) return fmt::format("<Result: refused, {}>", code(r.failure->reason));

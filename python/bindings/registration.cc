@@ -3,7 +3,7 @@
 #include <variant>
 
 #include "arrays.h"
-#include "helicarm/case_registration/dicom_registrations.h"
+#include "helicarm/case_registration/dicom_measurements.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -38,9 +38,10 @@ py::object register_models(const std::filesystem::path& folder,
         })
         .and_then([&](case_registration::CaseRegistration made) {
           auto written = out ? case_registration::write_registration(made, *out) : Expected<void>{};
-          if (written && dicom)
-            written =
-                case_registration::write_dicom_registrations(the_case, made, *out).map([](const auto&) {});
+          if (written && dicom && !made.failure)
+            written = case_registration::write_dicom_results(
+                          the_case, {case_registration::with_models({}, made), made}, *out, *out)
+                          .map([](const auto&) {});
           return written.map([&] { return std::move(made); });
         });
   }));
@@ -202,10 +203,12 @@ void add_registration(py::module_& module) {
       "(6 x 6: rotation vector, rad, then translation, mm, world axes, about centre_mm), decision, "
       "warnings,\n"
       "points and tunnels of its plan. World: the calibrator's frame, or that of the views' cameras.\n\n"
-      "out: folder for registration.json, report.html and overlays, or None. dicom: also\n"
-      "MODEL_registration.dcm, a DICOM Spatial Registration with the patient and study of the CT (a folder "
-      "of a\n"
-      "DICOM series). method, motion_sigma_mm,\n"
+      "out: folder for registration.json, report.html and overlays, or None. dicom: also measurements.dcm, "
+      "a\n"
+      "DICOM measurement report with the patient and study of the X-ray images, and MODEL_registration.dcm, "
+      "a\n"
+      "DICOM Spatial Registration with those of the CT (a folder of a DICOM series). method, "
+      "motion_sigma_mm,\n"
       "history: as run_case, the history is only read. max_error_mm: refuse where a point of the model or "
       "its\n"
       "plan may be off by more (95 %). search_mm, search_deg: searched about each start, per axis. threads: "

@@ -48,7 +48,8 @@ void forget_registration(const fs::path& folder) {
   forget_files(folder, overlays_of(folder / "registration.json"));
   // The file that names the overlays last: an interrupted removal can be repeated.
   forget_files(folder, {"report.html", "registration.csv", "relative.csv", "bodies.csv", "smoothed.csv",
-                        "smoothed.seq.mha", "frames.jsonl", "sequence.json", "registration.json"});
+                        "smoothed.seq.mha", "frames.jsonl", "sequence.json", dicom_measurements_name,
+                        "registration.json"});
 }
 
 void forget_results(const fs::path& folder) {

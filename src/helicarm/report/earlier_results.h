@@ -11,6 +11,9 @@ namespace helicarm::report {
 /// File name of a model's DICOM registration; `index` among the models.
 std::string dicom_registration_name(const std::string& model, std::size_t index);
 
+/// File name of a DICOM measurement report.
+inline constexpr const char* dicom_measurements_name = "measurements.dcm";
+
 /// All files of `run` in this folder, also those of a run with models; overlays by the names of the views in
 /// the result that it holds.
 void forget_results(const std::filesystem::path& folder);

@@ -10,6 +10,8 @@
 
 namespace helicarm::xray {
 
+struct DicomElements;
+
 /// The patient and study of a DICOM file, for images that shall be stored with it. Never printed or logged.
 struct PatientStudy {
   std::map<std::uint32_t, std::string> elements;  ///< Patient and General Study modules, by number
@@ -18,5 +20,7 @@ struct PatientStudy {
 
 /// Fails as `read_dicom`; refuses not_an_image for files that are not DICOM.
 Expected<PatientStudy> read_patient_study(const std::filesystem::path& file);
+
+PatientStudy patient_study_in(const DicomElements& elements);
 
 }  // namespace helicarm::xray

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
-#include <memory>
 #include <vector>
 
 #include <Eigen/LU>
@@ -14,11 +12,9 @@
 #include <fmt/ranges.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/core/private_files.h"
+#include "helicarm/xray/dataset_writing.h"
 #include "helicarm/xray/dicom_check.h"
 #include "helicarm/xray/dicom_tags.h"
-#include "helicarm/xray/dicom_time.h"
-#include "helicarm/xray/uid.h"
 
 namespace helicarm::xray {
 namespace {
@@ -30,26 +26,9 @@ std::optional<CtFrame> ct_frame_in(const std::filesystem::path& file) {
   if (!bytes || !looks_like_dicom(*bytes)) return std::nullopt;
   const auto elements = walk_dicom(*bytes, file.string());
   if (!elements || elements->text(tags::sop_class) != ct_class) return std::nullopt;
-  CtFrame frame{std::string(elements->text(tags::frame_of_reference)), {}};
+  CtFrame frame{std::string(elements->text(tags::frame_of_reference)), patient_study_in(*elements)};
   if (frame.frame_of_reference_uid.empty()) return std::nullopt;
-  for (const DicomTag tag : tags::patient_study)
-    if (const std::string_view value = elements->text(tag); !value.empty())
-      frame.patient_study.elements.emplace(tag.number, value);
-  frame.patient_study.sop_class_uid = elements->text(tags::sop_class);
-  frame.patient_study.sop_instance_uid = elements->text(tags::sop_instance);
   return frame;
-}
-
-void put_in(DcmItem& item, const DcmTagKey& tag, const std::string& value) {
-  if (item.putAndInsertString(tag, value.c_str()).bad())
-    throw BadInput(Reason::cannot_write, fmt::format("DICOM: {} cannot be stored", tag.toString().c_str()));
-}
-
-DcmItem& item_in(DcmItem& item, const DcmTagKey& sequence, signed long at = 0) {
-  DcmItem* made = nullptr;
-  if (item.findOrCreateSequenceItem(sequence, made, at).bad())
-    throw BadInput(Reason::cannot_write, "DICOM: a sequence cannot be stored");
-  return *made;
 }
 
 /// A DS has at most sixteen characters.
@@ -78,34 +57,18 @@ void check_rigid(const SpatialRegistration& registration) {
 }
 
 void put_registration(DcmDataset& dataset, const SpatialRegistration& registration) {
-  const std::string content = text_key(fmt::format(
-      "{} {} {} {}", registration.ct.patient_study.sop_instance_uid, registration.frame_of_reference_uid,
-      decimals_of(registration.frame_from_ct), registration.description));
-  const std::string now = dicom_date_time(double(std::time(nullptr)));
-  put_in(dataset, DCM_SpecificCharacterSet, "ISO_IR 192");
-  put_in(dataset, DCM_SOPClassUID, UID_SpatialRegistrationStorage);
-  put_in(dataset, DCM_SOPInstanceUID, uid_of(content));
-  put_in(dataset, DCM_SeriesInstanceUID, uid_of(text_key(content + " series")));
-  put_in(dataset, DCM_Modality, "REG");
-  put_in(dataset, DCM_SeriesNumber, "1");
-  put_in(dataset, DCM_InstanceNumber, "1");
-  put_in(dataset, DCM_Manufacturer, "helicarm");
-  put_in(dataset, DCM_SoftwareVersions, HELICARM_VERSION);
-  put_in(dataset, DCM_SeriesDescription, registration.description);
-  put_in(dataset, DCM_ContentDate, now.substr(0, 8));
-  put_in(dataset, DCM_ContentTime, now.substr(8, 6));
+  const std::string description = own_text(registration.ct.patient_study, registration.description);
+  put_object(dataset, UID_SpatialRegistrationStorage, "REG",
+             fmt::format("{} {} {} {}", registration.ct.patient_study.sop_instance_uid,
+                         registration.frame_of_reference_uid, decimals_of(registration.frame_from_ct),
+                         registration.description),
+             registration.ct.patient_study);
+  put_in(dataset, DCM_SeriesDescription, description);
   put_in(dataset, DCM_ContentLabel, "REGISTRATION");
-  put_in(dataset, DCM_ContentDescription, registration.description);
+  put_in(dataset, DCM_ContentDescription, description);
   put_in(dataset, DCM_FrameOfReferenceUID, registration.frame_of_reference_uid);
-  for (const auto& [number, value] : registration.ct.patient_study.elements)
-    put_in(dataset, {static_cast<Uint16>(number >> 16), static_cast<Uint16>(number & 0xFFFF)}, value);
-  for (const DcmTagKey& tag :
-       {DCM_PatientName, DCM_PatientID, DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyDate, DCM_StudyTime,
-        DCM_StudyID, DCM_AccessionNumber, DCM_ReferringPhysicianName, DCM_ContentCreatorName,
-        DCM_PositionReferenceIndicator, DCM_Laterality})
-    if (!dataset.tagExists(tag)) dataset.insertEmptyElement(tag);
-  if (!dataset.tagExists(DCM_StudyInstanceUID))
-    put_in(dataset, DCM_StudyInstanceUID, uid_of(text_key(content + " study")));
+  for (const DcmTagKey& tag : {DCM_ContentCreatorName, DCM_PositionReferenceIndicator, DCM_Laterality})
+    dataset.insertEmptyElement(tag);
   put_frame(dataset, 0, registration.ct.frame_of_reference_uid, registration.frame_from_ct);
   put_frame(dataset, 1, registration.frame_of_reference_uid,
             {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
@@ -133,13 +96,7 @@ Expected<void> write_spatial_registration(const std::filesystem::path& path,
     check_rigid(registration);
     DcmFileFormat file;
     put_registration(*file.getDataset(), registration);
-    value_or_throw(write_file_with(path, [&](const std::filesystem::path& aside) -> Expected<void> {
-      if (auto created = make_private_file(aside); !created) return created;
-      const OFCondition status = file.saveFile(aside.c_str(), EXS_LittleEndianExplicit);
-      if (status.good()) return {};
-      return fail(Reason::cannot_write,
-                  fmt::format("{}: cannot be written: {}", path.string(), status.text()));
-    }));
+    value_or_throw(save_private(path, file));
   });
 }
 

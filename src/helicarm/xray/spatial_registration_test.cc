@@ -8,6 +8,7 @@
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/xray/dicom_builder.h"
 #include "helicarm/xray/dicom_tags.h"
+#include "helicarm/xray/validated_test.h"
 
 namespace helicarm::xray {
 namespace spatial_registration_test {
@@ -60,6 +61,16 @@ TEST(SpatialRegistration, CarriesTheCtsFrameIntoTheOther) {
   const auto numbers = matrices[0].numbers({0x300600C6, "Matrix"}, 16, -1e6, 1e6);
   ASSERT_TRUE(numbers);
   for (std::size_t i = 0; i < 16; ++i) EXPECT_NEAR((*numbers)[i], quarter_turn[i], 1e-9);
+}
+
+TEST(SpatialRegistration, ConformsToTheStandard) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_file(folder.path() / "ct" / "1.dcm", ct_slice().bytes()));
+  const auto frame = ct_frame_of(folder.path() / "ct");
+  written({**frame, "1.2.3.7", quarter_turn, "femur to calibrator"}, folder.path() / "reg.dcm");
+  const auto errors = validated(folder.path() / "reg.dcm");
+  if (!errors) GTEST_SKIP() << "dciodvfy (dicom3tools) is not installed";
+  EXPECT_EQ(*errors, "");
 }
 
 TEST(SpatialRegistration, TheSameContentHasTheSameUid) {

@@ -2,8 +2,6 @@
 #include "helicarm/xray/write_dicom.h"
 
 #include <cmath>
-#include <cstdlib>
-#include <sstream>
 
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dctk.h>
@@ -17,6 +15,7 @@
 #include "helicarm/xray/read_dicom.h"
 #include "helicarm/xray/read_xray_image.h"
 #include "helicarm/xray/uid.h"
+#include "helicarm/xray/validated_test.h"
 
 namespace helicarm::xray {
 namespace {
@@ -79,18 +78,6 @@ TEST_F(WriteDicom, ImageOutsideTheLimitsIsRefused) {
   EXPECT_EQ(write_dicom(folder_ / "a.dcm", image).error().reason, Reason::bad_value);
   EXPECT_EQ(write_dicom(folder_ / "a.dcm", DerivedImage{}).error().reason, Reason::bad_size);
   EXPECT_TRUE(fs::is_empty(folder_));
-}
-
-/// Lines with an error of dicom3tools' validator; nothing where it is not installed.
-std::optional<std::string> validated(const fs::path& file) {
-  if (std::system("command -v dciodvfy >/dev/null 2>&1") != 0) return {};
-  const std::string log = file.string() + ".log";
-  if (std::system(fmt::format("dciodvfy '{}' >'{}' 2>&1", file.string(), log).c_str()) == -1) return {};
-  std::istringstream lines(*read_file(log, 1 << 20));
-  std::string errors;
-  for (std::string line; std::getline(lines, line);)
-    if (line.starts_with("Error")) errors += line + '\n';
-  return errors;
 }
 
 TEST_F(WriteDicom, FilesConformToTheStandard) {
