@@ -121,6 +121,17 @@ class CommandLine(SimulatedCase):
         self.assertEqual([line.split(",")[:3] for line in lines[1:]], [["broken", "failed", "bad_json"], ["case", "ok", ""]])
         self.assertTrue((self.root / "both/case/report.html").exists())
 
+    def test_export_states_the_pixel_spacing_of_an_object(self):
+        out = self.root / "spacing"
+        done = run("export", self.root / "case", "--out", out, "--as", "images", "--at", "T1")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("helicarm: AP: T1 lies ", done.stderr)
+        self.assertIn(b"GEOMETRY", (out / "AP_rectified.dcm").read_bytes())
+        done = run("export", self.root / "case", "--out", out, "--at", "elsewhere")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("there are: T1, ", done.stderr)
+        self.assertEqual(run("export", self.root / "case", "--out", out, "--as", "csv", "--at", "T1").returncode, 2)
+
     def test_run_writes_a_dicom_measurement_report(self):
         out = self.root / "dicom"
         done = run("run", self.root / "case", "--out", out, "--dicom", "--no-report")

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "command_line.h"
+#include "helicarm/case_registration/measured_object.h"
 #include "helicarm/case_registration/register_fields.h"
 #include "helicarm/core/json.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -17,7 +19,8 @@ namespace helicarm::cli {
 
 struct ExportArguments {
   RunArguments run = {.folder = {}, .out = "helicarm-export"};
-  std::vector<std::string> as;  ///< of `export_words`; empty: all
+  std::vector<std::string> as;    ///< of `export_words`; empty: all
+  std::optional<std::string> at;  ///< object of the images' pixel spacing
 };
 
 namespace {
@@ -26,6 +29,15 @@ std::vector<report::Export> exports_named(const std::vector<std::string>& words)
   auto kinds = report::exports_named(words);
   if (!kinds) throw BadInput(kinds.error().reason, "--" + kinds.error().message);
   return *std::move(kinds);
+}
+
+void print_spacings(const pipeline::Result& result, const report::SpacingObject& object, Console& console) {
+  if (console.quiet) return;
+  for (const auto& [view, at] : value_or_throw(report::spacings_at(result, object)))
+    console.progress << fmt::format(
+        "helicarm: {}: {} lies {:.1f} mm from the source: pixel spacing {:.5f} x {:.5f} mm, sigma {:.2g} %\n",
+        result.views[view].name, object.name, at.source_object_mm, at.pixel_mm.x(), at.pixel_mm.y(),
+        100 * at.relative_sigma);
 }
 
 }  // namespace
@@ -41,8 +53,15 @@ CommandResult export_command(const ExportArguments& arguments, Console& console)
           Reason::usage,
           fmt::format("{}: holds a result; give the folder of the case instead, which is then measured again",
                       folder.string()));
-    const pipeline::Result result = value_or_throw(measured_case(arguments.run, console)).result;
-    const auto written = value_or_throw(report::write_exports(result, arguments.run.out, kinds));
+    if (arguments.at && std::ranges::find(kinds, report::Export::images) == kinds.end())
+      throw BadInput(Reason::usage, "--at is of the rectified images: --as lacks images");
+    const case_registration::Measurement measured = value_or_throw(measured_case(arguments.run, console));
+    const pipeline::Result& result = measured.result;
+    std::optional<report::SpacingObject> object;
+    if (arguments.at && !result.failure)
+      object = value_or_throw(case_registration::object_named(measured, *arguments.at));
+    const auto written = value_or_throw(report::write_exports(result, arguments.run.out, kinds, object));
+    if (object) print_spacings(result, *object, console);
     if (console.json) {
       Json files = Json::array();
       for (const auto& path : written) files.push_back(path.string());
@@ -57,7 +76,8 @@ void add_export(CLI::App& app, Action& action) {
   auto* command =
       add_command(app, group::images, "export", "Measure a case and write the result for other programs",
                   "helicarm export my-case --out exported\n"
-                  "  helicarm export my-case --out exported --as csv,slicer");
+                  "  helicarm export my-case --out exported --as csv,slicer\n"
+                  "  helicarm export my-case --out exported --as images --at femur");
   auto& a = arguments_of(command, action, export_command);
   command->add_option("CASE", a.run.folder, "Folder that holds case.json")->required();
   command->add_option("--out", a.run.out, "Folder for the files")->capture_default_str();
@@ -70,6 +90,10 @@ void add_export(CLI::App& app, Action& action) {
               fmt::join(report::export_words, ", "), fmt::join(report::requested_words, ", ")))
       ->type_name("WORD")
       ->delimiter(',');
+  command->add_option(
+      "--at", a.at,
+      "A located point, planned point or model: the rectified images have the Pixel Spacing of its depth, "
+      "with magnification and distances, for measurements in other viewers");
   add_run_options(command, a.run, "The C-arm's history (JSON), read only");
   add_fields(command, a.run.options.search, case_registration::search_fields);
 }

@@ -2,7 +2,7 @@
 #include "helicarm/core/files.h"
 
 #include "arrays.h"
-#include "helicarm/case_registration/measure_case.h"
+#include "helicarm/case_registration/measured_object.h"
 #include "helicarm/core/private_files.h"
 #include "helicarm/operation/schemas.h"
 #include "helicarm/pipeline/case_bundle.h"
@@ -17,11 +17,16 @@ using NamedPaths = std::map<std::string, std::filesystem::path>;
 
 std::vector<std::string> exported(const case_registration::Measurement& measured,
                                   const std::filesystem::path& folder,
-                                  const std::optional<std::vector<std::string>>& as) {
+                                  const std::optional<std::vector<std::string>>& as,
+                                  const std::optional<std::string>& at) {
   const auto kinds = value_or_raise(report::exports_named(as.value_or(std::vector<std::string>{})));
   report::forget_exports(folder);
-  const auto written =
-      value_or_raise(without_gil([&] { return report::write_exports(measured.result, folder, kinds); }));
+  if (at && std::ranges::find(kinds, report::Export::images) == kinds.end())
+    raise({Reason::usage, "at is of the rectified images: as_ lacks images", {}, {}});
+  std::optional<report::SpacingObject> object;
+  if (at && !measured.result.failure) object = value_or_raise(case_registration::object_named(measured, *at));
+  const auto written = value_or_raise(
+      without_gil([&] { return report::write_exports(measured.result, folder, kinds, object); }));
   std::vector<std::string> files;
   for (const auto& path : written) files.push_back(path.string());
   return files;

@@ -162,12 +162,13 @@ def _track_rotation(self, body):
     return rotation_of(poses)
 
 
-def _export(self, folder, as_=None):
-    """Files for other programs, as `helicarm export` writes them: as_ lists the formats, None: the usual ones.
+def _export(self, folder, as_=None, at=None):
+    """Files for other programs, as `helicarm export` writes them: as_ lists the formats, None: the usual ones. at: a located
+    point, planned point or model, whose depth gives the rectified images their Pixel Spacing.
 
     Returns the paths. Raises InputError: usage, name_clash, cannot_write; RefusedError where the result is refused.
     """
-    return _c._export(self, folder, as_)
+    return _c._export(self, folder, as_, at)
 
 
 class Snapshot:

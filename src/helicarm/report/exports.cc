@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <string>
@@ -13,6 +14,7 @@
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
+#include "helicarm/measures/object_plane.h"
 #include "helicarm/rectification/rectified_dicom.h"
 #include "helicarm/report/camera_exports.h"
 #include "helicarm/report/overlay.h"
@@ -202,17 +204,27 @@ bool is_exported(const std::filesystem::path& file) {
 
 /// NAME_rectified.dcm for each calibrated view: the pixels that its projection refers to.
 std::map<std::string, xray::DerivedImage> images_of(const pipeline::Result& result,
-                                                    std::span<const Export> kinds) {
+                                                    std::span<const Export> kinds,
+                                                    const std::optional<SpacingObject>& object) {
   std::map<std::string, xray::DerivedImage> images;
   if (std::ranges::find(kinds, Export::images) == kinds.end()) return images;
+  const auto spacings =
+      object ? value_or_throw(spacings_at(result, *object)) : std::map<std::size_t, xray::ObjectSpacing>();
   for (std::size_t i = 0; i < result.views.size(); ++i) {
     const pipeline::ViewResult& view = result.views[i];
     if (!view.calibrated || !view.xray_image || !view.rectification) continue;
     const std::string name = file_stem(view.name, i) + "_rectified.dcm";
-    if (!images
-             .emplace(name,
-                      rectification::rectified_dicom(*view.xray_image, view.rectification->map, "rectified"))
-             .second)
+    std::string done = "rectified";
+    if (object)
+      done += fmt::format(", pixel spacing at {}, {:.3f} mm from the source", object->name,
+                          spacings.at(i).source_object_mm);
+    xray::DerivedImage image =
+        rectification::rectified_dicom(*view.xray_image, view.rectification->map, std::move(done));
+    if (object) {
+      image.at_object = spacings.at(i);
+      image.series_description = "rectified, calibrated pixel spacing";
+    }
+    if (!images.emplace(name, std::move(image)).second)
       throw BadInput(Reason::name_clash, fmt::format("{}: two views would share this file", name));
   }
   return images;
@@ -238,6 +250,35 @@ Expected<std::vector<Export>> exports_named(const std::vector<std::string>& word
   return kinds;
 }
 
+Expected<std::map<std::size_t, xray::ObjectSpacing>> spacings_at(const pipeline::Result& result,
+                                                                 const SpacingObject& object) {
+  return guarded([&] {
+    std::map<std::size_t, xray::ObjectSpacing> spacings;
+    for (std::size_t i = 0; i < result.views.size(); ++i) {
+      const pipeline::ViewResult& view = result.views[i];
+      if (!view.calibrated) continue;
+      auto plane = measures::plane_through(*view.calibrated, object.at, object.covariance);
+      if (!plane) {
+        plane.error().view = view.name;
+        plane.error().message = fmt::format("{}: {}", object.name, plane.error().message);
+        throw BadInput(plane.error());
+      }
+      const geometry::Intrinsics& k = plane->intrinsics;
+      std::optional<double> source_detector_mm;
+      if (view.rectification && view.rectification->map.rectified_pixel_mm &&
+          view.rectification->map.rectified_plane == rectification::RectifiedPlane::detector)
+        source_detector_mm = std::abs(k.fy) * *view.rectification->map.rectified_pixel_mm;
+      spacings.emplace(
+          i, xray::ObjectSpacing{plane->depth_mm,
+                                 source_detector_mm,
+                                 {plane->depth_mm / std::abs(k.fx), plane->depth_mm / std::abs(k.fy)},
+                                 plane->relative_sigma,
+                                 object.name});
+    }
+    return spacings;
+  });
+}
+
 void forget_exports(const std::filesystem::path& folder) {
   std::vector<std::string> names;
   std::error_code ec;
@@ -249,13 +290,14 @@ void forget_exports(const std::filesystem::path& folder) {
 
 Expected<std::vector<std::filesystem::path>> write_exports(const pipeline::Result& result,
                                                            const std::filesystem::path& folder,
-                                                           std::span<const Export> kinds) {
+                                                           std::span<const Export> kinds,
+                                                           const std::optional<SpacingObject>& object) {
   forget_exports(folder);
   if (result.failure) return tl::unexpected<Failure>(*result.failure);
   std::vector<std::filesystem::path> paths;
   auto written = guarded([&] {
     const Files files = files_of(result, kinds);
-    const auto images = images_of(result, kinds);
+    const auto images = images_of(result, kinds, object);
     for (const auto& [name, text] : files) {
       value_or_throw(write_file(folder / name, text));
       paths.push_back(folder / name);

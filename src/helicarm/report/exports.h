@@ -3,11 +3,15 @@
 
 #include <array>
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "helicarm/pipeline/result.h"
+#include "helicarm/xray/write_dicom.h"
 
 namespace helicarm::report {
 
@@ -50,15 +54,29 @@ inline constexpr std::array<std::string_view, requested_export.size()> requested
 /// The formats with these words; none: `every_export`. Fails with usage for another word.
 Expected<std::vector<Export>> exports_named(const std::vector<std::string>& words);
 
+/// An object at whose depth the Pixel Spacing of rectified images holds.
+struct SpacingObject {
+  std::string name;
+  Eigen::Vector3d at;  ///< calibrator's frame, mm
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
+/// Pixel Spacing at the object's depth in each calibrated view, by the view's index; refuses `behind_source`,
+/// naming the view.
+Expected<std::map<std::size_t, xray::ObjectSpacing>> spacings_at(const pipeline::Result& result,
+                                                                 const SpacingObject& object);
+
 /// Removes the files of an earlier export, recognised by name and content.
 void forget_exports(const std::filesystem::path& folder);
 
 /// Writes the available parts of a result into `folder`, which then holds no file of an earlier export, and
 /// returns the files' paths; all files or none. Refuses with the result's own failure, `point_at_infinity`
 /// for a view without DLT coefficients, `name_clash` if two views would share a file, `cannot_write`; where
-/// not all formats are written, also what RTK cannot represent (`unsupported`, `behind_source`).
+/// not all formats are written, also what RTK cannot represent (`unsupported`, `behind_source`). `object`:
+/// the rectified images have the Pixel Spacing of its depth; refuses as `spacings_at`.
 Expected<std::vector<std::filesystem::path>> write_exports(const pipeline::Result& result,
                                                            const std::filesystem::path& folder,
-                                                           std::span<const Export> kinds = every_export);
+                                                           std::span<const Export> kinds = every_export,
+                                                           const std::optional<SpacingObject>& object = {});
 
 }  // namespace helicarm::report

@@ -12,6 +12,8 @@
 #include "helicarm/core/json.h"
 #include "helicarm/exchange/import_matrix.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/xray/dicom_elements.h"
+#include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::report {
@@ -91,6 +93,51 @@ TEST_F(Exports, RectifiedImagesAreOfTheViews) {
   ASSERT_TRUE(image) << image.error().message;
   EXPECT_EQ(image->pixels.width(), 64);
   EXPECT_EQ(image->acquisition.pixel_mm, std::optional(Eigen::Vector2d(0.25, 0.25)));
+}
+
+TEST_F(Exports, PixelSpacingMeasuresLengthsAtTheObjectsDepth) {
+  const SpacingObject object{"FS", {20, -10, 30}};
+  const auto spacings = spacings_at(result_, object);
+  ASSERT_TRUE(spacings) << spacings.error().message;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const geometry::View& view = result_.views[i].calibrated->view;
+    const Eigen::Matrix3d to_world = view.camera_from_world.rotation.transpose();
+    const Eigen::Vector2d at = view.project(object.at);
+    // Along the image's rows a skew would turn the direction, not the length along u.
+    const Eigen::Vector2d right = view.project(object.at + to_world * Eigen::Vector3d(10, 0, 0));
+    const Eigen::Vector2d down = view.project(object.at + to_world * Eigen::Vector3d(0, 10, 0));
+    EXPECT_NEAR(std::abs(right.x() - at.x()) * spacings->at(i).pixel_mm.x(), 10, 1e-9);
+    EXPECT_NEAR(std::abs(down.y() - at.y()) * spacings->at(i).pixel_mm.y(), 10, 1e-9);
+  }
+}
+
+TEST_F(Exports, RectifiedImagesStateTheSpacingOfAnObject) {
+  for (pipeline::ViewResult& view : result_.views) {
+    view.rectification.emplace();
+    view.rectification->map = rectification::identity_map(64, 48, 0.25);
+  }
+  const std::array only{Export::images};
+  const SpacingObject object{"Knie, \xC3\xBC\\" + std::string(80, 'x'), {20, -10, 30}};
+  ASSERT_TRUE(write_exports(result_, folder_, only, object));
+  const std::string bytes = text("AP_rectified.dcm");
+  const auto elements = xray::walk_dicom(bytes, "AP").value();
+  const auto at = spacings_at(result_, object)->at(0);
+  const auto spacing = elements.numbers(xray::tags::pixel_spacing, 2, 0, 10);
+  ASSERT_TRUE(spacing);
+  EXPECT_NEAR((*spacing)[1], at.pixel_mm.x(), 1e-9);
+  EXPECT_NEAR((*spacing)[0], at.pixel_mm.y(), 1e-9);
+  EXPECT_EQ(elements.text({0x00280A02, ""}), "GEOMETRY");
+  EXPECT_LE(elements.text({0x00280A04, ""}).size(), 64U);
+  const auto magnification = elements.numbers({0x00181114, ""}, 1, 0, 10);
+  ASSERT_TRUE(magnification);
+  EXPECT_NEAR((*magnification)[0] * (*spacing)[0], 0.25, 1e-8);  // of the detector
+  EXPECT_NEAR((*elements.numbers(xray::tags::source_patient, 1, 0, 1e4))[0], at.source_object_mm, 1e-6);
+}
+
+TEST_F(Exports, AnObjectBehindTheSourceIsRefused) {
+  const auto spacings = spacings_at(result_, {"behind", {0, 0, -5000}});
+  EXPECT_EQ(spacings.error().reason, Reason::behind_source);
+  EXPECT_EQ(spacings.error().view, "AP");
 }
 
 TEST_F(Exports, MayaCamReadsBackToTheLastBit) {

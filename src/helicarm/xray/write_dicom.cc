@@ -69,6 +69,15 @@ SopClass class_of(const DerivedImage& image) {
   return *found;
 }
 
+/// The first `most` bytes of a text in UTF-8, without a character that would be cut, nor a backslash.
+std::string whole_characters(std::string text, std::size_t most) {
+  std::ranges::replace(text, '\\', '/');
+  if (text.size() <= most) return text;
+  std::size_t end = most;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
+  return text.substr(0, end);
+}
+
 DcmTagKey key_of(std::uint32_t number) {
   return {static_cast<Uint16>(number >> 16), static_cast<Uint16>(number & 0xFFFF)};
 }
@@ -167,13 +176,35 @@ void put_intensity(DcmDataset& dataset, const DerivedImage& image) {
   if (logarithmic.value_or(false)) put_dose_table(dataset, image);
 }
 
+/// PS3.3 10.7: the spacing accounts for a known magnification (GEOMETRY).
+void put_object_spacing(DcmDataset& dataset, const ObjectSpacing& at) {
+  put(dataset, DCM_PixelSpacing, fmt::format("{}\\{}", decimal(at.pixel_mm.y()), decimal(at.pixel_mm.x())));
+  put(dataset, DCM_PixelSpacingCalibrationType, "GEOMETRY");
+  const std::string figures =
+      fmt::format("{:.1f} mm from the source, sigma {:.2g} %", at.source_object_mm, 100 * at.relative_sigma);
+  constexpr std::size_t most = 64;
+  const std::string_view separator = at.object.empty() ? "" : ": ";
+  put(dataset, DCM_PixelSpacingCalibrationDescription,
+      fmt::format("{}{}{}", whole_characters(at.object, most - separator.size() - figures.size()), separator,
+                  figures));
+  put(dataset, DCM_DistanceSourceToPatient, decimal(at.source_object_mm));
+  if (!at.source_detector_mm) return;
+  put(dataset, DCM_DistanceSourceToDetector, decimal(*at.source_detector_mm));
+  put(dataset, DCM_EstimatedRadiographicMagnificationFactor,
+      decimal(*at.source_detector_mm / at.source_object_mm));
+}
+
 void put_acquisition(DcmDataset& dataset, const DerivedImage& image, const SopClass& sop_class) {
   const Acquisition& a = image.acquisition;
   if (a.pixel_mm)
     put(dataset, DCM_ImagerPixelSpacing,
         fmt::format("{}\\{}", decimal(a.pixel_mm->y()), decimal(a.pixel_mm->x())));
-  if (a.source_detector_mm) put(dataset, DCM_DistanceSourceToDetector, decimal(*a.source_detector_mm));
-  if (a.source_patient_mm) put(dataset, DCM_DistanceSourceToPatient, decimal(*a.source_patient_mm));
+  if (image.at_object)
+    put_object_spacing(dataset, *image.at_object);
+  else {
+    if (a.source_detector_mm) put(dataset, DCM_DistanceSourceToDetector, decimal(*a.source_detector_mm));
+    if (a.source_patient_mm) put(dataset, DCM_DistanceSourceToPatient, decimal(*a.source_patient_mm));
+  }
   if (a.acquired) put(dataset, DCM_AcquisitionDateTime, dicom_date_time(a.acquired->seconds));
   if (sop_class.modality == "CR") return;
   if (a.flip_hint) put(dataset, DCM_FieldOfViewHorizontalFlip, "YES");

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "helicarm/core/failure.h"
@@ -14,6 +15,15 @@ namespace helicarm::xray {
 
 /// Three decades, where the range of a logarithmic image is not known.
 inline constexpr double nominal_log_range = 6.908;
+
+/// Pixel Spacing at the depth of an object, from a calibration.
+struct ObjectSpacing {
+  double source_object_mm;                   ///< along the central ray
+  std::optional<double> source_detector_mm;  ///< nothing: the detector's pixel size is not known
+  Eigen::Vector2d pixel_mm;                  ///< in the object's plane; x: column spacing, y: row spacing
+  double relative_sigma = 0;                 ///< of pixel_mm
+  std::string object = {};                   ///< its name
+};
 
 /// An image to be written as DICOM: XA, or RF, CR or DX by `acquisition.modality`. Contains no patient data
 /// except the fields below.
@@ -35,6 +45,9 @@ struct DerivedImage {
   std::optional<PatientStudy> patient_study = {};
   /// Of a logarithmic image: natural logarithm of the ratio of dose between the highest and the lowest value.
   double log_range = nominal_log_range;
+  /// Written in place of the source's distances: their modules' attributes, Pixel Spacing and the
+  /// magnification.
+  std::optional<ObjectSpacing> at_object = {};
   bool rle = false;  ///< RLE lossless instead of uncompressed
 };
 

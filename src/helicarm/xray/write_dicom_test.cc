@@ -92,6 +92,7 @@ TEST_F(WriteDicom, FilesConformToTheStandard) {
         image.acquisition.primary_angle_deg = 30;
         image.acquisition.logarithmic = logarithmic;
         if (image.acquisition.modality == "DX") image.acquisition.technique[0x00200020] = "L\\F";
+        if (derived) image.at_object = ObjectSpacing{700, 1000, {0.14, 0.21}, 0.0005, "femur"};
         if (derived) image.derivation = "rectified";
         if (derived) image.source_instance_uid = make_uid();
         ASSERT_TRUE(write_dicom(folder_ / "a.dcm", image));
