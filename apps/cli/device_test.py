@@ -5,11 +5,30 @@
 import json
 import pathlib
 import signal
+import socket
 import subprocess
 import tempfile
 import unittest
 
-from program import PROGRAM, run
+from program import PROGRAM, SimulatedCase, run
+
+
+class Send(SimulatedCase):
+    def test_images_and_cameras_of_a_case_reach_each_client(self):
+        sender = subprocess.Popen([PROGRAM, "tracker", "send", self.root / "case", "--seconds", "60", "--json"], text=True,
+                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.addCleanup(sender.communicate)
+        self.addCleanup(sender.kill)
+        port = next(line for line in sender.stderr if " port " in line).split()[-1]
+        with socket.create_connection(("127.0.0.1", int(port)), 30) as client, client.makefile("rb") as stream:
+            names = []
+            for _ in range(4):
+                header = stream.read(58)
+                names.append(tuple(part.rstrip(b"\0").decode() for part in (header[2:14], header[14:34])))
+                stream.read(int.from_bytes(header[42:50], "big"))
+        self.assertEqual(names, [("IMAGE", "AP"), ("TRANSFORM", "AP_camera"), ("IMAGE", "LAT"), ("TRANSFORM", "LAT_camera")])
+        sender.terminate()
+        self.assertEqual(sender.wait(timeout=30), 0)
 
 
 class Tracker(unittest.TestCase):

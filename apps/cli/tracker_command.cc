@@ -20,6 +20,7 @@
 #include "helicarm/geometry/view_json.h"
 #include "mount_command.h"
 #include "stop_signal.h"
+#include "tracker_send.h"
 
 namespace helicarm::cli {
 namespace {
@@ -271,6 +272,7 @@ void add_tracker(CLI::App& app, Action& action) {
       "tool=8700449.rom\n"
       "  helicarm tracker record 127.0.0.1:18944 poses.mha --seconds 20\n"
       "  helicarm tracker replay poses.mha --port 18944\n"
+      "  helicarm tracker send my-case --port 18944\n"
       "  helicarm tracker pivot poses.mha --tool PointerToTracker\n"
       "  helicarm tracker calibrate-mount 127.0.0.1:18944 --facet calibrator --tip tip.json --touch "
       "P1,P1,P1,P4,P4,P4,P8,P8,P8,P11,P11,P11");
@@ -301,6 +303,7 @@ void add_tracker(CLI::App& app, Action& action) {
   auto& turned = arguments_of(pivot, action, tracker_pivot_command);
   pivot->add_option("FILE", turned.file, "A MetaImage sequence file")->required();
   pivot->add_option("--tool", turned.tool, "The pointer's name in the file")->required();
+  add_tracker_send(tracker, action);
   add_calibrate_mount(tracker, action);
 }
 
