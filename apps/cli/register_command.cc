@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <sstream>
 #include <string>
@@ -22,11 +23,13 @@
 #include "measuring.h"
 #include "progress_line.h"
 #include "resumed_sequence.h"
+#include "several_cases.h"
 
 namespace helicarm::cli {
 
 /// `helicarm register CASE --out DIR [--frames A-B[:STEP]]`.
 struct RegisterArguments {
+  SeveralCases several = {};
   RunArguments run = {.folder = {}, .out = "registration"};  ///< the C-arm's history is only read
   std::string frames;                                        ///< A-B[:STEP]; empty: one image per view
   bool resume = false;                                       ///< of a sequence
@@ -64,9 +67,18 @@ void print(const RegisteredModel& model, std::ostream& out) {
     out << report::text_of(report::without_empty_columns(in_bone));
 }
 
+constexpr std::initializer_list<const char*> register_columns{"status",   "code",   "message", "frames",
+                                                              "accepted", "warned", "refused", "warnings"};
+
+std::string line_of_register(const CaseRow& row) {
+  return fmt::format("{:.0f} accepted, {:.0f} warned, {:.0f} refused, {:.0f} warnings",
+                     row.figures[1].value_or(0), row.figures[2].value_or(0), row.figures[3].value_or(0),
+                     row.figures[4].value_or(0));
+}
+
 /// Every model through a sequence of images.
-void follow(const RegisterArguments& arguments, const case_registration::RegisterOptions& options,
-            const case_registration::Progress& steps, Console& console) {
+CaseRow follow(const RegisterArguments& arguments, const case_registration::RegisterOptions& options,
+               const case_registration::Progress& steps, Console& console) {
   const auto range = value_or_throw(case_registration::frame_range_from(arguments.frames));
   const auto the_case =
       value_or_throw(pipeline::read_case(arguments.run.folder, pipeline::Purpose::registration));
@@ -104,7 +116,26 @@ void follow(const RegisterArguments& arguments, const case_registration::Registe
     console.out << fmt::format("  {} frames in {:.1f} s\n\n  written to {}\n", sequence.frames.size(),
                                sequence.seconds, arguments.run.out.string());
   }
-  if (const auto refusal = sequence.refusal()) throw BadInput(*refusal);
+  CaseRow row{
+      {}, sequence.refusal(), {double(sequence.frames.size()), 0, 0, 0, double(sequence.warnings.size())}};
+  for (const Json& model : summary["models"]) {
+    *row.figures[1] += model.at("accepted").get<double>();
+    *row.figures[2] += model.at("warned").get<double>();
+    *row.figures[3] += model.at("refused").get<double>();
+  }
+  return row;
+}
+
+CaseRow row_of(const case_registration::CaseRegistration& result) {
+  std::array<double, 3> decisions{};
+  double warnings = double(result.warnings.size());
+  std::optional<Failure> failure = result.failure;
+  for (const RegisteredModel& model : result.models) {
+    ++decisions.at(std::size_t(model.registration.decision));
+    warnings += double(model.registration.warnings.size());
+    if (!failure) failure = model.registration.failure;
+  }
+  return {{}, std::move(failure), {std::nullopt, decisions[0], decisions[1], decisions[2], warnings}};
 }
 
 /// Says which frames of an interrupted sequence a new one replaces.
@@ -129,41 +160,63 @@ std::string summary_of(const case_registration::CaseRegistration& registration) 
   return text.str();
 }
 
+namespace {
+
+/// The models of one case. A refusal is in the row.
+CaseRow registered(const RegisterArguments& arguments, Console& console) {
+  const RunArguments& run = arguments.run;
+  name_replaced_frames(arguments, console);
+  if (!arguments.resume) report::forget_registration(run.out);
+  const case_registration::RegisterOptions options = value_or_throw(options_of(run, console));
+  case_registration::Progress progress;
+  if (!console.quiet)
+    progress.step = [&](const std::string& model, std::string_view step) {
+      console.progress << fmt::format("helicarm: {}{}{}\n", model, model.empty() ? "" : ": ", step);
+    };
+  if (!arguments.frames.empty()) return follow(arguments, options, progress, console);
+  const auto the_case = value_or_throw(pipeline::read_case(run.folder, pipeline::Purpose::registration));
+  const auto result = value_or_throw(case_registration::register_case(the_case, options, progress));
+  value_or_throw(case_registration::write_registration(result, run.out));
+  if (run.dicom && !result.failure)
+    write_dicom_files(the_case, {case_registration::with_models({}, result), result}, run.out, run.out,
+                      console);
+  print_warnings(result.warnings, console);
+  for (const RegisteredModel& model : result.models) {
+    print_warnings(model.registration.warnings, console);
+    print_notes(model.registration.notes, console);
+  }
+  if (console.json && !result.refused())
+    console.out << to_text(case_registration::to_json(result)) << '\n';
+  else if (!console.quiet && !console.json) {
+    console.out << summary_of(result) << fmt::format("\n  written to {}\n", run.out.string());
+  }
+  return row_of(result);
+}
+
+}  // namespace
+
 CommandResult register_command(const RegisterArguments& arguments, Console& console) {
+  if (arguments.resume && arguments.frames.empty())
+    return fail(Reason::usage, "--resume is for a sequence: give --frames A-B as well");
+  if (arguments.run.dicom && !arguments.frames.empty())
+    return fail(Reason::usage, "--dicom is for one moment: it cannot be combined with --frames");
+  RegisterArguments one = arguments;
+  if (arguments.several.cases.size() > 1) {
+    const auto one_case = [&](const std::filesystem::path& the_case, const std::filesystem::path& out,
+                              Console& silent) {
+      one.run.folder = the_case;
+      one.run.out = out;
+      return registered(one, silent);
+    };
+    return do_cases(
+        arguments.several,
+        {arguments.run.out, register_columns, one_case, line_of_register, report::forget_registration},
+        console);
+  }
   return guarded([&] {
-    if (arguments.resume && arguments.frames.empty())
-      throw BadInput(Reason::usage, "--resume is for a sequence: give --frames A-B as well");
-    if (arguments.run.dicom && !arguments.frames.empty())
-      throw BadInput(Reason::usage, "--dicom is for one moment: it cannot be combined with --frames");
-    name_replaced_frames(arguments, console);
-    if (!arguments.resume) report::forget_registration(arguments.run.out);
-    const case_registration::RegisterOptions options = value_or_throw(options_of(arguments.run, console));
-    case_registration::Progress progress;
-    if (!console.quiet)
-      progress.step = [&](const std::string& model, std::string_view step) {
-        console.progress << fmt::format("helicarm: {}{}{}\n", model, model.empty() ? "" : ": ", step);
-      };
-    if (!arguments.frames.empty()) return follow(arguments, options, progress, console);
-    const auto the_case =
-        value_or_throw(pipeline::read_case(arguments.run.folder, pipeline::Purpose::registration));
-    const auto result = value_or_throw(case_registration::register_case(the_case, options, progress));
-    value_or_throw(case_registration::write_registration(result, arguments.run.out));
-    if (arguments.run.dicom && !result.failure)
-      write_dicom_files(the_case, {case_registration::with_models({}, result), result}, arguments.run.out,
-                        arguments.run.out, console);
-    print_warnings(result.warnings, console);
-    for (const RegisteredModel& model : result.models) {
-      print_warnings(model.registration.warnings, console);
-      print_notes(model.registration.notes, console);
-    }
-    if (console.json && !result.refused())
-      console.out << to_text(case_registration::to_json(result)) << '\n';
-    else if (!console.quiet && !console.json) {
-      console.out << summary_of(result) << fmt::format("\n  written to {}\n", arguments.run.out.string());
-    }
-    if (result.failure) throw BadInput(*result.failure);
-    for (const RegisteredModel& model : result.models)
-      if (model.registration.failure) throw BadInput(*model.registration.failure);
+    one.run.folder = arguments.several.cases.front();
+    const CaseRow row = registered(one, console);
+    if (row.failure) throw BadInput(*row.failure);
   });
 }
 
@@ -180,7 +233,7 @@ void add_register(CLI::App& app, Action& action) {
                               "Exit code 3: a registration is refused; registration.json holds the figures. "
                               "See docs/registration.md.");
   auto& a = arguments_of(command, action, register_command);
-  command->add_option("CASE", a.run.folder, "Folder that holds case.json")->required();
+  add_cases(command, a.several);
   command->add_option("--out", a.run.out, "Folder for registration.json, report.html and the overlays")
       ->capture_default_str();
   add_run_options(command, a.run, "The C-arm's history (JSON), read only");

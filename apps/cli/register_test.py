@@ -102,6 +102,23 @@ class Register(SimulatedCase):
         self.assertEqual(run("register", folder, "--out", out).returncode, 0)
         self.assertFalse(report.exists())
 
+    def test_several_cases_have_a_folder_each_and_one_table(self):
+        folder, _ = self.case_with_landmarks("one")
+        broken = self.root / "broken"
+        broken.mkdir()
+        (broken / "case.json").write_text("{")
+        out = self.root / "several"
+        done = run("register", broken, folder, "--out", out)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("1 of 2 cases", done.stderr)
+        self.assertIn("one: 1 accepted, 0 warned, 0 refused", done.stderr)
+        lines = (out / "summary.csv").read_text().splitlines()
+        self.assertEqual(lines[0], "case,status,code,message,frames,accepted,warned,refused,warnings")
+        self.assertEqual([line.split(",")[:3] for line in lines[1:]], [["broken", "failed", "bad_json"], ["one", "ok", ""]])
+        self.assertTrue((out / "one/report.html").exists())
+        self.assertEqual(run("register", folder, folder, "--out", out, "--quiet").returncode, 0)
+        self.assertEqual(sorted(path.name for path in out.iterdir()), ["one", "one_2", "summary.csv"])
+
     def test_run_export_and_register_take_the_same_options(self):
         folder, case = self.case_with_landmarks("options")
         case["models"][0]["plan"] = "plan.mrk.json"

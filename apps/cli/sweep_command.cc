@@ -11,11 +11,12 @@
 #include "helicarm/core/json.h"
 #include "helicarm/sweep/sweep.h"
 #include "progress_line.h"
+#include "several_cases.h"
 
 namespace helicarm::cli {
 
 struct SweepArguments {
-  std::filesystem::path folder;  ///< holds case.json
+  SeveralCases several = {};
   std::filesystem::path out = "helicarm-sweep";
   std::string path;   ///< free, smooth; empty: by the images
   std::string check;  ///< FDK; empty: none
@@ -24,10 +25,12 @@ struct SweepArguments {
 };
 namespace {
 
+auto accepted_images(const sweep::Sweep& sweep) {
+  return std::ranges::count_if(sweep.frames, [](const auto& frame) { return frame.best.has_value(); });
+}
+
 std::string summary_of(const sweep::Sweep& sweep) {
-  const auto accepted =
-      std::ranges::count_if(sweep.frames, [](const auto& frame) { return frame.best.has_value(); });
-  std::string text = fmt::format("  {} of {} images accepted\n", accepted, sweep.frames.size());
+  std::string text = fmt::format("  {} of {} images accepted\n", accepted_images(sweep), sweep.frames.size());
   if (!sweep.path) return text;
   const sweep::SweepPath& path = *sweep.path;
   text += fmt::format("  arc {:.1f} degrees, source to axis {:.1f} mm", path.arc_deg, path.source_to_axis_mm);
@@ -64,18 +67,17 @@ std::optional<sweep::CheckOptions> check_options(const SweepArguments& arguments
   return options;
 }
 
-}  // namespace
-
-/// Calibrates every image of a run and writes sweep.json, geometry/ and report.html. A refusal of the run is
-/// also written and then fails with its reason; unusable input leaves no sweep.json.
-CommandResult sweep_command(const SweepArguments& arguments, Console& console) {
+/// Calibrates every image of a run and writes sweep.json, geometry/ and report.html; unusable input leaves no
+/// sweep.json.
+Expected<sweep::Sweep> swept(const SweepArguments& arguments, const std::filesystem::path& folder,
+                             const std::filesystem::path& out, Console& console) {
   return guarded([&] {
-    sweep::forget_sweep(arguments.out);
+    sweep::forget_sweep(out);
     sweep::SweepOptions options;
     if (!arguments.path.empty()) options.path = value_or_throw(sweep::path_kind(arguments.path));
     options.threads = console.threads;
     const auto check = check_options(arguments, console.threads);
-    const auto the_case = value_or_throw(sweep::read_sweep_case(arguments.folder));
+    const auto the_case = value_or_throw(sweep::read_sweep_case(folder));
     sweep::Sweep result = [&] {
       ProgressLine progress(console);
       return value_or_throw(
@@ -86,15 +88,46 @@ CommandResult sweep_command(const SweepArguments& arguments, Console& console) {
       value_or_throw(
           sweep::add_check(result, the_case, *check, [&](double share) { progress.notify(share); }));
     }
-    value_or_throw(sweep::write_sweep(result, arguments.out));
+    value_or_throw(sweep::write_sweep(result, out));
     print_warnings(result.warnings, console);
     if (console.json) {
       console.out << to_text(sweep::to_json(result)) << '\n';
       console.answered = true;
     } else if (!console.quiet) {
       console.out << summary_of(result)
-                  << fmt::format("  {:.1f} s\n\n  written to {}\n", result.seconds, arguments.out.string());
+                  << fmt::format("  {:.1f} s\n\n  written to {}\n", result.seconds, out.string());
     }
+    return result;
+  });
+}
+
+constexpr std::initializer_list<const char*> sweep_columns{"status", "code",     "message",
+                                                           "images", "accepted", "warnings"};
+
+std::string line_of_sweep(const CaseRow& row) {
+  return fmt::format("{:.0f} of {:.0f} images accepted, {:.0f} warnings", row.figures[1].value_or(0),
+                     row.figures[0].value_or(0), row.figures[2].value_or(0));
+}
+
+}  // namespace
+
+/// Of one run or several. A refusal of a run is written and then fails with its reason.
+CommandResult sweep_command(const SweepArguments& arguments, Console& console) {
+  if (arguments.several.cases.size() > 1) {
+    const auto one_case = [&](const std::filesystem::path& the_case, const std::filesystem::path& out,
+                              Console& silent) {
+      const sweep::Sweep result = value_or_throw(swept(arguments, the_case, out, silent));
+      return CaseRow{
+          {},
+          result.failure,
+          {double(result.frames.size()), double(accepted_images(result)), double(result.warnings.size())}};
+    };
+    return do_cases(arguments.several,
+                    {arguments.out, sweep_columns, one_case, line_of_sweep, sweep::forget_sweep}, console);
+  }
+  return guarded([&] {
+    const sweep::Sweep result =
+        value_or_throw(swept(arguments, arguments.several.cases.front(), arguments.out, console));
     if (result.failure) throw BadInput(*result.failure);
   });
 }
@@ -117,7 +150,7 @@ void add_sweep(CLI::App& app, Action& action) {
       "See "
       "docs/sweep.md.");
   auto& a = arguments_of(command, action, sweep_command);
-  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
+  add_cases(command, a.several);
   command->add_option("--out", a.out, "Folder for sweep.json, geometry/ and report.html")
       ->capture_default_str();
   command

@@ -49,6 +49,17 @@ class Sweep(SimulatedCase):
         self.assertEqual(json.loads((out / "sweep.json").read_text())["status"], "refused")
         self.assertFalse((out / "geometry").exists())
 
+    def test_several_runs_have_a_folder_each_and_one_table(self):
+        runs = [self.case_of(name, "all") for name in ("blank-1", "blank-2")]
+        out = self.root / "several"
+        done = run("sweep", *runs, "--out", out, "--share", "word")
+        self.assertEqual(done.returncode, 3)
+        self.assertIn("2 of 2 cases", done.stderr)
+        lines = (out / "summary.csv").read_text().splitlines()
+        self.assertEqual(lines[0], "case,status,code,message,images,accepted,warnings")
+        self.assertEqual([line.split(",")[:2] for line in lines[1:]], [["blank-1", "refused"], ["blank-2", "refused"]])
+        self.assertEqual(json.loads((out / "blank-2/sweep.json").read_text())["status"], "refused")
+
     def test_options_of_a_check_are_refused_before_the_run_is_read(self):
         for options, reason in ((["--check", "ART"], "is not FDK"), (["--wire", "0,0,0;0,0,9"], "require --check FDK"),
                                 (["--check", "FDK", "--wire", "0,0,0"], "is not x,y,z;x,y,z"),

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <filesystem>
 #include <string>
 
@@ -12,11 +13,12 @@
 #include "interruption.h"
 #include "progress_line.h"
 #include "resumed_sequence.h"
+#include "several_cases.h"
 
 namespace helicarm::cli {
 
 struct TrackArguments {
-  std::filesystem::path folder;  ///< holds case.json
+  SeveralCases several = {};
   std::filesystem::path out = "helicarm-track";
   std::string frames;  ///< A-B[:STEP]
   std::filesystem::path axes;
@@ -58,23 +60,21 @@ std::string summary_of(const track::Sequence& sequence, const track::TrackCase& 
   return text;
 }
 
-}  // namespace
-
 /// Follows markers and writes the tables, track.json and report.html. A refusal is written to track.json and
 /// then fails with its reason; unusable input leaves none.
-CommandResult track_command(const TrackArguments& arguments, Console& console) {
+Expected<track::Sequence> tracked(const TrackArguments& arguments, const std::filesystem::path& folder,
+                                  const std::filesystem::path& out, Console& console) {
   return guarded([&] {
-    if (!arguments.resume) track::forget_track(arguments.out);
+    if (!arguments.resume) track::forget_track(out);
     const auto range = value_or_throw(case_registration::frame_range_from(arguments.frames));
     const auto refuse = [&](const Failure& failure) {
       if (exit_code(failure.reason) == 3) {
-        track::forget_track(arguments.out);
-        value_or_throw(
-            write_file(arguments.out / "track.json", to_text(track::refused_json(failure)) + "\n"));
+        track::forget_track(out);
+        value_or_throw(write_file(out / "track.json", to_text(track::refused_json(failure)) + "\n"));
       }
       throw BadInput(failure);
     };
-    auto the_case = track::read_track_case(arguments.folder, range, points_file(arguments));
+    auto the_case = track::read_track_case(folder, range, points_file(arguments));
     if (!the_case) refuse(the_case.error());
     if (!arguments.axes.empty())
       the_case->axes = value_or_throw(track::read_body_axes(arguments.axes, *the_case));
@@ -91,30 +91,59 @@ CommandResult track_command(const TrackArguments& arguments, Console& console) {
     };
     const auto sequence = [&] {
       try {
-        return track::run_track(*the_case, range,
-                                {.out = arguments.out, .resume = arguments.resume, .on_note = noted(console)},
-                                on_frame);
+        return track::run_track(
+            *the_case, range, {.out = out, .resume = arguments.resume, .on_note = noted(console)}, on_frame);
       } catch (const Interruption::Requested&) {
-        console.progress << kept_after_interruption("track", arguments.folder, arguments.frames,
-                                                    arguments.out, followed, range.count())
+        console.progress << kept_after_interruption("track", folder, arguments.frames, out, followed,
+                                                    range.count())
                          << std::flush;
         interruption.end_program();
         throw;
       }
     }();
     if (!sequence) refuse(sequence.error());
-    value_or_throw(track::write_track(*sequence, *the_case, arguments.out));
+    value_or_throw(track::write_track(*sequence, *the_case, out));
     print_warnings(sequence->warnings, console);
     if (console.json)
       console.out << to_text(track::to_json(*sequence, *the_case)) << '\n';
     else if (!console.quiet)
       console.out << summary_of(*sequence, *the_case)
                   << fmt::format("  {:.1f} s, {:.1f} frames/s\n\n  written to {}\n", sequence->seconds,
-                                 double(sequence->frames.size()) / sequence->seconds, arguments.out.string());
-    if (sequence->failure) {
-      console.answered = console.json;
-      throw BadInput(*sequence->failure);
-    }
+                                 double(sequence->frames.size()) / sequence->seconds, out.string());
+    return *sequence;
+  });
+}
+
+constexpr std::initializer_list<const char*> track_columns{"status",   "code",     "message", "frames",
+                                                           "complete", "repaired", "warnings"};
+
+std::string line_of_track(const CaseRow& row) {
+  return fmt::format("{:.0f} frames, {:.0f} with all markers tracked, {:.0f} warnings",
+                     row.figures[0].value_or(0), row.figures[1].value_or(0), row.figures[3].value_or(0));
+}
+
+}  // namespace
+
+/// Of one sequence or several.
+CommandResult track_command(const TrackArguments& arguments, Console& console) {
+  if (arguments.several.cases.size() > 1) {
+    const auto one_case = [&](const std::filesystem::path& the_case, const std::filesystem::path& out,
+                              Console& silent) {
+      const track::Sequence sequence = value_or_throw(tracked(arguments, the_case, out, silent));
+      return CaseRow{{},
+                     sequence.failure,
+                     {double(sequence.frames.size()), double(sequence.complete), double(sequence.repaired),
+                      double(sequence.warnings.size())}};
+    };
+    return do_cases(arguments.several,
+                    {arguments.out, track_columns, one_case, line_of_track, track::forget_track}, console);
+  }
+  return guarded([&] {
+    const track::Sequence sequence =
+        value_or_throw(tracked(arguments, arguments.several.cases.front(), arguments.out, console));
+    if (!sequence.failure) return;
+    console.answered = console.json;
+    throw BadInput(*sequence.failure);
   });
 }
 
@@ -147,7 +176,7 @@ void add_track(CLI::App& app, Action& action) {
       "--resume.\nExit code 3: the picks contradict each other, or nothing was followed. See "
       "docs/motion.md.");
   auto& a = arguments_of(command, action, track_command);
-  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
+  add_cases(command, a.several);
   command->add_option("--frames", a.frames, "Frames A-B[:STEP]; the markers are picked in frame A")
       ->required();
   command->add_option("--out", a.out, "Folder for the tables, track.json and report.html")

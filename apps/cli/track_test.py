@@ -116,6 +116,19 @@ class Track(unittest.TestCase):
     def track(self, folder, out="refused", frames=f"1-{FRAMES}", *options):
         return run("track", folder, "--frames", frames, "--out", self.root / out, *options)
 
+    def test_processes_of_one_word_follow_each_sequence_once(self):
+        sequences = [self.changed(name, lambda case, folder: None) for name in ("night-1", "night-2")]
+        out = self.root / "nights"
+        words = [PROGRAM, "track", *map(str, sequences), "--frames", f"1-{FRAMES}", "--out", str(out), "--share", "night"]
+        both = [subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+        said = [process.communicate()[1] for process in both]
+        self.assertEqual([process.returncode for process in both], [0, 0], said)
+        lines = (out / "summary.csv").read_text().splitlines()
+        self.assertEqual(lines[0], "case,status,code,message,frames,complete,repaired,warnings")
+        self.assertEqual([line.split(",")[:2] + line.split(",")[4:5] for line in lines[1:]],
+                         [["night-1", "ok", str(FRAMES)], ["night-2", "ok", str(FRAMES)]])
+        self.assertEqual((out / "night-2/markers.csv").read_bytes(), (self.root / "out/markers.csv").read_bytes())
+
     def check_places(self, out):
         for row in table(out / "markers.csv"):
             body = "jaw" if row["name"][0] == "J" else "skull"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run_command.h"
+#include "several_cases.h"
 
 #include <gtest/gtest.h>
 
