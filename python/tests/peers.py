@@ -20,6 +20,7 @@ import tempfile
 
 import numpy as np
 
+import dicom_peers
 import helicarm
 
 COUNT = 200
@@ -558,6 +559,8 @@ def version_of(package):
         return subprocess.run(["dcmdump", "--version"], capture_output=True, text=True).stdout.split("v")[1].split()[0]
     if package == "itk":
         return run(itk_program(), "version").strip()
+    if package in ("dicom3tools", "openigtlink"):
+        return run("dpkg-query", "-W", "-f", "${Version}", {"openigtlink": "libopenigtlink-dev"}.get(package, package))
     if package == "vtk":
         return importlib.import_module("vtk").vtkVersion().GetVTKVersion()
     return importlib.import_module(package).__version__
@@ -568,7 +571,11 @@ def is_there(package):
     if package == "itk":
         return bool(PROGRAM and shutil.which("cmake")) and any(pathlib.Path("/usr").glob("lib*/cmake/ITK-*/ITKConfig.cmake"))
     if package == "dcmtk":
-        return bool(PROGRAM) and all(shutil.which(name) for name in ("storescu", "echoscu", "dcmdump", "dcmconv", "dcmcrle", "dcmcjpls"))
+        return bool(PROGRAM) and all(shutil.which(name) for name in ("storescu", "echoscu", "dcmdump", "dcmconv", "dcmcrle", "dcmcjpls", "dsrdump", "dsr2html"))
+    if package == "dicom3tools":
+        return bool(PROGRAM and shutil.which("dciodvfy"))
+    if package == "openigtlink":
+        return bool(PROGRAM and shutil.which("g++")) and pathlib.Path("/usr/include/openigtlink/igtlImageMessage.h").exists()
     return importlib.util.find_spec(package) is not None
 
 
@@ -587,6 +594,10 @@ JUDGES = [
     (scipy_rotations, "scipy", "ITK transform `.tfm`, Euler angles", "read", (1e-9,), ("mm",)),
     (opencv_writes, "cv2", "OpenCV YAML, XML, JSON", "read", (1e-8,), ("px",)),
     (dcmtk_writes, "dcmtk", "DICOM X-ray image in DCMTK's transfer syntaxes", "read", (0,), ("grey values",)),
+    (dicom_peers.pydicom_reads_reports, "pydicom", "DICOM measurement report (SR) against result.json", "written", (1e-4, 1e-4), ("mm", "px")),
+    (dicom_peers.dcmtk_reads_reports, "dcmtk", "DICOM measurement report (SR) by `dsrdump`, `dsr2html`", "written", (0,), ("warnings and errors",)),
+    (dicom_peers.dciodvfy_checks, "dicom3tools", "DICOM images, derived images and measurement reports by `dciodvfy`", "written", (0,), ("errors",)),
+    (dicom_peers.openigtlink_reads_images, "openigtlink", "IMAGE and TRANSFORM of `tracker send`", "sent", (0.01, 0), ("px", "grey values")),
     (dcmtk_sends, "dcmtk", "C-ECHO, C-STORE by `echoscu`, `storescu`", "received", (0,), ("grey values",)),
 ]
 
