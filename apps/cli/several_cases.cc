@@ -142,9 +142,9 @@ CommandResult do_shared(const SeveralCases& several, const CaseWork& work, const
     SharedWork shared(work.out, launch, names, [&] { forget_earlier(work); });
     const auto given_up = [&](std::size_t index) {
       return json_of(
-          {names[index],
-           Failure{Reason::interrupted, "each process that did it ended before it was done", {}, {}},
-           {}});
+          CaseRow{names[index],
+                  Failure{Reason::interrupted, "each process that did it ended before it was done", {}, {}},
+                  {}});
     };
     while (const auto item = shared.next(given_up)) {
       const CaseRow row = row_of(several, work, item->index, names[item->index], console);
