@@ -56,10 +56,11 @@ def pydicom_reads_reports(folder, count=4):
         image = pydicom.dcmread(case / "AP.dcm")
         assert (report.PatientID, report.StudyInstanceUID) == (image.PatientID, image.StudyInstanceUID)
         (measurements,) = items(report, "126010")
-        groups = {items(group, "112039")[0].TextValue: group for group in items(measurements, "125007")}
+        groups = {(concept_of(items(group, "121071")[0].ConceptCodeSequence[0]), items(group, "112039")[0].TextValue): group
+                  for group in items(measurements, "125007")}
         images = {pydicom.dcmread(case / f"{view['name']}.dcm").SOPInstanceUID: view["name"] for view in result["views"]}
         for point in result["points"]:
-            group = groups[point["name"]]
+            group = groups["target" if point["source"] == "target" else "point", point["name"]]
             (error,) = items(group, "error_95")
             if point["xyz_mm"] is None:
                 assert not error.MeasuredValueSequence and error.NumericValueQualifierCodeSequence[0].CodeValue == "114006"
@@ -78,7 +79,7 @@ def pydicom_reads_reports(folder, count=4):
                     off = max(off, np.abs(np.array(mark.GraphicData) - 0.5 - point["seen"][view]["uv_raw"]).max())
         for tunnel in result["tunnels"]:
             if tunnel["length_mm"] is not None:
-                far = max(far, abs(number_of(items(groups[tunnel["name"]], "410668003")[0]) - tunnel["length_mm"]))
+                far = max(far, abs(number_of(items(groups["tunnel", tunnel["name"]], "410668003")[0]) - tunnel["length_mm"]))
     return count, far, off
 
 
