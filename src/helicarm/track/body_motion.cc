@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
+#include "helicarm/track/body_rays.h"
 #include "helicarm/track/body_residuals.h"
 #include "helicarm/track/body_series.h"
 
@@ -184,6 +185,22 @@ void learn_deviations(const SequenceData& work, const BodyPlan& plan, const Sequ
   }
 }
 
+/// Places of markers that two views show in too few frames to determine them.
+void place_rare_markers(const SequenceData& work, const BodyPlan& plan, const Sequence& sequence,
+                        Estimated& at, BodySequence& body) {
+  const double independent = (1 - sequence.correlation) / (1 + sequence.correlation);
+  for (std::size_t i = 0; i < plan.markers.size(); ++i) {
+    if (at.counts[i] || body.markers[i].moved_at || !plan.geometry.empty()) continue;
+    const auto found = place_by_rays(work, plan, at, i, independent, sequence.lasting);
+    if (!found || found->determining <= int(few_frames)) continue;
+    at.shape.in_body[i] = found->place.place;
+    at.by_place[i] = found->place.covariance;
+    at.spread[i] = 4 * (std::pow(body.deviation_mm, 2) + 1e-6) * Eigen::Matrix3d::Identity();
+    body.markers[i].in_body = {found->place.place, at.by_place[i]};
+    body.markers[i].loose_mm = std::sqrt(at.spread[i].trace() / 3);
+  }
+}
+
 /// Which markers count, where they are in the body, and their deviations from there.
 void learn_shape(SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
                  Sequence& sequence) {
@@ -271,6 +288,7 @@ void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, Body
   for (auto& pose : measured)
     if (pose) pose->covariance *= fewer;
   at.motion = smooth_poses(work.times, measured, geometry::mean_of(points));
+  place_rare_markers(work, plan, sequence, at, body);
   take_motion(body, at.poses, at.motion, geometry::mean_of(points));
 }
 

@@ -112,6 +112,29 @@ TEST(Sequence, PlacesAndPosesAreWithinTheirBands) {
   EXPECT_FALSE(warning_of(sequence, Reason::markers_swapped));
 }
 
+TEST(Sequence, AMarkerOfOneViewIsPlacedByItsRaysAlongTheBodysPoses) {
+  constexpr std::size_t rare = 5;  // of the skull
+  TrackCase the_case = two_bodies();
+  for (std::size_t k = 0; k < 2; ++k)
+    the_case.picks.push_back(
+        {rare, k, the_case.views[k].camera.project(place_of(rare, 1, none)) + Eigen::Vector2d(1, -1)});
+  auto sights = drawn(the_case, none);
+  for (std::size_t f = 0; f < sights.size(); ++f)
+    if (f != 0 && f != 20) sights[f].of[rare][1].reset();
+  // Noise that was taken for it, along the other view's ray: 4 mm off.
+  const auto& view = the_case.views[1].camera;
+  const Eigen::Vector3d wrong = place_of(rare, 1, none) + Eigen::Vector3d(0, 4, 0);
+  sights[0].of[rare][1]->uv_raw = view.project(wrong);
+  const Sequence sequence = estimate_sequence(the_case, sights);
+  for (const std::size_t f : {std::size_t(5), std::size_t(20), std::size_t(39)}) {
+    const TrackedMarker& marker = sequence.markers[f][rare];
+    ASSERT_TRUE(marker.place);
+    const Eigen::Vector3d off = marker.place->place - place_of(rare, int(f) + 1, none);
+    EXPECT_LT(off.norm(), 0.5) << f;
+    EXPECT_LT(off.dot(marker.place->covariance.ldlt().solve(off)), 16) << f;
+  }
+}
+
 /// Each marker hidden in the second view, later in both, in turn; its images displaced alike in all frames,
 /// as texture that moves with it does.
 std::vector<FrameSights> drawn_with_texture(const TrackCase& the_case, unsigned seed) {

@@ -20,6 +20,9 @@ struct FrameSights {
   int repaired = 0;  ///< markers whose disc by motion alone was another's by the bodies' geometry
 };
 
+/// Farthest from a pick at which its disc is sought, less a radius.
+inline constexpr double pick_reach_px = 6;
+
 /// Follows markers and bodies from frame to frame. Its state is a function of the first images and of the
 /// frames that it absorbed, so that an interrupted sequence goes on as if it had not been.
 class Tracker {
@@ -93,6 +96,7 @@ class Tracker {
   void seek_evidence(FrameSights& sights, const std::vector<ExpectedMarker>& expected,
                      const std::vector<xray::XrayImage>& images) const;
   ContrastModel contrast_of(std::size_t marker, std::size_t view) const;
+  std::vector<MarkerPick> drop_weak_first(const std::vector<xray::XrayImage>& images);
   void learn_appearance(const std::vector<xray::XrayImage>& images);
   void find_first(int frame, const std::vector<xray::XrayImage>& images);
   void check_rays();

@@ -3,12 +3,23 @@
 #include <cmath>
 #include <limits>
 
+#include <fmt/format.h>
+
 #include "helicarm/core/parallel.h"
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/track/marker_fit.h"
 #include "helicarm/track/tracker.h"
 
 namespace helicarm::track {
+namespace {
+
+/// Logarithm of the likelihood ratio that makes a marker certain.
+double enough_evidence() {
+  constexpr double detected = 0.95, certain = 0.99;  // before and after the image is seen
+  return std::log(certain / (1 - certain)) - std::log(detected / (1 - detected));
+}
+
+}  // namespace
 
 ContrastModel Tracker::contrast_of(std::size_t marker, std::size_t view) const {
   ContrastModel model = contrasts_[view].model();
@@ -34,8 +45,7 @@ std::optional<ExpectedMarker> Tracker::narrowed(const ExpectedMarker& marker, st
 void Tracker::seek_evidence(FrameSights& sights, const std::vector<ExpectedMarker>& expected,
                             const std::vector<xray::XrayImage>& images) const {
   constexpr double widest_px = 2, nearest_px = 1.2;
-  constexpr double detected = 0.95, certain = 0.99;  // before and after the image is seen
-  const double enough = std::log(certain / (1 - certain)) - std::log(detected / (1 - detected));
+  const double enough = enough_evidence();
   const std::size_t count = markers_.size();
   for (const bool is_search : {false, true}) {
     std::vector<std::optional<ExpectedMarker>> at(count);
@@ -86,12 +96,39 @@ void Tracker::seek_evidence(FrameSights& sights, const std::vector<ExpectedMarke
   }
 }
 
+/// Leaves out the discs near picks that background explains as well: each is one of many places within reach.
+std::vector<MarkerPick> Tracker::drop_weak_first(const std::vector<xray::XrayImage>& images) {
+  std::vector<MarkerPick> dropped;
+  for (const MarkerPick& pick : given_->picks) {
+    auto& image = first_.of[pick.marker][pick.view];
+    if (!image) continue;
+    const double radius = radius_px(pick.view, markers_[pick.marker].place), reach = pick_reach_px + radius;
+    std::vector<KnownNeighbour> others;
+    for (std::size_t i = 0; i < markers_.size(); ++i)
+      if (const auto& other = first_.of[i][pick.view]; other && i != pick.marker)
+        others.push_back({other->uv_raw, other->radius_px});
+    const KnownMarker known{image->uv_raw, Eigen::Matrix2d::Zero(),
+                            appearance_[pick.view].radius_factor * radius,
+                            contrast_of(pick.marker, pick.view)};
+    const auto fit = fit_known_marker(images[pick.view].pixels, known, others, appearance_[pick.view]);
+    if (!fit) continue;
+    const double one_of_many = std::log(2 * std::pow(fit->image.sigma_px / reach, 2));
+    if (fit->evidence + std::min(0.0, one_of_many) >= enough_evidence()) continue;
+    dropped.push_back(pick);
+    if (std::ranges::count(given_->picks, pick.marker, &MarkerPick::marker) >= 2)
+      markers_[pick.marker].known = true;
+  }
+  for (const MarkerPick& pick : dropped) first_.of[pick.marker][pick.view].reset();
+  return dropped;
+}
+
 /// Likewise in the first frame, where the picks place the markers.
 void Tracker::seek_first(const std::vector<xray::XrayImage>& images) {
   constexpr double click_px = 2;
   for (std::size_t k = 0; k < cameras_.size(); ++k)
     for (const auto& of : first_.of)
       if (of[k]) contrasts_[k].add(*of[k], 1);
+  const auto dropped = drop_weak_first(images);
   std::vector<ExpectedMarker> expected;
   for (std::size_t m = 0; m < markers_.size(); ++m) {
     ExpectedMarker& made = expected.emplace_back();
@@ -106,6 +143,16 @@ void Tracker::seek_first(const std::vector<xray::XrayImage>& images) {
       made.place.setConstant(std::numeric_limits<double>::quiet_NaN());
   }
   seek_evidence(first_, expected, images);
+  for (const MarkerPick& pick : dropped)
+    if (!first_.of[pick.marker][pick.view])
+      warnings_.push_back(
+          {Reason::target_not_found,
+           fmt::format(
+               "frame {}: the disc nearest to the pick \"{}\" at {:.1f}, {:.1f} may be noise as well: "
+               "the marker counts as hidden in this view until it is clear",
+               first_.frame, given_->markers[pick.marker], pick.uv_raw.x(), pick.uv_raw.y()),
+           given_->views[pick.view].images.name,
+           {{"u_px", pick.uv_raw.x()}, {"v_px", pick.uv_raw.y()}}});
   contrasts_.assign(cameras_.size(), {});
 }
 

@@ -12,7 +12,6 @@
 namespace helicarm::track {
 
 void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
-  constexpr double click_px = 6;
   std::vector<SizeRange> sizes(cameras_.size());
   appearance_.resize(cameras_.size());
   parallel_for(cameras_.size(), 0, [&](std::size_t k) {
@@ -20,7 +19,7 @@ void Tracker::learn_appearance(const std::vector<xray::XrayImage>& images) {
     for (const MarkerPick& pick : given_->picks)
       if (pick.view == k)
         picks.push_back({pick.marker, pick.uv_raw, radius_px(k, markers_[pick.marker].place)});
-    const LearntAppearance learnt = learnt_appearance(images[k], picks, click_px);
+    const LearntAppearance learnt = learnt_appearance(images[k], picks, pick_reach_px);
     appearance_[k] = learnt.appearance;
     sizes[k] = learnt.sizes;
   });
@@ -44,7 +43,7 @@ void Tracker::warn_of_unseen() {
 }
 
 void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) {
-  constexpr double click_sigma_px = 1.5, click_px = 6;
+  constexpr double click_sigma_px = 1.5;
   // Places by the clicks alone: depth and size.
   std::vector<Eigen::Vector3d> placed;
   for (std::size_t m = 0; m < markers_.size(); ++m) {
@@ -82,7 +81,7 @@ void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) 
   };
   std::vector<Snap> snaps;
   for (const MarkerPick& pick : given_->picks) {
-    const double radius = radius_px(pick.view, markers_[pick.marker].place), reach = click_px + radius;
+    const double radius = radius_px(pick.view, markers_[pick.marker].place), reach = pick_reach_px + radius;
     const SearchWindow window{pick.uv_raw, reach + radius, radius, 0};
     const auto nearest = picked_marker(images[pick.view], pick.uv_raw, radius, reach, appearance_[pick.view]);
     std::vector<MarkerImage> found = find_markers(images[pick.view], {&window, 1}, appearance_[pick.view]);
@@ -110,7 +109,7 @@ void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) 
           {Reason::target_not_found,
            fmt::format("frame {}: no marker of {:.1f} px in diameter within {:.0f} px of the pick \"{}\" at "
                        "{:.1f}, {:.1f}: it counts as hidden in this view; pick it again if it is visible",
-                       frame, 2 * radius_px(pick.view, markers_[pick.marker].place), click_px + 2,
+                       frame, 2 * radius_px(pick.view, markers_[pick.marker].place), pick_reach_px + 2,
                        given_->markers[pick.marker], pick.uv_raw.x(), pick.uv_raw.y()),
            given_->views[pick.view].images.name,
            {{"u_px", pick.uv_raw.x()}, {"v_px", pick.uv_raw.y()}}});
