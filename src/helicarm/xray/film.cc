@@ -169,6 +169,7 @@ std::shared_ptr<const Film> Film::at(const fs::path& path) {
                       {},
                       {{"frame", 1}}});
     decoding->layout = pixel_layout(decoding->header, decoding->origin);
+    if (!is_lossless_film(decoding->header)) check_key_frames(path, container, decoding->header);
     decoding->count();
   } catch (const BadInput& bad) {
     if (bad.failure().reason != Reason::missing_file) throw;

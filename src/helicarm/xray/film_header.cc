@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <sstream>
 
 #include <fmt/format.h>
 
@@ -104,7 +105,56 @@ void check_not_turned(const Json& stream, const std::string& origin) {
                       origin, whole(item, "rotation")));
 }
 
+[[noreturn]] void refuse_fields(const std::string& origin) {
+  throw BadInput(
+      Reason::unsupported,
+      fmt::format("{}: the film is interlaced: each image has two moments, its odd and its even rows: "
+                  "record it progressively, or export its fields as images",
+                  origin));
+}
+
+void check_progressive(const Json& stream, const std::string& origin) {
+  static constexpr std::array<std::string_view, 4> fields = {"tt", "bb", "tb", "bt"};
+  if (std::ranges::find(fields, word(stream, "field_order")) != fields.end()) refuse_fields(origin);
+}
+
+/// The number behind "KEY=" in a line of ffprobe's compact writer.
+int number_behind(std::string_view line, std::string_view key) {
+  const std::size_t at = line.find(key);
+  int value = 0;
+  if (at != line.npos) std::from_chars(line.data() + at + key.size(), line.data() + line.size(), value);
+  return value;
+}
+
 }  // namespace
+
+void check_key_frames(const fs::path& path, std::string_view container, const FilmHeader& header) {
+  const std::string origin = path.filename().string();
+  std::vector<std::string> words = {"ffprobe",
+                                    "-v",
+                                    "error",
+                                    "-select_streams",
+                                    "v:0",
+                                    "-skip_frame",
+                                    "nokey",
+                                    "-show_entries",
+                                    "frame=width,height,interlaced_frame",
+                                    "-of",
+                                    "compact=p=0"};
+  std::ranges::copy(film_input(path, container), std::back_inserter(words));
+  ChildProgram probe(words);
+  std::istringstream lines(all_output(probe));
+  for (std::string line; std::getline(lines, line);) {
+    if (number_behind(line, "interlaced_frame=") == 1) refuse_fields(origin);
+    const int width = number_behind(line, "width="), height = number_behind(line, "height=");
+    if (width > 0 && height > 0 && (width != header.width || height != header.height))
+      throw BadInput(
+          Reason::unsupported,
+          fmt::format("{}: the size of its images changes from {} x {} to {} x {}: export its frames "
+                      "as images and use those of one size",
+                      origin, header.width, header.height, width, height));
+  }
+}
 
 std::vector<std::string> film_input(const fs::path& path, std::string_view container) {
   // The name is a file's, and the container is stated: neither opens another file or an address.
@@ -154,6 +204,7 @@ FilmHeader read_film_header(const fs::path& path, std::string_view container) {
   header.pixel_format = word(stream, "pix_fmt");
   header.pixel_aspect = aspect_from(word(stream, "sample_aspect_ratio"));
   check_not_turned(stream, origin);
+  check_progressive(stream, origin);
   const auto pixels = std::size_t(std::max(header.width, 0)) * std::size_t(std::max(header.height, 0));
   if (pixels < 1 || header.width > int(image::max_image_side) || header.height > int(image::max_image_side) ||
       2 * pixels > image::max_image_bytes)

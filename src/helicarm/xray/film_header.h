@@ -31,8 +31,13 @@ struct FilmHeader {
 std::vector<std::string> film_input(const std::filesystem::path& path, std::string_view container);
 
 /// Throws BadInput: missing_file without ffprobe, not_an_image, bad_size, unsupported for a film to be
-/// turned.
+/// turned and for one that is interlaced.
 FilmHeader read_film_header(const std::filesystem::path& path, std::string_view container);
+
+/// Throws BadInput (unsupported) for interlaced frames and for frames of another size; only frames that are
+/// coded by themselves can differ.
+void check_key_frames(const std::filesystem::path& path, std::string_view container,
+                      const FilmHeader& header);
 
 /// Throws BadInput (unsupported) for pixel formats whose grey values would change.
 PixelLayout pixel_layout(const FilmHeader& header, const std::string& origin);

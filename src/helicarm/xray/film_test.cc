@@ -137,6 +137,31 @@ TEST_F(Films, TurnedFilmsAreRefused) {
   EXPECT_EQ(refused.error().reason, Reason::unsupported) << refused.error().message;
 }
 
+TEST_F(Films, InterlacedFilmsAreRefused) {
+  for (const char* options :
+       {"-c:v mpeg4 -flags +ildct+ilme -top 1", "-s 64x64 -c:v libx264 -x264opts interlaced=1 -top 1"}) {
+    const auto refused = ImageFile::open(film("film.mp4", options));
+    ASSERT_FALSE(refused) << options;
+    EXPECT_EQ(refused.error().reason, Reason::unsupported) << refused.error().message;
+    EXPECT_NE(refused.error().message.find("interlaced"), std::string::npos) << refused.error().message;
+  }
+}
+
+TEST_F(Films, ImagesThatChangeTheirSizeAreRefused) {
+  const std::string at = folder_.path().string() + "/";
+  film("one.avi", "-c:v mjpeg -pix_fmt yuvj420p -f mjpeg");
+  film("two.avi", "-c:v mjpeg -pix_fmt yuvj420p -s 80x60 -f mjpeg");
+  const std::string command = "cat '" + at + "one.avi' '" + at + "two.avi' > '" + at + "both' && " +
+                              "ffmpeg -v error -nostdin -f mjpeg -i '" + at + "both' -c copy '" + at +
+                              "changes.avi'";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  const auto refused = ImageFile::open(at + "changes.avi");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::unsupported) << refused.error().message;
+  EXPECT_NE(refused.error().message.find("from 64 x 50 to 80 x 60"), std::string::npos)
+      << refused.error().message;
+}
+
 TEST_F(Films, AreImageFilesOfSeveralFrames) {
   const auto path = film("film.avi", "-c:v mjpeg -pix_fmt yuvj420p");
   const auto file = *ImageFile::open(path);
