@@ -9,6 +9,7 @@
 #include "helicarm/image/grey_image.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/rectification/models/polynomial.h"
+#include "helicarm/rectification/pixel_map.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/xray/dicom_acquisition.h"
 #include "module.h"
@@ -56,6 +57,21 @@ rectification::DistortionMap identity(int width, int height, std::optional<doubl
   checked(double(height), sides, "height");
   return rectification::identity_map(width, height,
                                      checked(pixel_mm, {xray::min_pixel_mm, xray::max_pixel_mm}, "pixel_mm"));
+}
+
+rectification::DistortionMap of_xmalab(const std::filesystem::path& raw,
+                                       const std::filesystem::path& undistorted,
+                                       const std::pair<int, int>& shape,
+                                       const std::optional<std::string>& model) {
+  constexpr Limits sides{1, image::max_image_side};
+  checked(double(shape.first), sides, "shape");
+  checked(double(shape.second), sides, "shape");
+  return value_or_raise(without_gil([&] {
+    return rectification::read_xmalab_grid(raw, undistorted).and_then([&](const auto& grid) {
+      return rectification::fit_pixel_map(grid, shape.second, shape.first, {{}, model.value_or("")})
+          .map([](rectification::MapFit fit) { return std::move(fit.map); });
+    });
+  }));
 }
 
 using GivenPlate = std::variant<phantom::Plate, std::filesystem::path>;
@@ -140,6 +156,13 @@ the image centre. Points are (u, v) in pixels; (0, 0) is the centre of the top-l
       .def_static(
           "identity", &identity, py::arg("width"), py::arg("height"), py::arg("pixel_mm") = py::none(),
           "The map of a flat panel, without distortion. pixel_mm: detector pixel, 0.01 to 2 mm, or None.")
+      .def_static("from_xmalab", &of_xmalab, py::arg("raw"), py::arg("undistorted"), py::kw_only(),
+                  py::arg("shape"), py::arg("model") = py::none(),
+                  R"(Of the dots of XMALab's grid, as `helicarm rectify --xmalab`.
+
+raw, undistorted: NAME_INPTS.csv and NAME_BSPTS.csv, as XMALab exports them with its look-up table. shape: (height, width)
+of the image. model: as rectify's. Rectified pixels are those of XMALab's undistorted image. Releases the GIL.
+Raises InputError: bad_size where the files' numbers of dots differ, bad_value; RefusedError where no map fits.)")
       .def_static("load", &loaded, py::arg("path"), "Reads map.json. Raises InputError.")
       .def_static(
           "from_dict",

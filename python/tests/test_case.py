@@ -88,6 +88,22 @@ def test_identity_map_keeps_a_non_square_image():
         helicarm.DistortionMap.identity(60, 90).rectify_image(image)
 
 
+def test_map_of_the_dots_of_xmalabs_grid(tmp_path):
+    v, u = np.mgrid[20:460:20, 20:620:20].astype(float)
+    straight = np.c_[u.ravel(), v.ravel()]
+    off = straight - [320, 240]
+    raw = straight + off * 1e-7 * np.sum(off ** 2, axis=1)[:, None]
+    for name, points in (("INPTS", raw), ("BSPTS", straight), ("short", straight[:-1])):
+        np.savetxt(tmp_path / f"{name}.csv", points, delimiter=",", fmt="%.9g")
+    made = helicarm.DistortionMap.from_xmalab(tmp_path / "INPTS.csv", tmp_path / "BSPTS.csv", shape=(480, 640))
+    assert made.shape == (480, 640)
+    assert made.rectified_from_raw(raw) == pytest.approx(straight, abs=0.05)
+    with pytest.raises(helicarm.InputError, match="bad_size"):
+        helicarm.DistortionMap.from_xmalab(tmp_path / "INPTS.csv", tmp_path / "short.csv", shape=(480, 640))
+    with pytest.raises(helicarm.InputError, match="shape"):
+        helicarm.DistortionMap.from_xmalab(tmp_path / "INPTS.csv", tmp_path / "BSPTS.csv", shape=(0, 640))
+
+
 def test_plate_is_found_in_an_image(case):
     image = helicarm.read_image(case[0] / "AP.dcm")
     found = helicarm.rectify(image, helicarm.Plate.load(case[0] / "plate.json"))
