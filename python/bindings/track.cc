@@ -74,7 +74,9 @@ std::unique_ptr<Tracked> tracked_images(
     const std::vector<std::tuple<std::string, std::vector<std::size_t>, std::optional<Doubles>>>& bodies,
     double diameter_mm, std::optional<double> frame_rate_hz, const std::optional<std::filesystem::path>& out,
     const std::vector<std::pair<std::size_t, Doubles>>& axes, std::optional<double> butterworth_hz,
-    int butterworth_order, const py::object& progress) {
+    int butterworth_order,
+    const std::vector<std::tuple<std::size_t, std::size_t, int, double, double>>& corrections,
+    const py::object& progress) {
   auto made = std::make_unique<Tracked>();
   track::TrackCase& the_case = made->the_case;
   for (const auto& [name, images, camera, map] : views) {
@@ -96,6 +98,8 @@ std::unique_ptr<Tracked> tracked_images(
   the_case.frame_rate_hz = checked(frame_rate_hz, {0.01, 1e5}, "frame_rate_hz");
   the_case.markers = markers;
   for (const auto& [marker, view, u, v] : picks) the_case.picks.push_back({marker, view, {u, v}});
+  for (const auto& [marker, view, frame, u, v] : corrections)
+    the_case.corrections.push_back({marker, view, {u, v}, frame});
   for (const auto& [name, of, geometry] : bodies)
     the_case.bodies.push_back(
         {name, of, geometry ? rows_of<3>(*geometry, "bodies: " + name) : std::vector<Eigen::Vector3d>{}});
@@ -314,12 +318,14 @@ void add_track(py::module_& module) {
         return fmt::format("<Track: {} frames, {} markers, {} bodies>", t.sequence.frames.size(),
                            t.the_case.markers.size(), t.the_case.bodies.size());
       });
-  module.def("_track_images", &tracked_images, py::arg("views"), py::arg("camera_covariance"),
-             py::arg("markers"), py::arg("picks"), py::arg("bodies"), py::kw_only(), py::arg("diameter_mm"),
-             py::arg("frame_rate_hz") = py::none(), py::arg("out") = py::none(),
-             py::arg("axes") = std::vector<std::pair<std::size_t, Doubles>>{},
-             py::arg("butterworth_hz") = py::none(),
-             py::arg("butterworth_order") = track::Butterworth{}.order, py::arg("progress") = py::none());
+  module.def(
+      "_track_images", &tracked_images, py::arg("views"), py::arg("camera_covariance"), py::arg("markers"),
+      py::arg("picks"), py::arg("bodies"), py::kw_only(), py::arg("diameter_mm"),
+      py::arg("frame_rate_hz") = py::none(), py::arg("out") = py::none(),
+      py::arg("axes") = std::vector<std::pair<std::size_t, Doubles>>{},
+      py::arg("butterworth_hz") = py::none(), py::arg("butterworth_order") = track::Butterworth{}.order,
+      py::arg("corrections") = std::vector<std::tuple<std::size_t, std::size_t, int, double, double>>{},
+      py::arg("progress") = py::none());
   const track::TrackOptions usual;
   const track::PointsFile counting;
   module.def("track", &tracked, py::arg("case"), py::kw_only(), py::arg("frames"),

@@ -203,7 +203,7 @@ def _loaded(given, kind, built_in):
 
 
 def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, bodies=None, frame_rate_hz=None,
-          camera_covariance=None, axes=None, **options):
+          camera_covariance=None, axes=None, corrections=None, **options):
     """Follows markers and bodies through a sequence: of a case, or of arrays.
 
     track(case, *, frames="A-B[:STEP]", out=None, resume=False, axes=None, butterworth_hz=None, progress=None): case: folder that holds case.json; the markers
@@ -216,6 +216,8 @@ def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, b
       images: (n, height, width) array, or a list of arrays, XrayImages, paths or pydicom datasets, as many in every view,
         metal dark; frame i of all views is one moment. camera: as register takes it.
       picks: raw pixels in the first frame, each marker in one view or more. diameter_mm: of the markers, 0.1 to 30.
+      corrections: {frame: {marker: {view: (u, v)}}} of frames 2 to n: the marker is at the nearest disc there, and is followed
+        from it on. Of a case: picks of later frames in case.json.
       bodies: {name: [markers]}, or {name: {marker: (x, y, z)}} where the body's geometry is known, mm.
       axes: {body: 3 x 3} of two bodies or more, columns x (right), y (anterior), z (proximal) in the first frame's
         world: joint angles against the first one; 3 x 4 with the origin, mm: joint translations too. Of a case: the path of
@@ -231,7 +233,7 @@ def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, b
         options["picks"], picks = picks, None
     given = {"views": views, "picks": picks, "diameter_mm": diameter_mm, "bodies": bodies, "frame_rate_hz": frame_rate_hz,
              "camera_covariance": camera_covariance}
-    _one_of("track", case, given)
+    _one_of("track", case, {**given, "corrections": corrections})
     if case is not None:
         if frames is None:
             raise InputError("usage", "track: frames is missing, such as frames=\"1-100\"")
@@ -248,19 +250,28 @@ def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, b
     held = [(name, [as_image(image, name=name) for image in images], camera, map_)
             for (name, images, _), (camera, map_) in zip(triples, cameras)]
     names, markers = list(counts), list(picks)
-    flat = []
-    for marker, places in picks.items():
-        for view, uv in places.items():
-            if view not in counts:
-                raise InputError("bad_value", f'picks: "{marker}": there is no view "{view}"')
-            u, v = map(float, uv)
-            flat.append((markers.index(marker), names.index(view), u, v))
+    def flattened(places_of, what, *frame):
+        made = []
+        for marker, places in places_of.items():
+            if marker not in markers:
+                raise InputError("bad_value", f'{what}: "{marker}" has no pick in the first frame')
+            for view, uv in places.items():
+                if view not in counts:
+                    raise InputError("bad_value", f'{what}: "{marker}": there is no view "{view}"')
+                u, v = map(float, uv)
+                made.append((markers.index(marker), names.index(view), *frame, u, v))
+        return made
+    last = next(iter(counts.values()))
+    for frame in corrections or {}:
+        if not 2 <= frame <= last:
+            raise InputError("bad_value", f"corrections: frame {frame}: they are of frames 2 to {last}, picks of the first")
+    later = [each for frame, of in (corrections or {}).items() for each in flattened(of, "corrections", int(frame))]
     for name in axes or {}:
         if name not in (bodies or {}):
             raise InputError("bad_value", f'axes: "{name}" is no body')
     held_axes = [(list(bodies).index(name), np.array(matrix, float)) for name, matrix in (axes or {}).items()]
-    return _c._track_images(held, covariance, markers, flat, _bodies_of(bodies or {}, markers), axes=held_axes,
-                            diameter_mm=diameter_mm, frame_rate_hz=frame_rate_hz, **options)
+    return _c._track_images(held, covariance, markers, flattened(picks, "picks"), _bodies_of(bodies or {}, markers), axes=held_axes,
+                            diameter_mm=diameter_mm, frame_rate_hz=frame_rate_hz, corrections=later, **options)
 
 
 def _bodies_of(bodies, markers):

@@ -244,6 +244,13 @@ def test_markers_are_tracked_in_arrays(tmp_path):
     assert motion.smoothed["bone"][-1, :3, 3] == pytest.approx([1.5, 0, 0.75], abs=0.1)
     assert (tmp_path / "out/markers.csv").exists() and (tmp_path / "out/bone.tra").exists()
     assert motion.joint_angles == {} == motion.joint_covariances
+    spot = {"a": {"B": views["B"][1].project(moved[2][1])}}
+    corrected = helicarm.track(views=views, picks=picks, diameter_mm=3, bodies={"bone": names}, corrections={3: spot}, out=tmp_path / "corrected")
+    seen = np.genfromtxt(tmp_path / "corrected/points2d.csv", delimiter=",", skip_header=1)
+    assert seen[2, 2:4] == pytest.approx(spot["a"]["B"], abs=0.2) and np.isnan(seen[2, 6:8]).all()
+    assert corrected.places[:2, 1:] == pytest.approx(motion.places[:2, 1:], abs=0.05)
+    refused("bad_value", "frames 2 to 4", helicarm.track, views=views, picks=picks, diameter_mm=3, corrections={1: spot})
+    refused("bad_value", '"x" has no pick', helicarm.track, views=views, picks=picks, diameter_mm=3, corrections={3: {"x": spot["a"]}})
     for name, (_, camera) in views.items():
         (tmp_path / f"{name}.json").write_text(json.dumps({"K": camera.K.tolist(), "R": camera.R.tolist(), "t": camera.t.tolist()}))
     (tmp_path / "case.json").write_text(json.dumps({

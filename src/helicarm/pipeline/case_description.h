@@ -134,7 +134,8 @@ void describe_pick(Codec& codec, PickValue& pick, const std::vector<CaseView>& v
       reader.refuse(Reason::bad_value, "view", fmt::format("\"{}\" is not a view of the case", pick.view));
   });
   check_track(codec, "frame", purpose);
-  codec.integer("frame", pick.frame, 0, most_number, "of `helicarm track`: the sequence's first frame");
+  codec.integer("frame", pick.frame, 0, most_number,
+                "of `helicarm track`: the sequence's first frame, or a later one that it corrects");
   codec.vector("uv", pick.uv_raw, pixel_range, "raw pixel `[u, v]`, inside the image");
   if (codec.wants(pick.snap != Snap::none))
     codec.choice(

@@ -17,7 +17,8 @@ namespace {
 constexpr double degrees = 180 / EIGEN_PI, width_of_95 = 1.959964;
 constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
 
-/// Three curves with their 95 % bands over the frames.
+}  // namespace
+
 report::Chart pose_chart(const std::vector<int>& numbers, const std::vector<TrackedBody>& frames,
                          std::string title, bool turns) {
   report::Chart chart{std::move(title), "frame", turns ? "degrees" : "mm"};
@@ -48,8 +49,6 @@ report::Chart pose_chart(const std::vector<int>& numbers, const std::vector<Trac
   }
   return chart;
 }
-
-}  // namespace
 
 std::string report_card(const std::string& value, const std::string& what) {
   return fmt::format("<div class=\"card\"><b>{}</b><span>{}</span></div>", report::escaped(value), what);

@@ -54,6 +54,7 @@ struct Sequence {
   double lasting = 0;                              ///< part of their variance that lasts over the sequence
   std::vector<double> sigma_factor;                ///< per marker, of the fits' standard deviations
   std::vector<MarkerDistance> distances;
+  std::vector<FrameSights> sights = {};  ///< as they were found, of a sequence of images
   int repaired = 0, complete = 0;
   std::vector<Warning> warnings;
   std::optional<Failure> failure;  ///< nothing that was asked for was followed

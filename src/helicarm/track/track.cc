@@ -4,6 +4,8 @@
 #include <chrono>
 #include <cstdint>
 #include <future>
+#include <locale>
+#include <sstream>
 
 #include <fmt/format.h>
 
@@ -40,6 +42,65 @@ std::string identity_of(const TrackCase& the_case, const case_registration::Fram
       text += fmt::format(" {} {} {}", place.x(), place.y(), place.z());
   }
   return xray::digest(text);
+}
+
+/// Its corrections, a line each.
+std::string text_of(const std::vector<MarkerPick>& corrections) {
+  std::string text;
+  for (const MarkerPick& pick : corrections)
+    text += fmt::format("\n{} {} {} {} {}", pick.frame.value_or(0), pick.marker, pick.view, pick.uv_raw.x(),
+                        pick.uv_raw.y());
+  return text;
+}
+
+/// In the order of `text_of`; up to a line that is none.
+std::vector<MarkerPick> corrections_from(const std::string& text) {
+  std::vector<MarkerPick> read;
+  std::istringstream lines(text);
+  lines.imbue(std::locale::classic());
+  int frame = 0;
+  MarkerPick pick;
+  while (lines >> frame >> pick.marker >> pick.view >> pick.uv_raw.x() >> pick.uv_raw.y()) {
+    pick.frame = frame;
+    read.push_back(pick);
+  }
+  return read;
+}
+
+/// The first frame that one of them corrects and the other does not; nothing where they are the same.
+std::optional<int> first_difference(const std::vector<MarkerPick>& some,
+                                    const std::vector<MarkerPick>& others) {
+  std::optional<int> first;
+  for (const auto& [from, in] : {std::pair(&some, &others), std::pair(&others, &some)})
+    for (const MarkerPick& pick : *from)
+      if (std::ranges::find(*in, pick) == in->end() && (!first || *pick.frame < *first)) first = pick.frame;
+  return first;
+}
+
+/// Without the frames from the first one on whose corrections are others.
+void drop_corrected(std::vector<FrameSights>& kept, const std::vector<MarkerPick>& earlier,
+                    const TrackCase& the_case, const TrackOptions& options) {
+  const auto first = first_difference(earlier, the_case.corrections);
+  if (!first) return;
+  const auto from = std::ranges::find_if(kept, [&](const FrameSights& each) { return each.frame >= *first; });
+  if (from == kept.end()) return;
+  kept.erase(from, kept.end());
+  if (options.on_note)
+    options.on_note(
+        fmt::format("frame {}: its picks are others than before: computed again from this frame", *first));
+}
+
+void warn_of_corrections(const TrackCase& the_case, Sequence& sequence) {
+  for (const MarkerPick& pick : the_case.corrections)
+    for (const FrameSights& frame : sequence.sights)
+      if (frame.frame == pick.frame && !frame.of[pick.marker][pick.view])
+        sequence.warnings.push_back(
+            {Reason::target_not_found,
+             fmt::format("frame {}: no marker near the pick \"{}\" at {:.1f}, {:.1f}: it counts as hidden in "
+                         "this view",
+                         frame.frame, the_case.markers[pick.marker], pick.uv_raw.x(), pick.uv_raw.y()),
+             the_case.views[pick.view].images.name,
+             {{"frame", double(frame.frame)}}});
 }
 
 std::vector<std::string> names_of_views(const TrackCase& the_case) {
@@ -80,17 +141,20 @@ Expected<SequenceImages> open_images(const TrackCase& the_case, const case_regis
 
 /// The frames that an interrupted run left in the folder.
 std::vector<FrameSights> kept_frames(const fs::path& folder, const TrackCase& the_case,
-                                     const std::string& identity, const std::vector<int>& numbers) {
+                                     const std::string& identity, const std::vector<int>& numbers,
+                                     const TrackOptions& options) {
   std::error_code ignored;
   if (!fs::exists(folder / "sights.csv", ignored)) return {};
-  const auto of = read_file(folder / "sights.id", 100);
-  if (!of || *of != identity)
+  const auto of = read_file(folder / "sights.id", most_bytes);
+  if (!of || of->substr(0, of->find('\n')) != identity)
     throw BadInput(
         Reason::bad_value,
         fmt::format("--resume: {} holds rows of another sequence, case or range of frames: run without "
                     "--resume, or with another --out",
                     folder.string()));
-  return sights_from(value_or_throw(read_file(folder / "sights.csv", most_bytes)), the_case, numbers);
+  auto kept = sights_from(value_or_throw(read_file(folder / "sights.csv", most_bytes)), the_case, numbers);
+  drop_corrected(kept, corrections_from(of->substr(identity.size())), the_case, options);
+  return kept;
 }
 
 /// Of the images that these frames were seen in; empty where an earlier version wrote them.
@@ -131,14 +195,16 @@ Expected<Sequence> run_track(const TrackCase& the_case, const case_registration:
     if (!the_case.points.empty()) return placed_sequence(the_case, numbers, options, on_frame);
     const SequenceImages images = value_or_throw(open_images(the_case, frames));
     const std::string identity = identity_of(the_case, frames);
-    std::vector<FrameSights> kept;
-    if (options.out && options.resume) kept = kept_frames(*options.out, the_case, identity, numbers);
+    std::vector<FrameSights> kept = options.kept;
+    drop_corrected(kept, options.kept_corrections, the_case, options);
+    if (options.out && options.resume) kept = kept_frames(*options.out, the_case, identity, numbers, options);
     const auto first = value_or_throw(images.at(numbers.front()));
     std::vector<ImageKeys> keys;
-    if (!kept.empty()) keys = kept_keys(*options.out, the_case, numbers);
+    const bool is_resumed = options.out && options.resume && !kept.empty();
+    if (is_resumed) keys = kept_keys(*options.out, the_case, numbers);
     // An image that changed since then makes its frame, and those after it, another sequence.
     const auto keep_unchanged = [&](std::size_t i, const ImageKeys& now) {
-      if (i >= kept.size()) return;
+      if (!is_resumed || i >= kept.size()) return;
       const std::string changed =
           changed_image(numbers[i], names_of_views(the_case), i < keys.size() ? keys[i] : ImageKeys{}, now);
       if (changed.empty()) return;
@@ -152,7 +218,7 @@ Expected<Sequence> run_track(const TrackCase& the_case, const case_registration:
     if (options.out) {
       std::error_code ignored;
       fs::create_directories(*options.out, ignored);
-      value_or_throw(write_file(*options.out / "sights.id", identity));
+      value_or_throw(write_file(*options.out / "sights.id", identity + text_of(the_case.corrections)));
       tables.emplace(*options.out);
     }
     std::vector<FrameSights> sights{tracker.first()};
@@ -180,6 +246,8 @@ Expected<Sequence> run_track(const TrackCase& the_case, const case_registration:
     Sequence sequence = estimate_sequence(the_case, sights);
     sequence.warnings.insert(sequence.warnings.end(), images.warnings().begin(), images.warnings().end());
     sequence.warnings.insert(sequence.warnings.end(), tracker.warnings().begin(), tracker.warnings().end());
+    sequence.sights = std::move(sights);
+    warn_of_corrections(the_case, sequence);
     sequence.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     return sequence;
   });

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "helicarm/report/chart.h"
 #include "helicarm/track/sequence.h"
 
 namespace helicarm::track {
@@ -13,6 +14,10 @@ namespace helicarm::track {
 struct TrackOptions {
   std::optional<std::filesystem::path> out;  ///< folder for rows as they are computed; nothing: none are kept
   bool resume = false;                       ///< goes on after the rows in `out`
+  /// `Sequence::sights` of the same case, from the first frame on: not looked at again, up to the first frame
+  /// whose corrections are others than `kept_corrections`.
+  std::vector<FrameSights> kept = {};
+  std::vector<MarkerPick> kept_corrections = {};
   /// Told why rows of an interrupted run are computed again.
   std::function<void(const std::string&)> on_note = {};
 };
@@ -50,6 +55,14 @@ std::string points2d_csv(const Sequence& sequence, const TrackCase& the_case);
 std::string points3d_csv(const Sequence& sequence, const TrackCase& the_case);
 /// Autoscoper's tracking of a body: a row per frame, the 16 numbers of its smoothed pose by rows, mm.
 std::string tra_of(const BodySequence& body);
+
+/// Curves of the report that belong together, with 95 % bars.
+struct CurveSheet {
+  std::string title;  ///< body, or body / reference
+  std::vector<report::Chart> charts;
+};
+/// Of each body, of each further body in the first one, and of each joint.
+std::vector<CurveSheet> curve_sheets(const Sequence& sequence, const TrackCase& the_case);
 
 /// report.html as one page.
 std::string track_report(const Sequence& sequence, const TrackCase& the_case);

@@ -95,21 +95,58 @@ std::size_t marker_named(TrackCase& read, const std::string& name) {
   return read.markers.size() - 1;
 }
 
-/// Refuses picks of other frames.
-void check_frames_of_picks(const std::vector<pipeline::Pick>& picks, int first, const std::string& origin) {
+/// Refuses picks of frames before the first and of frames that the range leaves out.
+void check_frames_of_picks(const std::vector<pipeline::Pick>& picks,
+                           const case_registration::FrameRange& frames, bool is_found,
+                           const std::string& origin) {
+  const int first = frames.first;
   std::set<int> others;
   for (const pipeline::Pick& pick : picks)
-    if (pick.frame && *pick.frame != first) others.insert(*pick.frame);
+    if (pick.frame && *pick.frame != first) {
+      others.insert(*pick.frame);
+      if (*pick.frame<frames.last&& * pick.frame> first && (*pick.frame - first) % frames.step != 0)
+        throw BadInput(
+            Reason::bad_value,
+            fmt::format("{}: picks: \"{}\" of frame {}: is not among the frames, every {}th from {} on",
+                        origin, pick.name, *pick.frame, frames.step, first));
+    }
   if (others.empty()) return;
   const bool none = std::ranges::none_of(
       picks, [&](const pipeline::Pick& pick) { return pick.frame.value_or(first) == first; });
-  throw BadInput(Reason::bad_value,
-                 none ? fmt::format("{}: picks: none is of the first frame, {}; they are of frame {}: begin "
-                                    "--frames there, or pick the markers in frame {}",
-                                    origin, first, fmt::join(others, ", "), first)
-                      : fmt::format("{}: picks: of the frames {} beside the first frame, {}: only the first "
-                                    "frame is picked",
-                                    origin, fmt::join(others, ", "), first));
+  if (is_found || (!none && *others.begin() > first)) return;
+  throw BadInput(
+      Reason::bad_value,
+      none ? fmt::format("{}: picks: none is of the first frame, {}; they are of frame {}: begin "
+                         "--frames there, or pick the markers in frame {}",
+                         origin, first, fmt::join(others, ", "), first)
+           : fmt::format("{}: picks: of the frames {} beside the first frame, {}: picks begin with the "
+                         "first frame",
+                         origin, fmt::join(others, ", "), first));
+}
+
+/// As the search of the first frame names markers.
+bool is_name_of_found(const std::string& name) {
+  return name.size() > 1 && name[0] == 'M' && name.find_first_not_of("0123456789", 1) == name.npos;
+}
+
+/// Picks of later frames, of markers that the first one has; those behind the last frame count in a longer
+/// run.
+void take_corrections(TrackCase& read, const pipeline::Case& base,
+                      const case_registration::FrameRange& frames, const std::string& origin) {
+  for (const pipeline::Pick& pick : base.picks) {
+    const int frame = pick.frame.value_or(frames.first);
+    if (frame <= frames.first || frame > frames.last) continue;
+    const auto marker = std::ranges::find(read.markers, pick.name);
+    if (marker == read.markers.end())
+      throw BadInput(
+          Reason::bad_value,
+          fmt::format("{}: picks: \"{}\" of frame {}: the first frame, {}, has no such marker: pick "
+                      "it there",
+                      origin, pick.name, frame, frames.first));
+    const auto view = std::ranges::find(base.views, pick.view, &pipeline::CaseView::name);
+    read.corrections.push_back({std::size_t(marker - read.markers.begin()),
+                                std::size_t(view - base.views.begin()), pick.uv_raw, frame});
+  }
 }
 
 std::vector<Eigen::Vector3d> geometry_from(const fs::path& file, const TrackCase& read,
@@ -200,7 +237,11 @@ Expected<TrackCase> read_track_case(const fs::path& path, const case_registratio
       throw BadInput(
           Reason::bad_value,
           fmt::format("{}: \"picks\" and a file of points name the markers: leave one out", origin));
-    check_frames_of_picks(base.picks, frames.first, origin);
+    // Picks of later frames may correct markers that were found, which have these names.
+    const bool is_found = !points && std::ranges::all_of(base.picks, [&](const pipeline::Pick& pick) {
+      return pick.frame.value_or(frames.first) > frames.first && is_name_of_found(pick.name);
+    });
+    check_frames_of_picks(base.picks, frames, is_found, origin);
     TrackCase read;
     read.folder = base.folder;
     read.warnings = base.warnings;
@@ -222,6 +263,7 @@ Expected<TrackCase> read_track_case(const fs::path& path, const case_registratio
     if (base.markers) read.diameter_mm = base.markers->diameter_mm;
     read.frame_rate_hz = base.frame_rate_hz;
     for (const pipeline::Pick& pick : base.picks) {
+      if (pick.frame.value_or(frames.first) != frames.first) continue;
       const auto view = std::ranges::find(base.views, pick.view, &pipeline::CaseView::name);
       read.picks.push_back(
           {marker_named(read, pick.name), std::size_t(view - base.views.begin()), pick.uv_raw});
@@ -232,7 +274,8 @@ Expected<TrackCase> read_track_case(const fs::path& path, const case_registratio
       calibrate(read, base, frames);
     if (points) take_points(read, *points, frames);
     if (!is_placed) complete_picks(read, frames);
-    read_bodies(read, base.bodies, points || !base.picks.empty(), origin);
+    take_corrections(read, base, frames, origin);
+    read_bodies(read, base.bodies, points || !is_found, origin);
     if (is_placed) check_geometry_of_points(read, points->file.filename().string());
     return read;
   });

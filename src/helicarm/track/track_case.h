@@ -23,11 +23,13 @@ struct TrackView : SequenceView {
   std::optional<rectification::DistortionMap> map;  ///< raw to rectified; nothing: none
 };
 
-/// A marker's place in one view of the first frame.
+/// A marker's place in one view of the first frame; or of a later one, a correction.
 struct MarkerPick {
   std::size_t marker;
   std::size_t view;
   Eigen::Vector2d uv_raw;
+  std::optional<int> frame = {};  ///< of a correction
+  bool operator==(const MarkerPick&) const = default;
 };
 
 /// A rigid set of markers.
@@ -46,6 +48,8 @@ struct TrackCase {
   std::optional<double> frame_rate_hz;
   std::vector<std::string> markers;
   std::vector<MarkerPick> picks;  ///< of the first frame
+  /// Of later frames: the marker is at the disc nearest to it there, and is followed from there on.
+  std::vector<MarkerPick> corrections = {};
   std::vector<BodyPlan> bodies;
   std::optional<Butterworth> butterworth;  ///< places filtered as laboratories do, for comparison
   std::vector<BodyAxes> axes;  ///< the first body is the reference of the others; empty: no joint angles

@@ -43,19 +43,23 @@ std::vector<std::vector<report::Chart>> filter_charts(const Sequence& sequence, 
   return charts;
 }
 
+report::Chart residual_chart(const Sequence& sequence, std::size_t body) {
+  report::Chart rms{"Markers from their places in the body", "frame", "rms, mm"};
+  report::ChartSeries residual{""};
+  for (std::size_t f = 0; f < sequence.frames.size(); ++f)
+    residual.points.push_back(
+        {double(sequence.frames[f]), sequence.bodies[body].frames[f].rms_mm.value_or(no_value)});
+  rms.series.push_back(std::move(residual));
+  rms.y_from_zero = true;
+  return rms;
+}
+
 std::string body_charts(const Sequence& sequence, const TrackCase& the_case) {
   std::vector<std::string> names;
   std::vector<report::Chart> residuals;
   for (std::size_t b = 0; b < the_case.bodies.size(); ++b) {
     names.push_back(the_case.bodies[b].name);
-    report::Chart rms{"Markers from their places in the body", "frame", "rms, mm"};
-    report::ChartSeries residual{""};
-    for (std::size_t f = 0; f < sequence.frames.size(); ++f)
-      residual.points.push_back(
-          {double(sequence.frames[f]), sequence.bodies[b].frames[f].rms_mm.value_or(no_value)});
-    rms.series.push_back(std::move(residual));
-    rms.y_from_zero = true;
-    residuals.push_back(std::move(rms));
+    residuals.push_back(residual_chart(sequence, b));
   }
   return motion_charts(sequence.frames, names, sequence.bodies, sequence.relative, residuals,
                        filter_charts(sequence, the_case));
@@ -84,26 +88,31 @@ std::optional<report::Chart> shift_chart(const Sequence& sequence, const Joint& 
   return is_any ? std::optional(std::move(chart)) : std::nullopt;
 }
 
-std::string joint_charts(const Sequence& sequence, const TrackCase& the_case) {
+std::vector<report::Chart> charts_of_joint(const Sequence& sequence, const Joint& joint) {
   constexpr double to_degrees = 180 / EIGEN_PI, bar_sigmas = 1.959964;
   constexpr std::array names{"flexion", "adduction", "external rotation"};
+  report::Chart chart{"Joint angles (Grood and Suntay)", "frame", "degrees"};
+  for (int i = 0; i < 3; ++i) {
+    report::ChartSeries curve{names[std::size_t(i)]};
+    curve.joined = true;
+    for (std::size_t f = 0; f < sequence.frames.size(); ++f) {
+      const auto& at = joint.frames[f];
+      const double value = at ? to_degrees * at->angles[i] : no_value;
+      const double width = at ? bar_sigmas * to_degrees * std::sqrt(at->covariance(i, i)) : no_value;
+      curve.points.push_back({double(sequence.frames[f]), value});
+      curve.ranges.push_back({value - width, value + width});
+    }
+    chart.series.push_back(std::move(curve));
+  }
+  std::vector<report::Chart> charts{std::move(chart)};
+  if (auto shifts = shift_chart(sequence, joint)) charts.push_back(std::move(*shifts));
+  return charts;
+}
+
+std::string joint_charts(const Sequence& sequence, const TrackCase& the_case) {
   std::string html;
   for (const Joint& joint : sequence.joints) {
-    report::Chart chart{"Joint angles (Grood and Suntay)", "frame", "degrees"};
-    for (int i = 0; i < 3; ++i) {
-      report::ChartSeries curve{names[std::size_t(i)]};
-      curve.joined = true;
-      for (std::size_t f = 0; f < sequence.frames.size(); ++f) {
-        const auto& at = joint.frames[f];
-        const double value = at ? to_degrees * at->angles[i] : no_value;
-        const double width = at ? bar_sigmas * to_degrees * std::sqrt(at->covariance(i, i)) : no_value;
-        curve.points.push_back({double(sequence.frames[f]), value});
-        curve.ranges.push_back({value - width, value + width});
-      }
-      chart.series.push_back(std::move(curve));
-    }
-    std::vector<report::Chart> charts{std::move(chart)};
-    if (auto shifts = shift_chart(sequence, joint)) charts.push_back(std::move(*shifts));
+    const auto charts = charts_of_joint(sequence, joint);
     html += fmt::format(
         "<h2>Joint of {} and {}</h2>\n<figure class=\"plain\">{}<figcaption>Smoothed; bars: 95 %, of "
         "the poses.</figcaption></figure>\n",
@@ -185,6 +194,26 @@ std::string distance_table(const Sequence& sequence, const TrackCase& the_case) 
 }
 
 }  // namespace
+
+std::vector<CurveSheet> curve_sheets(const Sequence& sequence, const TrackCase& the_case) {
+  std::vector<CurveSheet> sheets;
+  for (std::size_t b = 0; b < sequence.bodies.size(); ++b) {
+    const auto& smooth = sequence.bodies[b].smoothed;
+    sheets.push_back({the_case.bodies[b].name,
+                      {pose_chart(sequence.frames, smooth, "Centre from its place in the first frame", false),
+                       pose_chart(sequence.frames, smooth, "Rotation vector against the first frame", true),
+                       residual_chart(sequence, b)}});
+  }
+  for (std::size_t b = 0; b < sequence.relative.size(); ++b)
+    sheets.push_back(
+        {the_case.bodies[b + 1].name + " / " + the_case.bodies[0].name,
+         {pose_chart(sequence.frames, sequence.relative[b], "Centre in the reference body", false),
+          pose_chart(sequence.frames, sequence.relative[b], "Rotation vector in the reference body", true)}});
+  for (const Joint& joint : sequence.joints)
+    sheets.push_back({the_case.bodies[joint.body].name + " / " + the_case.bodies[joint.reference].name,
+                      charts_of_joint(sequence, joint)});
+  return sheets;
+}
 
 std::string track_report(const Sequence& sequence, const TrackCase& the_case) {
   std::array<int, 4> counts{};

@@ -36,7 +36,8 @@ class Tracker {
   const FrameSights& first() const { return first_; }
   const std::vector<Warning>& warnings() const { return warnings_; }
 
-  /// The markers in the images of the frame after the last one absorbed.
+  /// The markers in the images of the frame after the last one absorbed; those that the case corrects there
+  /// are where it says.
   FrameSights look(int frame, const std::vector<xray::XrayImage>& images) const;
   void absorb(const FrameSights& sights);
 
@@ -76,6 +77,9 @@ class Tracker {
   };
 
   explicit Tracker(const TrackCase& the_case) : given_(&the_case) {}
+  FrameSights look_freely(int frame, const std::vector<xray::XrayImage>& images) const;
+  void correct(FrameSights& sights, const std::vector<xray::XrayImage>& images) const;
+  bool is_corrected(std::size_t marker, int frame) const;
   Eigen::Vector2d rectified(std::size_t view, const Eigen::Vector2d& raw) const;
   Eigen::Vector2d raw(std::size_t view, const Eigen::Vector2d& uv) const;
   double radius_px(std::size_t view, const Eigen::Vector3d& place) const;
@@ -96,6 +100,8 @@ class Tracker {
   void seek_evidence(FrameSights& sights, const std::vector<ExpectedMarker>& expected,
                      const std::vector<xray::XrayImage>& images) const;
   ContrastModel contrast_of(std::size_t marker, std::size_t view) const;
+  bool may_be_noise(const MarkerImage& image, const MarkerPick& pick, const FrameSights& sights,
+                    const xray::XrayImage& of) const;
   std::vector<MarkerPick> drop_weak_first(const std::vector<xray::XrayImage>& images);
   void learn_appearance(const std::vector<xray::XrayImage>& images);
   void find_first(int frame, const std::vector<xray::XrayImage>& images);

@@ -135,6 +135,8 @@ void Tracker::absorb(const FrameSights& sights) {
       const std::size_t m = plan.markers[i];
       if (now[m].located && body.hidden == 0) {
         const Eigen::Vector3d in_body = pose.inverse() * now[m].place;
+        // What another disc taught of its place in the body does not count any more.
+        if (is_corrected(m, sights.frame)) body.seen[i] = 0;
         if (body.seen[i] > 0 && (in_body - body.in_body[i]).norm() < 5 * body.loose_mm) {
           squares += (in_body - body.in_body[i]).squaredNorm();
           residuals += 3;
@@ -153,14 +155,15 @@ void Tracker::absorb(const FrameSights& sights) {
     MarkerState& state = markers_[m];
     if (!state.known && !now[m].located) continue;
     const Eigen::Vector3d moved = now[m].place - state.place;
-    if (state.known && now[m].located) {
+    const bool goes_on = state.known && !is_corrected(m, sights.frame);
+    if (goes_on && now[m].located) {
       const double grown = (1 + state.hidden) * (1 + state.hidden);
       state.acceleration_mm =
           std::clamp(mean_square(state.acceleration_mm, (moved - state.velocity).squaredNorm() / grown, 3),
                      least_acceleration_mm, 5.0);
       update_delay(m, sights, now[m].place, 0.5 * (moved + velocities[m]));
     }
-    state.velocity = state.known ? moved : Eigen::Vector3d::Zero();
+    state.velocity = goes_on ? moved : Eigen::Vector3d::Zero();
     state.place = now[m].place;
     state.hidden = now[m].located ? 0 : state.hidden + 1;
     state.known = true;

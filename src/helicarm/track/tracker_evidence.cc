@@ -96,24 +96,27 @@ void Tracker::seek_evidence(FrameSights& sights, const std::vector<ExpectedMarke
   }
 }
 
-/// Leaves out the discs near picks that background explains as well: each is one of many places within reach.
+/// Whether background explains the disc near a pick as well: it is one of many places within reach.
+bool Tracker::may_be_noise(const MarkerImage& image, const MarkerPick& pick, const FrameSights& sights,
+                           const xray::XrayImage& of) const {
+  const double radius = radius_px(pick.view, markers_[pick.marker].place), reach = pick_reach_px + radius;
+  std::vector<KnownNeighbour> others;
+  for (std::size_t i = 0; i < markers_.size(); ++i)
+    if (const auto& other = sights.of[i][pick.view]; other && i != pick.marker)
+      others.push_back({other->uv_raw, other->radius_px});
+  const KnownMarker known{image.uv_raw, Eigen::Matrix2d::Zero(),
+                          appearance_[pick.view].radius_factor * radius, contrast_of(pick.marker, pick.view)};
+  const auto fit = fit_known_marker(of.pixels, known, others, appearance_[pick.view]);
+  if (!fit) return false;
+  const double one_of_many = std::log(2 * std::pow(fit->image.sigma_px / reach, 2));
+  return fit->evidence + std::min(0.0, one_of_many) < enough_evidence();
+}
+
 std::vector<MarkerPick> Tracker::drop_weak_first(const std::vector<xray::XrayImage>& images) {
   std::vector<MarkerPick> dropped;
   for (const MarkerPick& pick : given_->picks) {
-    auto& image = first_.of[pick.marker][pick.view];
-    if (!image) continue;
-    const double radius = radius_px(pick.view, markers_[pick.marker].place), reach = pick_reach_px + radius;
-    std::vector<KnownNeighbour> others;
-    for (std::size_t i = 0; i < markers_.size(); ++i)
-      if (const auto& other = first_.of[i][pick.view]; other && i != pick.marker)
-        others.push_back({other->uv_raw, other->radius_px});
-    const KnownMarker known{image->uv_raw, Eigen::Matrix2d::Zero(),
-                            appearance_[pick.view].radius_factor * radius,
-                            contrast_of(pick.marker, pick.view)};
-    const auto fit = fit_known_marker(images[pick.view].pixels, known, others, appearance_[pick.view]);
-    if (!fit) continue;
-    const double one_of_many = std::log(2 * std::pow(fit->image.sigma_px / reach, 2));
-    if (fit->evidence + std::min(0.0, one_of_many) >= enough_evidence()) continue;
+    const auto& image = first_.of[pick.marker][pick.view];
+    if (!image || !may_be_noise(*image, pick, first_, images[pick.view])) continue;
     dropped.push_back(pick);
     if (std::ranges::count(given_->picks, pick.marker, &MarkerPick::marker) >= 2)
       markers_[pick.marker].known = true;

@@ -36,6 +36,12 @@ std::vector<std::vector<Candidate>> Tracker::search(const std::vector<xray::Xray
 }
 
 FrameSights Tracker::look(int frame, const std::vector<xray::XrayImage>& images) const {
+  FrameSights sights = look_freely(frame, images);
+  correct(sights, images);
+  return sights;
+}
+
+FrameSights Tracker::look_freely(int frame, const std::vector<xray::XrayImage>& images) const {
   const std::size_t count = markers_.size();
   std::vector<ExpectedMarker> markers;
   for (std::size_t m = 0; m < count; ++m) {
