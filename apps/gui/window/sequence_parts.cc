@@ -2,13 +2,19 @@
 // The parts of the window of a sequence: controls, film, and its tables.
 #include <QHBoxLayout>
 #include <QHeaderView>
+#include <QPainter>
+#include <QShortcut>
+#include <QSvgRenderer>
+#include <QTabWidget>
 #include <QVBoxLayout>
 
+#include "gui/replay/print_svg.h"
 #include "gui/window/sequence_window.h"
 #include "gui/window/style.h"
 #include "gui/xray/text.h"
 #include "gui/xray/xray_view.h"
 #include "helicarm/localization/error_bound.h"
+#include "helicarm/track/track.h"
 
 namespace helicarm::gui {
 namespace {
@@ -60,7 +66,11 @@ SequenceWindow::SequenceWindow(QWidget* parent) : QDialog(parent) {
   says_->setWordWrap(true);
   column->addWidget(says_);
   column->addWidget(build_film(), 3);
-  column->addWidget(build_tables(), 2);
+  auto* tabs = new QTabWidget;
+  tabs->setObjectName("sequenceTabs");
+  tabs->addTab(build_tables(), tr("&Markers"));
+  tabs->addTab(build_curves(), tr("&Curves"));
+  column->addWidget(tabs, 2);
   connect(&clock_, &QTimer::timeout, this, &SequenceWindow::play_on);
   clock_.setInterval(film_ms);
   resize(1100, 740);
@@ -87,6 +97,8 @@ QWidget* SequenceWindow::build_top() {
   };
   read_ = add(tr("&Read"), "sequenceRead", [this] { read(); });
   follow_ = add(tr("&Follow the markers"), "sequenceFollow", [this] { follow(); });
+  undo_ = add(tr("&Undo the pick"), "sequenceUndo", [this] { undo_pick(); });
+  connect(new QShortcut(QKeySequence::Undo, this), &QShortcut::activated, this, [this] { undo_pick(); });
   cancel_ = add(tr("&Cancel"), "sequenceCancel", [this] { *stopped_ = true; });
   write_ = add(tr("&Write tables and report..."), "sequenceWrite", [this] { ask_and_write(); });
   save_film_ = add(tr("&Save the film..."), "sequenceFilm", [this] { ask_and_film(); });
@@ -134,9 +146,58 @@ QWidget* SequenceWindow::build_tables() {
   by_frames_ = add_list("markersByFrames", tr("Markers by frames"));
   connect(by_frames_, &QTableWidget::cellClicked, this, [this](int frame, int) { set_frame(frame); });
   connect(by_frames_, &QTableWidget::cellActivated, this, [this](int frame, int) { set_frame(frame); });
+  markers_->setSelectionBehavior(QAbstractItemView::SelectRows);
+  markers_->setSelectionMode(QAbstractItemView::SingleSelection);
+  markers_->setToolTip(tr("A click in an image places the selected marker there, in the displayed frame"));
+  connect(markers_, &QTableWidget::itemSelectionChanged, this, &SequenceWindow::allow);
   row->addWidget(markers_, 1);
   row->addWidget(by_frames_, 1);
   return whole;
+}
+
+QWidget* SequenceWindow::build_curves() {
+  auto* whole = new QWidget;
+  auto* column = new QVBoxLayout(whole);
+  column->setContentsMargins(0, 0, 0, 0);
+  sheet_ = new QComboBox;
+  sheet_->setObjectName("sequenceSheet");
+  sheet_->setAccessibleName(tr("Body, or body / reference"));
+  connect(sheet_, &QComboBox::currentIndexChanged, this, &SequenceWindow::show_curves);
+  curves_ = new CurvesView;
+  curves_->setObjectName("sequenceCurves");
+  curves_->setAccessibleName(tr("Curves of the smooth motion with 95 % bars"));
+  column->addWidget(sheet_);
+  column->addWidget(curves_, 1);
+  return whole;
+}
+
+/// Those of the report.
+void SequenceWindow::show_curves() {
+  const auto sheets = shown_ && shown_->sequence ? track::curve_sheets(*shown_->sequence, shown_->given)
+                                                 : std::vector<track::CurveSheet>();
+  const int chosen = std::max(0, sheet_->currentIndex());
+  const QSignalBlocker quiet(sheet_);
+  sheet_->clear();
+  for (const track::CurveSheet& sheet : sheets) sheet_->addItem(text(sheet.title));
+  if (sheets.empty()) return curves_->show_svg({});
+  const int at = std::min(chosen, int(sheets.size()) - 1);
+  sheet_->setCurrentIndex(at);
+  const auto& charts = sheets[std::size_t(at)].charts;
+  curves_->show_svg(print_svg(report::chart_svg(charts, charts.size()), true));
+}
+
+void CurvesView::show_svg(QByteArray svg) {
+  svg_ = std::move(svg);
+  update();
+}
+
+void CurvesView::paintEvent(QPaintEvent*) {
+  if (svg_.isEmpty()) return;
+  QSvgRenderer drawn(svg_);
+  drawn.setAspectRatioMode(Qt::KeepAspectRatio);
+  QPainter painter(this);
+  painter.fillRect(rect(), Qt::white);
+  drawn.render(&painter, rect());
 }
 
 void SequenceWindow::allow() {
@@ -144,7 +205,9 @@ void SequenceWindow::allow() {
   read_->setEnabled(!busy_);
   follow_->setEnabled(!busy_ && shown_);
   cancel_->setEnabled(busy_);
-  write_->setEnabled(!busy_ && is_followed && !shown_->sequence->failure);
+  write_->setEnabled(!busy_ && is_followed && !shown_->sequence->failure && !shown_->is_corrected());
+  undo_->setEnabled(!busy_ && corrections_.can_undo());
+  for (XrayView* view : views_) view->set_picking(!busy_ && shown_ && markers_->currentRow() >= 0);
   save_film_->setEnabled(!busy_ && shown_ && !film_);
   for (QWidget* control : std::initializer_list<QWidget*>{play_, slider_})
     control->setEnabled(shown_ != nullptr);
@@ -158,6 +221,9 @@ void SequenceWindow::show_views() {
   while (views_.size() < shown_->given.views.size()) {
     views_.push_back(new XrayView);
     views_.back()->set_layer(Layer::raw);
+    connect(views_.back(), &XrayView::picked, this, [this, view = views_.size() - 1](const QPointF& raw) {
+      pick(view, {raw.x(), raw.y()});
+    });
     film_row_->addWidget(views_.back());
   }
 }

@@ -8,6 +8,7 @@
 #include <QVBoxLayout>
 #include <algorithm>
 #include <climits>
+#include <set>
 
 #include "gui/controller/steps.h"
 #include "gui/window/ask_files.h"
@@ -119,6 +120,7 @@ void SequenceWindow::take(const Expected<std::shared_ptr<const FollowedSequence>
     return allow();
   }
   shown_ = *done;
+  if (!shown_->sequence) corrections_ = Corrections(shown_->given);
   const auto& sequence = shown_->sequence;
   QStringList words;
   if (!sequence)
@@ -140,8 +142,50 @@ void SequenceWindow::take(const Expected<std::shared_ptr<const FollowedSequence>
   displayed_ = -1;
   show_views();
   fill_tables();
+  show_curves();
   allow();
   read_frame();
+}
+
+void SequenceWindow::pick(std::size_t view, const Eigen::Vector2d& raw) {
+  const int marker = markers_->currentRow();
+  if (!shown_ || busy_ || marker < 0 || displayed_ < 0) return;
+  const int frame = shown_->range.first + displayed_ * shown_->range.step;
+  corrections_.set({std::size_t(marker), view, raw, frame}, shown_->range);
+  take_picks();
+}
+
+void SequenceWindow::undo_pick() {
+  if (busy_ || !corrections_.can_undo()) return;
+  corrections_.undo();
+  take_picks();
+}
+
+/// Shows and keeps them; the sequence stays that of the picks before until it is followed again.
+void SequenceWindow::take_picks() {
+  auto changed = std::make_shared<FollowedSequence>(*shown_);
+  corrections_.put_into(changed->given);
+  shown_ = changed;
+  const auto saved = corrections_.save(folder_, shown_->given, shown_->range);
+  says_->setText(
+      !saved ? sentence_of(saved.error())
+      : shown_->sequence && !shown_->is_corrected()
+          ? tr("The picks are those that the markers were followed from.")
+          : tr("The picks are in case.json. \"Follow the markers\" goes on from their first frame."));
+  displayed_ = -1;
+  allow();
+  read_frame();
+}
+
+std::vector<track::MarkerPick> SequenceWindow::picks_of(int frame) const {
+  std::vector<track::MarkerPick> made;
+  if (shown_->is_corrected())
+    for (const track::MarkerPick& pick : shown_->given.corrections)
+      if (pick.frame == frame) made.push_back(pick);
+  if (!shown_->sequence || (shown_->is_corrected() && frame == shown_->range.first))
+    for (const track::MarkerPick& pick : shown_->given.picks)
+      if (frame == shown_->range.first) made.push_back(pick);
+  return made;
 }
 
 void SequenceWindow::read() {
@@ -165,7 +209,14 @@ void SequenceWindow::follow() {
       [from = shown_, stopped = stopped_, tell]() -> Expected<std::shared_ptr<const FollowedSequence>> {
         try {
           auto followed = std::make_shared<FollowedSequence>(*from);
-          auto sequence = track::run_track(from->given, from->range, {}, [&](int frame) {
+          followed->picks = from->given.picks;
+          followed->corrections = from->given.corrections;
+          track::TrackOptions options;
+          if (from->sequence && from->picks == from->given.picks) {
+            options.kept = from->sequence->sights;
+            options.kept_corrections = from->corrections;
+          }
+          auto sequence = track::run_track(from->given, from->range, options, [&](int frame) {
             tell(frame);
             if (*stopped) throw Cancelled();
           });
@@ -214,9 +265,14 @@ void SequenceWindow::show_frame(int number, const Expected<std::vector<xray::Xra
   for (std::size_t i = 0; i < views_.size(); ++i) {
     views_[i]->show_view(result, i, true);
     std::vector<FreshPick> marks;
+    std::set<std::size_t> picked;
+    for (const track::MarkerPick& pick : picks_of(frame))
+      if (pick.view == i && picked.insert(pick.marker).second)
+        marks.push_back({text(shown_->given.markers[pick.marker]), pick.uv_raw});
     if (const auto& sequence = shown_->sequence)
       for (std::size_t m = 0; m < shown_->given.markers.size(); ++m)
-        if (const auto& seen = sequence->images[std::size_t(number)][m * views_.size() + i])
+        if (const auto& seen = sequence->images[std::size_t(number)][m * views_.size() + i];
+            seen && !picked.contains(m))
           marks.push_back({text(shown_->given.markers[m]), seen->uv_raw});
     views_[i]->set_picks(std::move(marks));
   }

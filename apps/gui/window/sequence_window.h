@@ -2,6 +2,7 @@
 #pragma once
 
 #include <QCheckBox>
+#include <QComboBox>
 #include <QDialog>
 #include <QLabel>
 #include <QLineEdit>
@@ -14,6 +15,7 @@
 #include <memory>
 #include <optional>
 
+#include "gui/controller/corrections.h"
 #include "helicarm/case_registration/follow_case.h"
 #include "helicarm/core/failure.h"
 #include "helicarm/track/sequence.h"
@@ -32,6 +34,27 @@ struct FollowedSequence {
   track::SequenceImages images;
   case_registration::FrameRange range;
   std::optional<track::Sequence> sequence;
+  std::vector<track::MarkerPick> picks = {}, corrections = {};  ///< that `sequence` was followed from
+
+  /// Whether picks were made since.
+  bool is_corrected() const { return sequence && (picks != given.picks || corrections != given.corrections); }
+};
+
+/// The curves of a sheet of the report, on white.
+class CurvesView : public QWidget {
+  Q_OBJECT
+
+ public:
+  using QWidget::QWidget;
+  /// An SVG document.
+  void show_svg(QByteArray svg);
+  const QByteArray& svg() const { return svg_; }
+
+ protected:
+  void paintEvent(QPaintEvent* event) override;
+
+ private:
+  QByteArray svg_;
 };
 
 /// A marker through a sequence: in how many frames it is tracked, and its worst 95 % error there, mm.
@@ -48,8 +71,9 @@ bool is_sequence(const std::filesystem::path& folder);
 /// All frames of its first view, as A-B; empty if they are not known.
 QString all_frames(const std::filesystem::path& folder);
 
-/// A sequence of images with markers: follows them, plays the images with their marks, and lists the markers
-/// and their places by frames.
+/// A sequence of images with markers: follows them, plays the images with their marks, lists the markers
+/// and their places by frames, and draws the bodies' curves. The marker that is selected in the list is
+/// picked by a click in an image, from whose frame it is then followed again.
 class SequenceWindow : public QDialog {
   Q_OBJECT
 
@@ -64,11 +88,18 @@ class SequenceWindow : public QDialog {
   /// Of the shown frames, from 0.
   int frame() const { return slider_->value(); }
   void set_frame(int number) { slider_->setValue(number); }
+  /// The selected marker is at this raw pixel of the view in the displayed frame; kept in case.json at once.
+  void pick(std::size_t view, const Eigen::Vector2d& raw);
 
  private:
   QWidget* build_top();
   QWidget* build_film();
   QWidget* build_tables();
+  QWidget* build_curves();
+  void show_curves();
+  std::vector<track::MarkerPick> picks_of(int frame) const;
+  void take_picks();
+  void undo_pick();
   void read();
   void follow();
   void run(const QString& doing, std::function<Expected<std::shared_ptr<const FollowedSequence>>()> work);
@@ -89,10 +120,13 @@ class SequenceWindow : public QDialog {
   std::optional<std::filesystem::path> film_;  ///< folder of the frames that are written as they are shown
   bool busy_ = false, reading_ = false;
   int displayed_ = -1;
+  Corrections corrections_;
 
   QLineEdit* frames_ = nullptr;
   QPushButton *read_ = nullptr, *follow_ = nullptr, *cancel_ = nullptr, *write_ = nullptr,
-              *save_film_ = nullptr, *play_ = nullptr;
+              *save_film_ = nullptr, *play_ = nullptr, *undo_ = nullptr;
+  QComboBox* sheet_ = nullptr;
+  CurvesView* curves_ = nullptr;
   QLabel *says_ = nullptr, *number_ = nullptr;
   QWidget* film_frame_ = nullptr;
   QHBoxLayout* film_row_ = nullptr;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sequence of markers: its film, its list of markers, and its table by frames.
+#include <QTabWidget>
 #include <QTableWidget>
 #include <cmath>
 
@@ -127,6 +128,59 @@ TEST_F(WindowSequence, IsFollowedPlayedAndListedByFrames) {
   sequence()->set_frame(0);
   QTest::mouseClick(sequence()->findChild<QPushButton*>("sequencePlay"), Qt::LeftButton);
   ASSERT_TRUE(wait("it plays to its end", [&] { return sequence()->frame() == frames_drawn - 1; }));
+}
+
+TEST_F(WindowSequence, APickInALaterFrameIsKeptFollowedAndUndone) {
+  ASSERT_NO_FATAL_FAILURE(write_sequence(folder_ / "run"));
+  window_->open_paths({folder_ / "run" / "case.json"});
+  ASSERT_TRUE(wait("the sequence is shown", [&] { return sequence() != nullptr; }));
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  const auto follow = [&] {
+    QTest::mouseClick(sequence()->findChild<QPushButton*>("sequenceFollow"), Qt::LeftButton);
+    wait_free();
+  };
+  ASSERT_NO_FATAL_FAILURE(follow());
+  ASSERT_TRUE(sequence()->shown()->sequence) << says();
+  const auto before = sequence()->shown()->sequence->sights;
+  constexpr int corrected = 4;
+  sequence()->set_frame(corrected - 1);
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  table("markerList")->selectRow(0);
+  const Eigen::Vector2d at = project(1, beads(corrected)[2].at);
+  sequence()->pick(1, at);
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  EXPECT_TRUE(sequence()->shown()->is_corrected());
+  EXPECT_FALSE(sequence()->findChild<QPushButton*>("sequenceWrite")->isEnabled());
+  const auto case_picks = [&] { return read_json(folder_ / "run" / "case.json")->at("picks"); };
+  EXPECT_EQ(case_picks().size(), 9u);
+  EXPECT_EQ(case_picks().back().at("frame"), corrected);
+  ASSERT_NO_FATAL_FAILURE(follow());
+  const auto& after = sequence()->shown()->sequence->sights;
+  ASSERT_TRUE(after[corrected - 1].of[0][1]) << says();
+  EXPECT_LT((after[corrected - 1].of[0][1]->uv_raw - at).norm(), 0.3);
+  EXPECT_EQ(after[corrected - 2].of[0][0]->uv_raw, before[corrected - 2].of[0][0]->uv_raw);
+  QTest::mouseClick(sequence()->findChild<QPushButton*>("sequenceUndo"), Qt::LeftButton);
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  EXPECT_EQ(case_picks().size(), 8u);
+  ASSERT_NO_FATAL_FAILURE(follow());
+  EXPECT_EQ(sequence()->shown()->sequence->sights[corrected - 1].of[0][1]->uv_raw,
+            before[corrected - 1].of[0][1]->uv_raw);
+}
+
+TEST_F(WindowSequence, CurvesAreThoseOfTheReport) {
+  ASSERT_NO_FATAL_FAILURE(write_sequence(folder_ / "run"));
+  window_->open_paths({folder_ / "run" / "case.json"});
+  ASSERT_TRUE(wait("the sequence is shown", [&] { return sequence() != nullptr; }));
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  auto* curves = sequence()->findChild<CurvesView*>("sequenceCurves");
+  EXPECT_TRUE(curves->svg().isEmpty());
+  QTest::mouseClick(sequence()->findChild<QPushButton*>("sequenceFollow"), Qt::LeftButton);
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  EXPECT_EQ(sequence()->findChild<QComboBox*>("sequenceSheet")->currentText(), "jaw");
+  EXPECT_TRUE(curves->svg().contains("Rotation vector against the first frame"));
+  sequence()->findChild<QTabWidget*>("sequenceTabs")->setCurrentIndex(1);
+  screenshot("sequence-curves", sequence());
+  EXPECT_EQ(illegible_parts(*sequence()).join('\n').toStdString(), "");
 }
 
 TEST_F(WindowSequence, AnImageThatIsMissingIsNamed) {
