@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sequence of markers: its film, its list of markers, and its table by frames.
+#include <QSvgRenderer>
 #include <QTabWidget>
 #include <QTableWidget>
 #include <cmath>
@@ -178,6 +179,7 @@ TEST_F(WindowSequence, CurvesAreThoseOfTheReport) {
   ASSERT_NO_FATAL_FAILURE(wait_free());
   EXPECT_EQ(sequence()->findChild<QComboBox*>("sequenceSheet")->currentText(), "jaw");
   EXPECT_TRUE(curves->svg().contains("Rotation vector against the first frame"));
+  EXPECT_TRUE(QSvgRenderer(curves->svg()).isValid());
   sequence()->findChild<QTabWidget*>("sequenceTabs")->setCurrentIndex(1);
   screenshot("sequence-curves", sequence());
   EXPECT_EQ(illegible_parts(*sequence()).join('\n').toStdString(), "");
