@@ -106,7 +106,7 @@ def drawn(scene, view, t, options, rng, hidden):
         rotation, shift = scene.pose(body, t)
         uv, scale = projected(view, scene.balls[body][0] @ rotation.T + shift)
         for at, mm, radius in zip(uv, scale, scene.balls[body][1]):
-            add_ball(shade, at, radius * mm, 0.022 * 2 * radius)
+            add_ball(shade, at, radius * mm, options["bone"] * 2 * radius)
     moments = t + (np.linspace(-0.5, 0.5, 5) * options["blur"] if options["blur"] else np.zeros(1))
     for moment in moments:
         points = scene.places(moment)
@@ -123,6 +123,34 @@ def drawn(scene, view, t, options, rng, hidden):
     return np.clip(np.rint(image), 0, 255).astype(np.uint8)
 
 
+def bead_profile(radius):
+    """What a sharp bead of this radius takes of the radiation, blurred, about its centre."""
+    side = 2 * int(np.ceil(radius + 4)) + 1
+    shade = np.zeros((side, side))
+    v, u = np.mgrid[:side, :side] - side // 2
+    for du in (np.arange(5) - 2) / 5:
+        for dv in (np.arange(5) - 2) / 5:
+            shade += 1.1 * DIAMETER * np.sqrt(np.maximum(0, 1 - ((u + du) ** 2 + (v + dv) ** 2) / radius ** 2)) / 25
+    at = np.arange(-3, 4)
+    kernel = np.exp(-at ** 2 / (2 * 0.7 ** 2)) / np.exp(-at ** 2 / (2 * 0.7 ** 2)).sum()
+    profile = 1 - np.exp(-shade)
+    for axis in (0, 1):
+        profile = np.apply_along_axis(np.convolve, axis, profile, kernel, "same")
+    return profile
+
+
+def clearness(image, uv, radius, noise):
+    """Signal to noise of a bead for a detector that knows its place, size and contrast (matched filter); 0 outside the image."""
+    u, v = np.rint(uv).astype(int)
+    if not (8 <= u < SIZE - 8 and 8 <= v < SIZE - 8):
+        return 0.0
+    rows, columns = np.mgrid[v - 7:v + 8, u - 7:u + 8]
+    away = np.hypot(columns - uv[0], rows - uv[1])
+    around = float(np.median(image[v - 7:v + 8, u - 7:u + 8][(away > 5) & (away < 7)]))
+    sigma = np.hypot(noise * 0.18 * np.sqrt(around), 12 ** -0.5)
+    return max(0.0, around - 25) * float(np.sqrt(np.square(bead_profile(radius)).sum())) / sigma
+
+
 def png(image):
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
@@ -134,7 +162,8 @@ def png(image):
 def make_case(folder, scene, seed, frames, **options):
     """Images and case.json; the markers' true places (frames, markers, 3), and which are shown by both views."""
     rng = np.random.default_rng([seed, 1])
-    options = {"noise": 1, "hide": 0, "blur": 0, "decoys": 0, "delay": 0, **options}
+    options = {"noise": 1, "hide": 0, "blur": 0, "decoys": 0, "delay": 0, "bone": 0.022, **options}
+    clear = np.zeros((frames, 10, 2))
     options["dots"] = [[(rng.uniform(150, SIZE - 150, 2), rng.uniform(1.5, 4)) for _ in range(options["decoys"])] for _ in AXES]
     spans = [(rng.integers(10), rng.integers(2), start, start + rng.integers(5, 26))
              for start in rng.integers(3, max(4, frames - 10), options["hide"])]
@@ -149,7 +178,10 @@ def make_case(folder, scene, seed, frames, **options):
         for t in range(frames):
             hidden = [i for i, k, first, last in spans if k == view and first <= t <= last]
             moment = t + (options["delay"] if view else 0)
-            (folder / f"{name}_{t + 1:04d}.png").write_bytes(png(drawn(scene, view, moment, options, rng, hidden)))
+            image = drawn(scene, view, moment, options, rng, hidden)
+            (folder / f"{name}_{t + 1:04d}.png").write_bytes(png(image))
+            for i, (at, mm) in enumerate(zip(*projected(view, truth[t]))):
+                clear[t, i, view] = 0 if i in hidden else clearness(image, at, DIAMETER / 2 * mm, options["noise"])
         middle = (SIZE - 1) / 2
         (folder / f"{name}.json").write_text(json.dumps({
             "K": [[FOCUS, 0, middle], [0, FOCUS, middle], [0, 0, 1]], "R": axes.tolist(), "t": [0, 0, DISTANCE],
@@ -160,6 +192,7 @@ def make_case(folder, scene, seed, frames, **options):
     case = {"format": "helicarm-case/2", "views": views, "markers": {"diameter_mm": DIAMETER}, "frame_rate_hz": RATE_HZ, "picks": picks,
             "bodies": [{"name": body, "markers": [n for n in NAMES if n.startswith(body)]} for body in BODIES]}
     (folder / "case.json").write_text(json.dumps(case))
+    np.save(folder / "clear.npy", clear)
     shown = np.ones((frames, 10), bool)
     for i, _, first, last in spans:
         shown[first:last + 1, i] = False
@@ -193,6 +226,20 @@ def filtered(places, cut_off):
     return (np.fft.irfft(np.fft.rfft(padded - trend, axis=0) * response[:, None], len(padded), axis=0) + trend)[n - 1:2 * n - 1]
 
 
+def best_linear(places, moved):
+    """(frames, 3) by the linear filter without phase that is nearest to the truth: of one gain at each frequency for the three axes, the gain
+    that fits the true motion itself best. Ends reflected about their points, as for the Butterworth filter (sine transform)."""
+    n = len(places)
+    line = np.linspace(0, 1, n)[:, None] * (places[-1] - places[0]) + places[0]
+    index = np.arange(1, n - 1)
+    sines = np.sin(np.pi * index[:, None] * index / (n - 1)) * np.sqrt(2 / (n - 1))
+    measured, true = sines @ (places - line)[1:-1], sines @ (moved - line)[1:-1]
+    gain = np.sum(measured * true, 1) / np.maximum(np.sum(measured ** 2, 1), 1e-300)
+    made = line.copy()
+    made[1:-1] += sines.T @ (measured * gain[:, None])
+    return made
+
+
 def rms(errors):
     return float(np.sqrt(np.mean(np.sum(np.square(errors), axis=-1))))
 
@@ -203,11 +250,13 @@ class Result:
     def __init__(self, out, truth, shown):
         self.shown = shown.sum()
         self.missed = 0  # of those that both views show
+        self.of_place = []  # (frame, marker, tracked, share inside)
         self.status = {word: [] for word in ("tracked", "one_view", "predicted", "lost")}  # (error mm, share inside, carried on)
         places = np.full(truth.shape, np.nan)
         for row in table(out / "markers.csv"):
             f, m = int(row["frame"]) - 1, NAMES.index(row["name"])
             self.missed += shown[f, m] and row["status"] != "tracked"
+            self.of_place.append((f, m, row["status"] == "tracked", np.nan))
             if row["status"] == "lost":
                 self.status["lost"].append((0, 0, False))
                 continue
@@ -215,8 +264,9 @@ class Result:
             off = places[f, m] - truth[f, m]
             others = np.linalg.norm(np.delete(truth[f], m, 0) - places[f, m], axis=1)
             inside = np.abs(off) <= 1.959964 * np.array([float(row[f"s{axis}_mm"]) for axis in "xyz"])
+            self.of_place[-1] = (*self.of_place[-1][:3], inside.mean())
             self.status[row["status"]].append((np.linalg.norm(off), inside.mean(), np.linalg.norm(off) >= 0.5 and others.min() < 0.3))
-        self.smooth, self.single, self.butterworth, self.inside = [], [], [], []
+        self.smooth, self.single, self.butterworth, self.inside, self.about_mean = [], [], [], [], []
         for body, of in zip(BODIES, (slice(0, 5), slice(5, 10))):
             self.add_body(out, body, truth[:, of], places[:, of])
 
@@ -233,6 +283,15 @@ class Result:
                     self.inside.append(np.mean(np.abs(off) <= 1.959964 * np.array([float(row[f"sigma_{axis}_mm"]) for axis in "xyz"])))
         mean = places.mean(1)
         if np.isfinite(mean).all():
+            best = best_linear(mean, truth.mean(1))
+            smoothed = {int(row["frame"]): row for row in table(out / "smoothed.csv") if row["body"] == body and row["m11"]}
+            if len(smoothed) == len(truth):
+                poses = np.array([[[float(smoothed[f + 1][f"m{i}{k}"]) for k in range(1, 5)] for i in range(1, 4)] for f in range(len(truth))])
+                own = poses[:, :, :3] @ centre + poses[:, :, 3]
+                errors = [own - truth.mean(1), best - truth.mean(1)]
+                errors.insert(1, min((filtered(mean, cut_off) - truth.mean(1) for cut_off in np.arange(1.5, 24.5, 0.5)),
+                                     key=lambda e: rms(e - e.mean(0))))
+                self.about_mean += [np.array([e - e.mean(0) for e in errors])]
             tried = [filtered(mean, cut_off) for cut_off in np.arange(1.5, 24.5, 0.5)]
             self.butterworth += list(min(((f - f[0] - moved)[1:] for f in tried), key=rms))
 
@@ -248,7 +307,7 @@ def joined(results):
     made = object.__new__(Result)
     made.shown, made.missed = sum(r.shown for r in results), sum(r.missed for r in results)
     made.status = {word: sum((r.status[word] for r in results), []) for word in results[0].status}
-    for name in ("smooth", "single", "butterworth", "inside"):
+    for name in ("smooth", "single", "butterworth", "inside", "about_mean"):
         setattr(made, name, sum((getattr(r, name) for r in results), []))
     return made
 
@@ -257,6 +316,7 @@ def noise_table(a, root):
     lines = ["| noise | tracked, % of those that both views show | swaps carried on | tracked, mm rms | inside 95 %: tracked | one_view | predicted | lost | "
              "bodies by frames, mm rms | smoothed | inside 95 % | best Butterworth | CPU s a pair |",
              "| --- " * 13 + "|"]
+    about_mean = []
     for row, (noise, blur) in enumerate(((0.5, 0.5), (1, 0), (3, 0.3))):
         results, seconds = [], 0
         for k in range(a.seeds):
@@ -270,6 +330,7 @@ def noise_table(a, root):
             shutil.rmtree(root / f"n{noise}-{k}")
         all_ = joined(results)
         carried = sum(row[2] for rows in all_.status.values() for row in rows)
+        about_mean += all_.about_mean
         lines.append(
             f"| {noise}, blur {blur} | {100 * (1 - all_.missed / all_.shown):.1f} | {carried} | "
             f"{np.sqrt(np.mean([row[0] ** 2 for row in all_.status['tracked']])):.3f} | {all_.band('tracked')} | {all_.band('one_view')} | "
@@ -277,6 +338,35 @@ def noise_table(a, root):
             f"{100 * np.mean(all_.inside):.1f} | {rms(all_.butterworth) if all_.butterworth else np.nan:.4f} | "
             f"{seconds / (a.frames * a.seeds):.3f} |")
         print(lines[-1], flush=True)
+    smooth, butterworth, linear = (rms(np.concatenate([of[kind] for of in about_mean])) for kind in range(3))
+    lines += ["", f"About their mean over the frames, centres of all rows: smoothed {smooth:.4f} mm rms, best Butterworth {butterworth:.4f}, "
+                  f"best linear {linear:.4f} ({linear / butterworth:.2f} of the best Butterworth; smoothed {smooth / butterworth:.2f})."]
+    print(lines[-1], flush=True)
+    return lines
+
+
+def clear_table(a, root):
+    """Places that both views show, in dense bone under noise, by how clear the weaker image is."""
+    limits = (0, 2, 3, 4, 5, 6, 8, 12, np.inf)
+    rows = []
+    for k in range(max(2, a.seeds)):
+        seed, folder, out = a.seed + 100 + k, root / f"dense-{k}", root / f"dense-out-{k}"
+        truth, shown = make_case(folder, Scene(seed), seed, a.frames, noise=3, hide=6, decoys=3, blur=0.3, bone=0.04)
+        done = track(a.helicarm, folder, out, a.frames)[0]
+        if done.returncode:
+            sys.exit(done.stderr)
+        result, clear = Result(out, truth, shown), np.load(folder / "clear.npy").min(2)
+        rows += [(clear[f, m], tracked, inside) for f, m, tracked, inside in result.of_place if shown[f, m]]
+        shutil.rmtree(folder)
+    lines = ["| signal to noise of the weaker image | places | tracked, % | inside 95 %: tracked |", "| --- " * 4 + "|"]
+    for low, high in zip(limits, limits[1:]):
+        of = [row for row in rows if low <= row[0] < high]
+        bands = [row[2] for row in of if row[1]]
+        span = f"below {high}" if low == 0 else f"{low} and more" if high == np.inf else f"{low} to {high}"
+        lines.append(f"| {span} | {len(of)} | "
+                     f"{100 * np.mean([row[1] for row in of]) if of else np.nan:.1f} | {100 * np.mean(bands) if bands else np.nan:.1f} |")
+    for line in lines:
+        print(line, flush=True)
     return lines
 
 
@@ -431,7 +521,7 @@ def main():
         if a.published:
             print("\n".join(published_table(a, Path(root))))
             return
-        text = "\n".join(noise_table(a, Path(root)) + [""] + faults_table(a, Path(root)))
+        text = "\n".join(noise_table(a, Path(root)) + [""] + clear_table(a, Path(root)) + [""] + faults_table(a, Path(root)))
     if a.doc:
         renew(a.doc, "motion.py", [text])
     else:
