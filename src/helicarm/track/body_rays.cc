@@ -12,7 +12,7 @@
 namespace helicarm::track {
 namespace {
 
-constexpr double click_px = 2;
+constexpr double pick_sigma_px = 2;
 
 struct RayOfBody {
   Sight sight;
@@ -33,7 +33,8 @@ std::vector<RayOfBody> rays_of(const SequenceData& work, const BodyPlan& plan, c
       const auto& map = work.the_case.views[pick.view].map;
       const Eigen::Vector2d uv =
           map ? map->rectified_from_raw(pick.uv_raw).value_or(pick.uv_raw) : pick.uv_raw;
-      rays.push_back({{&work.cameras[pick.view], uv, click_px}, at.poses.front()->pose, click_px, 1, true});
+      rays.push_back(
+          {{&work.cameras[pick.view], uv, pick_sigma_px}, at.poses.front()->pose, pick_sigma_px, 1, true});
     }
   for (std::size_t k = 0; k < work.views; ++k) {
     double count = 0;

@@ -43,7 +43,7 @@ std::vector<std::vector<report::Chart>> filter_charts(const Sequence& sequence, 
   return charts;
 }
 
-report::Chart residual_chart(const Sequence& sequence, std::size_t body) {
+report::Chart misfit_chart(const Sequence& sequence, std::size_t body) {
   report::Chart rms{"Markers from their places in the body", "frame", "rms, mm"};
   report::ChartSeries residual{""};
   for (std::size_t f = 0; f < sequence.frames.size(); ++f)
@@ -59,7 +59,7 @@ std::string body_charts(const Sequence& sequence, const TrackCase& the_case) {
   std::vector<report::Chart> residuals;
   for (std::size_t b = 0; b < the_case.bodies.size(); ++b) {
     names.push_back(the_case.bodies[b].name);
-    residuals.push_back(residual_chart(sequence, b));
+    residuals.push_back(misfit_chart(sequence, b));
   }
   return motion_charts(sequence.frames, names, sequence.bodies, sequence.relative, residuals,
                        filter_charts(sequence, the_case));
@@ -202,7 +202,7 @@ std::vector<CurveSheet> curve_sheets(const Sequence& sequence, const TrackCase& 
     sheets.push_back({the_case.bodies[b].name,
                       {pose_chart(sequence.frames, smooth, "Centre from its place in the first frame", false),
                        pose_chart(sequence.frames, smooth, "Rotation vector against the first frame", true),
-                       residual_chart(sequence, b)}});
+                       misfit_chart(sequence, b)}});
   }
   for (std::size_t b = 0; b < sequence.relative.size(); ++b)
     sheets.push_back(
