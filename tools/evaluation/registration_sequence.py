@@ -3,6 +3,8 @@
 """Follows the femur and the tibia of a modelled knee through a simulated biplane sequence.
 
   tools/evaluation/registration_sequence.py --frames 100
+  tools/evaluation/registration_sequence.py --frames 100 --doc docs/motion.md    single frames against smooth motion as a table there, and
+                                                                                 an interrupted run that is resumed against a whole one
 
 The knee is that of tools/evaluation/bone_ct.py. The images are made here, by sums along rays, with soft tissue of varying thickness
 and noise; both bones move, about 1 mm and 1 degree from frame to frame. Prints the errors of the poses (mean over 14 points of
@@ -14,15 +16,19 @@ import csv
 import json
 import pathlib
 import re
+import shutil
+import signal
 import struct
 import subprocess
 import sys
 import tempfile
+import time
 import zlib
 
 import numpy as np
 
 import bone_ct
+from evaluate import renew
 from registration_protocol import TARGETS, moved, placed
 
 SIZE, PIXEL_MM, DETECTOR_MM, SOURCE_MM = 320, 0.7, 1100.0, 700.0
@@ -151,8 +157,8 @@ def summary(errors):
     return f"median {np.median(errors):.3f} mm, 95 % {np.percentile(errors, 95):.3f} mm, largest {max(errors):.3f} mm"
 
 
-def motion_summary(rows, name, in_femur, start):
-    """Errors of motions against the first frame at the model's points, and the share of the centre's that 1.96 sigma hold."""
+def motion_errors(rows, name, in_femur, start):
+    """Errors of motions against the first frame at the model's points, mm, and the share of the centre's that 1.96 sigma hold."""
     errors, inside, count = [], 0, 0
     points, centre = placed(start[name], CENTRES[name] + 0.75 * TARGETS), placed(start[name], CENTRES[name][None])
     for row in rows:
@@ -166,7 +172,72 @@ def motion_summary(rows, name, in_femur, start):
         sigma = np.array([float(row[f"sigma_{axis}_mm"]) for axis in "xyz"])
         inside += np.sum(np.abs(placed(pose_of(row), centre) - placed(true, centre))[0] < 1.96 * sigma)
         count += 3
-    return f"{summary(errors)}; rms {np.sqrt(np.mean(np.square(errors))):.4f} mm; {100 * inside / max(1, count):.0f} % inside 95 %"
+    return errors, inside / max(1, count)
+
+
+def motion_summary(rows, name, in_femur, start):
+    errors, inside = motion_errors(rows, name, in_femur, start)
+    return f"{summary(errors)}; rms {np.sqrt(np.mean(np.square(errors))):.4f} mm; {100 * inside:.0f} % inside 95 %"
+
+
+def moving_rows(folder, kind, name):
+    return [row for row in rows_of(folder / f"{kind}.csv") if row["body"] == name and row["m11"]]
+
+
+def about_mean(rows, name, in_femur, start):
+    """rms of the points' errors less their mean over the frames, mm: without the first frame's own error, which all share."""
+    points = placed(start[name], CENTRES[name] + 0.75 * TARGETS)
+    off = []
+    for row in rows:
+        poses = poses_at(int(row["frame"]))
+        true = poses[name] @ np.linalg.inv(start[name])
+        if in_femur:
+            true = np.linalg.inv(poses["femur"] @ np.linalg.inv(start["femur"])) @ true
+        off.append(placed(pose_of(row), points) - placed(true, points))
+    off = np.array(off)
+    return np.sqrt(np.mean(np.sum((off - off.mean(0)) ** 2, axis=-1)))
+
+
+def motion_table(folder, frames, resumed):
+    lines = ["| motion | frames | by frames, mm rms | about their mean | inside 95 % | smoothed, mm rms | about their mean | inside 95 % |", "| --- " * 8 + "|"]
+    start = poses_at(0)
+    for name, kinds, in_femur, words in (("femur", ("bodies", "smoothed"), False, "femur against its first frame"),
+                                         ("tibia", ("bodies", "smoothed"), False, "tibia against its first frame"),
+                                         ("tibia", (None, "relative"), True, "tibia in the femur's coordinates")):
+        cells = []
+        for kind in kinds:
+            if kind is None:
+                cells += ["", "", ""]
+                continue
+            rows = moving_rows(folder, kind, name)
+            errors, inside = motion_errors(rows, name, in_femur, start)
+            cells += [f"{np.sqrt(np.mean(np.square(errors[1:]))):.4f}", f"{about_mean(rows, name, in_femur, start):.4f}", f"{100 * inside:.1f}"]
+        lines.append(f"| {words} | {frames} | {' | '.join(cells)} |")
+    return lines + ["", resumed]
+
+
+def resumed_run(arguments, folder):
+    """A run that is interrupted and resumed, against the whole one."""
+    out = folder / "resumed"
+    shutil.rmtree(out, ignore_errors=True)
+    command = [arguments.program, "register", folder, "--out", out, "--frames", f"0-{arguments.frames - 1}", "--threads",
+               str(arguments.threads)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                               preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))  # ignored in the background
+    while process.poll() is None:
+        if (out / "frames.jsonl").exists() and len((out / "frames.jsonl").read_text().splitlines()) > arguments.frames // 3:
+            process.send_signal(signal.SIGINT)
+            process.wait()
+        time.sleep(0.05)
+    if len((out / "frames.jsonl").read_text().splitlines()) > arguments.frames:
+        sys.exit("the run ended before it was interrupted")
+    done = subprocess.run([*command, "--resume"], capture_output=True, text=True, check=False)
+    if done.returncode not in (0, 3):
+        sys.exit(done.stderr)
+    differ = [name for name in ("registration.csv", "bodies.csv", "smoothed.csv", "relative.csv", "smoothed.seq.mha")
+              if (out / name).read_bytes() != (folder / "out" / name).read_bytes()]
+    return (f"Interrupted after about a third of the {arguments.frames} frames and resumed: "
+            f"{'other bytes in ' + ', '.join(differ) if differ else 'the tables have the bytes of the whole run'}.")
 
 
 def main():
@@ -175,6 +246,7 @@ def main():
     parser.add_argument("--frames", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("--doc", type=pathlib.Path)
     parser.add_argument("--keep", type=pathlib.Path, help="folder for case and result; a case that it holds is used again")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
@@ -208,11 +280,13 @@ def main():
         start = poses_at(0)
         for kind in ("bodies", "smoothed", "relative"):
             for name in ("femur", "tibia"):
-                own = [row for row in rows_of(folder / f"out/{kind}.csv") if row["body"] == name and row["m11"]]
+                own = moving_rows(folder / "out", kind, name)
                 if own:
                     print(f"{kind}.csv, {name} against its first frame: {motion_summary(own, name, kind == 'relative', start)}")
         frames, seconds = re.search(r"(\d+) frames in ([\d.]+) s", done.stdout).groups()
         print(f"{frames} pairs in {seconds} s: {int(frames) / float(seconds):.2f} pairs/s, two bones")
+        if arguments.doc:
+            renew(arguments.doc, "registration_sequence.py", motion_table(folder / "out", int(frames), resumed_run(arguments, folder)))
 
 
 if __name__ == "__main__":
