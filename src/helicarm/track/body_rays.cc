@@ -31,10 +31,11 @@ std::vector<RayOfBody> rays_of(const SequenceData& work, const BodyPlan& plan, c
     for (const MarkerPick& pick : work.the_case.picks) {
       if (pick.marker != m) continue;
       const auto& map = work.the_case.views[pick.view].map;
-      const Eigen::Vector2d uv =
-          map ? map->rectified_from_raw(pick.uv_raw).value_or(pick.uv_raw) : pick.uv_raw;
+      const std::optional<Eigen::Vector2d> uv =
+          map ? map->rectified_from_raw(pick.uv_raw) : std::optional(pick.uv_raw);
+      if (!uv) continue;
       rays.push_back(
-          {{&work.cameras[pick.view], uv, pick_sigma_px}, at.poses.front()->pose, pick_sigma_px, 1, true});
+          {{&work.cameras[pick.view], *uv, pick_sigma_px}, at.poses.front()->pose, pick_sigma_px, 1, true});
     }
   for (std::size_t k = 0; k < work.views; ++k) {
     double count = 0;

@@ -104,7 +104,8 @@ void check_frames_of_picks(const std::vector<pipeline::Pick>& picks,
   for (const pipeline::Pick& pick : picks)
     if (pick.frame && *pick.frame != first) {
       others.insert(*pick.frame);
-      if (*pick.frame<frames.last&& * pick.frame> first && (*pick.frame - first) % frames.step != 0)
+      const int behind_first = *pick.frame - first;
+      if (behind_first > 0 && *pick.frame < frames.last && behind_first % frames.step != 0)
         throw BadInput(
             Reason::bad_value,
             fmt::format("{}: picks: \"{}\" of frame {}: is not among the frames, every {}th from {} on",
