@@ -3,6 +3,8 @@
 
 #include <QRegularExpression>
 #include <QString>
+#include <QStringList>
+#include <map>
 
 namespace helicarm::gui {
 namespace {
@@ -58,6 +60,29 @@ QByteArray print_svg(const std::string& figure, bool on_page) {
                         : R"x(<text fill="#000" stroke="none" transform="translate(1.7 1.7)" \1>\2</text>)x"
                           R"x(<text fill="#000" stroke="none" transform="translate(-1 -1)" \1>\2</text>)x"
                           R"x(<text fill="#fff" stroke="none" \1>\2</text>)x");
+  return svg.toUtf8();
+}
+
+QByteArray chart_document(const std::string& chart) {
+  QString svg = QString::fromStdString(chart);
+  static const QRegularExpression rule(R"(\.(\w+)\{([^}]*)\})"), classes(R"x(class="([^"]*)")x");
+  static const QRegularExpression clip(R"(<clipPath[^>]*>.*?</clipPath>)");
+  svg.remove(clip);
+  std::map<QString, QString> rules;
+  const QString sheet = svg.section("<style>", 1).section("</style>", 0, 0);
+  for (auto each = rule.globalMatch(sheet); each.hasNext();) {
+    const auto found = each.next();
+    rules[found.captured(1)] = found.captured(2);
+  }
+  qsizetype from = 0;
+  for (auto found = classes.match(svg); found.hasMatch(); found = classes.match(svg, from)) {
+    QStringList parts;
+    for (const QString& name : found.captured(1).split(' '))
+      if (rules.contains(name)) parts << rules[name];
+    const QString style = "style=\"" + parts.join(';') + '"';
+    svg.replace(found.capturedStart(), found.capturedLength(), style);
+    from = found.capturedStart() + style.size();
+  }
   return svg.toUtf8();
 }
 

@@ -3,13 +3,12 @@
 #include <QHBoxLayout>
 #include <QHeaderView>
 #include <QPainter>
-#include <QRegularExpression>
 #include <QShortcut>
 #include <QSvgRenderer>
 #include <QTabWidget>
 #include <QVBoxLayout>
-#include <map>
 
+#include "gui/replay/print_svg.h"
 #include "gui/window/sequence_window.h"
 #include "gui/window/style.h"
 #include "gui/xray/text.h"
@@ -37,30 +36,6 @@ QTableWidgetItem* cell_of(const QString& words, bool is_bad = false) {
   auto* cell = new QTableWidgetItem(words);
   if (is_bad) cell->setForeground(style::colours().red);
   return cell;
-}
-
-/// The rules of an SVG document's style sheet in its elements, and without clip paths: QtSvg does not apply
-/// all of the former, and draws the latter.
-QByteArray styled(QString svg) {
-  static const QRegularExpression rule(R"(\.(\w+)\{([^}]*)\})"), classes(R"x(class="([^"]*)")x");
-  static const QRegularExpression clip(R"(<clipPath[^>]*>.*?</clipPath>)");
-  svg.remove(clip);
-  std::map<QString, QString> rules;
-  const QString sheet = svg.section("<style>", 1).section("</style>", 0, 0);
-  for (auto each = rule.globalMatch(sheet); each.hasNext();) {
-    const auto found = each.next();
-    rules[found.captured(1)] = found.captured(2);
-  }
-  qsizetype from = 0;
-  for (auto found = classes.match(svg); found.hasMatch(); found = classes.match(svg, from)) {
-    QStringList parts;
-    for (const QString& name : found.captured(1).split(' '))
-      if (rules.contains(name)) parts << rules[name];
-    const QString style = "style=\"" + parts.join(';') + '"';
-    svg.replace(found.capturedStart(), found.capturedLength(), style);
-    from = found.capturedStart() + style.size();
-  }
-  return svg.toUtf8();
 }
 
 QString words_of_marker(const track::TrackedMarker& marker) {
@@ -208,7 +183,7 @@ void SequenceWindow::show_curves() {
   const int at = std::min(chosen, int(sheets.size()) - 1);
   sheet_->setCurrentIndex(at);
   const auto& charts = sheets[std::size_t(at)].charts;
-  curves_->show_svg(styled(QString::fromStdString(report::chart_svg(charts, charts.size()))));
+  curves_->show_svg(chart_document(report::chart_svg(charts, charts.size())));
 }
 
 void CurvesView::show_svg(QByteArray svg) {
