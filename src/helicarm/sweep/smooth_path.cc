@@ -141,23 +141,25 @@ double log_likelihood(const std::vector<PathObservation>& frames, const PathPrio
   return problem.log_determinant - chi2 / 2;
 }
 
-/// Logarithms of bend, of the source's jitter, of the detector's over the source's and of the rotation's, and
-/// what is known of them: flex of some mm over a turn (Daly et al. 2008, Fahrig and Holdsworth 2000), jitter
-/// of 0.02 to 0.25 mm, alike at both ends of one arm: along most directions the images show their sum alone.
+/// Logarithms of bend, of the root mean square of the source's and the detector's jitter, of the detector's
+/// over the source's and of the rotation's, and what is known of them: flex of some mm over a turn (Daly et
+/// al. 2008, Fahrig and Holdsworth 2000), jitter of 0.02 to 0.25 mm, alike at both ends of one arm: along
+/// most directions the images show their sum alone.
 using LogStiffness = Eigen::Matrix<double, 6, 1>;
 const LogStiffness typical_logs{std::log(4e-3), std::log(8e-3), std::log(3e-5), std::log(0.05), 0,
                                 std::log(1e-4)};
 const LogStiffness spread_of_logs{2, 2, 2, 1.5, 0.5, 1.5};
 
 Stiffness stiffness_of(const LogStiffness& logs) {
-  const double of_source = std::exp(logs[3]);
-  return {logs.head<3>().array().exp(), {of_source, of_source * std::exp(logs[4]), std::exp(logs[5])}};
+  const double ratio = std::exp(logs[4]), of_source = std::exp(logs[3]) * std::sqrt(2 / (1 + ratio * ratio));
+  return {logs.head<3>().array().exp(), {of_source, of_source * ratio, std::exp(logs[5])}};
 }
 
 LogStiffness logs_of(const Stiffness& stiffness) {
   LogStiffness logs;
-  logs << stiffness.bend.array().log(), stiffness.jitter.array().log();
-  logs[4] -= logs[3];
+  const double of_source = stiffness.jitter[0], of_detector = stiffness.jitter[1];
+  logs << stiffness.bend.array().log(), std::log(std::hypot(of_source, of_detector) / std::sqrt(2.0)),
+      std::log(of_detector / of_source), std::log(stiffness.jitter[2]);
   return logs;
 }
 

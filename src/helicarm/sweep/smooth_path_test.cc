@@ -70,6 +70,28 @@ TEST(SmoothPath, JitterOfTheFramesIsFoundAndItsRegionsHold) {
   }
 }
 
+TEST(SmoothPath, WhereImagesShowTheSumOfBothJittersBothAreAlike) {
+  constexpr double jitter_mm = 0.1;
+  Simulated simulation = simulated(120, jitter_mm, 11);
+  CameraVector precision;
+  precision << Eigen::Vector3d::Constant(1 / 0.02), Eigen::Vector3d::Constant(1 / 2.0),
+      Eigen::Vector3d::Constant(1 / 1e-3);
+  CameraMatrix sum_and_difference = CameraMatrix::Identity();
+  sum_and_difference.topLeftCorner<6, 6>() << Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity(),
+      Eigen::Matrix3d::Identity(), -Eigen::Matrix3d::Identity();
+  const CameraMatrix root = precision.asDiagonal() * sum_and_difference;
+  RandomStream random{12, 0};
+  for (std::size_t i = 0; i < simulation.frames.size(); ++i) {
+    CameraVector noise;
+    for (double& value : noise) value = random.normal();
+    simulation.frames[i].value = simulation.cameras[i] + root.inverse() * noise;
+    simulation.frames[i].information = root.transpose() * root;
+  }
+  const Stiffness stiffness = choose_stiffness(simulation.frames, {});
+  EXPECT_NEAR(stiffness.jitter[0] / jitter_mm, 1, 0.2);
+  EXPECT_NEAR(stiffness.jitter[1] / jitter_mm, 1, 0.2);
+}
+
 TEST(SmoothPath, IsNearerThanEachFrameAlone) {
   const Simulated simulation = simulated(120, 0.02, 9);
   const SmoothPath path = smooth_path(simulation.frames, {}, choose_stiffness(simulation.frames, {}));
