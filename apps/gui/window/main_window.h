@@ -95,6 +95,8 @@ class MainWindow : public QMainWindow {
   void build_recent();
   /// A case of markers through a sequence, in a window of its own.
   void open_sequence(const std::filesystem::path& folder);
+  /// A run of images of a calibrator, in a window of its own.
+  void open_run(const std::filesystem::path& folder);
   /// Slices of a CT, to find its bones, in a window of its own.
   void open_ct(const std::filesystem::path& file, std::vector<CtTunnel> tunnels);
   void open_ct_of(std::size_t model);

@@ -16,6 +16,7 @@
 #include "gui/window/ask_files.h"
 #include "gui/window/bones_window.h"
 #include "gui/window/main_window.h"
+#include "gui/window/run_window.h"
 #include "gui/window/sequence_window.h"
 
 namespace helicarm::gui {
@@ -74,7 +75,8 @@ void MainWindow::leave_then(std::function<void()> act) {
 }
 
 void MainWindow::leave_for(const std::vector<fs::path>& paths) {
-  const bool has_own_window = paths.size() == 1 && (is_sequence(paths.front()) || is_volume(paths.front()));
+  const bool has_own_window =
+      paths.size() == 1 && (is_sequence(paths.front()) || is_run(paths.front()) || is_volume(paths.front()));
   if (has_own_window) return open_paths(paths);
   leave_then([this, paths] { open_paths(paths); });
 }
@@ -129,6 +131,7 @@ void MainWindow::open_paths(const std::vector<fs::path>& paths) {
     if (is_volume(first)) return open_ct(first, {});
   }
   if (paths.size() == 1 && is_sequence(first)) return open_sequence(first);
+  if (paths.size() == 1 && is_run(first)) return open_run(first);
   const bool is_folder = paths.size() == 1 && fs::is_directory(first);
   if (is_folder && fs::exists(first / "session.log")) return open_session(first);
   if (!is_folder) return open_images(paths);
@@ -145,6 +148,14 @@ void MainWindow::open_sequence(const fs::path& folder) {
   if (sequence == nullptr || sequence->is_busy()) sequence = new SequenceWindow(this);
   show_beside(sequence);
   sequence->open_case(folder, all_frames(folder));
+}
+
+void MainWindow::open_run(const fs::path& folder) {
+  remember(Folder::cases, folder);
+  auto* run = findChild<RunWindow*>("run");
+  if (run == nullptr || run->is_busy()) run = new RunWindow(this);
+  show_beside(run);
+  run->open_case(folder);
 }
 
 void MainWindow::open_ct(const fs::path& file, std::vector<CtTunnel> tunnels) {

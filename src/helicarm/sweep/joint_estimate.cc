@@ -259,6 +259,8 @@ void set_best(SweepFrame& frame, const Joint& joint, std::size_t i, const Camera
   Eigen::MatrixX2d off(points.points.size(), 2);
   for (std::size_t k = 0; k < points.points.size(); ++k)
     off.row(Eigen::Index(k)) = points.pixels[k] - best.view.project(points.points[k]);
+  for (std::size_t k = 0; k < points.points.size(); ++k)
+    frame.fiducials[points.balls[k]].residual_px = off.row(Eigen::Index(k)).norm();
   best.chi2 = (points.whitening * off).squaredNorm();
   best.reprojection_rms_px = std::sqrt(off.squaredNorm() / double(points.points.size()));
   const double fitted = (joint.observations[i].information * point.camera_covariance).trace();

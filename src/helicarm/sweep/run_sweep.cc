@@ -293,6 +293,7 @@ SweepFrame reported(const Frame& frame, const FrameEstimate& estimate) {
   sweep_frame.secondary_angle_deg = estimate.secondary_angle_deg;
   sweep_frame.fiducials_used = int(std::ranges::count(
       estimate.fiducials.fiducials, fiducials::FiducialStatus::used, &fiducials::Fiducial::status));
+  sweep_frame.fiducials = estimate.fiducials.fiducials;
   sweep_frame.alone = estimate.alone;
   if (!estimate.failure) {
     sweep_frame.best = estimate.alone;

@@ -14,6 +14,10 @@
 #include "helicarm/sweep/reconstruction_check.h"
 #include "helicarm/sweep/sweep_case.h"
 
+namespace helicarm::report {
+struct Chart;
+}
+
 namespace helicarm::sweep {
 
 enum class PathKind { free, smooth };
@@ -36,6 +40,8 @@ struct SweepFrame {
   std::optional<Failure> failure;  ///< of a refused frame
   std::optional<double> primary_angle_deg, secondary_angle_deg;
   int fiducials_used = 0;
+  /// One per ball of the calibrator, with their residuals about `best`; none where no label was accepted.
+  std::vector<fiducials::Fiducial> fiducials;
   std::optional<calibration::CalibratedView> best, alone;
   std::optional<double> path_angle_deg;  ///< along the path, from the first frame
   std::optional<double> off_path_sigma;  ///< of this frame from the path of the others
@@ -85,6 +91,11 @@ Json to_json(const Sweep& sweep);
 
 /// The JSON Schema of sweep.json.
 Json sweep_schema();
+
+/// The report's charts: deviations of source and detector from the reference orbit over the angle; residuals
+/// and standard deviations by image, with the refused ones. Empty without them.
+std::vector<report::Chart> path_charts(const Sweep& sweep);
+std::vector<report::Chart> image_charts(const Sweep& sweep);
 
 /// report.html as one page.
 std::string sweep_report(const Sweep& sweep);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -62,26 +63,11 @@ report::Chart deviation_chart(const Sweep& sweep, const char* title, const char*
 
 std::string charts(const Sweep& sweep) {
   if (!sweep.path) return "";
-  std::array flex{deviation_chart(sweep, "Source from the reference orbit", "mm", 0, 1),
-                  deviation_chart(sweep, "Detector from the reference orbit", "mm", 3, 1),
-                  deviation_chart(sweep, "Turn of the detector", "degrees", 6, shown_degrees)};
-  report::Chart residual{"Residuals", "image", "rms, px"}, sigma{"Source, standard deviation", "image", "mm"};
-  report::ChartSeries rms{""}, off{""};
-  for (const SweepFrame& frame : sweep.frames) {
-    if (!frame.best) continue;
-    rms.points.push_back({double(frame.number), frame.best->reprojection_rms_px});
-    off.points.push_back(
-        {double(frame.number), std::sqrt(calibration::source_covariance(*frame.best).trace())});
-  }
-  residual.series.push_back(std::move(rms));
-  residual.y_from_zero = sigma.y_from_zero = true;
-  sigma.series.push_back(std::move(off));
-  const std::array quality{residual, sigma};
-  return "<h2>Path and flex</h2>\n<figure class=\"plain\">" + report::chart_svg(flex) +
+  return "<h2>Path and flex</h2>\n<figure class=\"plain\">" + report::chart_svg(path_charts(sweep)) +
          "<figcaption>Deviation from a camera that turns about the axis, in its own "
          "directions.</figcaption></figure>\n"
          "<h2>Images</h2>\n<figure class=\"plain\">" +
-         report::chart_svg(quality) + "</figure>\n";
+         report::chart_svg(image_charts(sweep)) + "</figure>\n";
 }
 
 std::string worst_frames(const Sweep& sweep) {
@@ -134,6 +120,32 @@ std::string findings(const Sweep& sweep) {
 }
 
 }  // namespace
+
+std::vector<report::Chart> path_charts(const Sweep& sweep) {
+  if (!sweep.path) return {};
+  return {deviation_chart(sweep, "Source from the reference orbit", "mm", 0, 1),
+          deviation_chart(sweep, "Detector from the reference orbit", "mm", 3, 1),
+          deviation_chart(sweep, "Turn of the detector", "degrees", 6, shown_degrees)};
+}
+
+std::vector<report::Chart> image_charts(const Sweep& sweep) {
+  if (!sweep.path) return {};
+  report::Chart residual{"Residuals", "image", "rms, px"}, sigma{"Source, standard deviation", "image", "mm"};
+  report::ChartSeries rms{""}, off{""}, refused{"refused"};
+  refused.scattered = true;
+  for (const SweepFrame& frame : sweep.frames) {
+    const double number = frame.number, none = std::numeric_limits<double>::quiet_NaN();
+    rms.points.push_back({number, frame.best ? frame.best->reprojection_rms_px : none});
+    off.points.push_back(
+        {number, frame.best ? std::sqrt(calibration::source_covariance(*frame.best).trace()) : none});
+    if (!frame.best) refused.points.push_back({number, 0});
+  }
+  residual.y_from_zero = sigma.y_from_zero = true;
+  residual.series.push_back(std::move(rms));
+  if (!refused.points.empty()) residual.series.push_back(std::move(refused));
+  sigma.series.push_back(std::move(off));
+  return {std::move(residual), std::move(sigma)};
+}
 
 std::string sweep_report(const Sweep& sweep) {
   return report::page_html("helicarm sweep", "Geometry of a run",
