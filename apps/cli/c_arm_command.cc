@@ -83,6 +83,9 @@ CommandResult c_arm_check_command(const CArmCheckArguments& arguments, Console& 
       console.answered = true;
     } else {
       console.out << report::text_of(report::c_arm_table(check.acquisitions));
+      for (const calibration::MapDifference& map : check.maps)
+        console.out << fmt::format("  {}: distortion {:.2f} px rms from the prediction, sigma {:.2f}\n",
+                                   map.view, map.error_px, map.sigma_px);
     }
     if (change) throw BadInput(*change);
     if (!console.json)
@@ -100,7 +103,8 @@ void add_c_arm(CLI::App& app, Action& action) {
                   "  helicarm c-arm check arm-2.json wednesday\n\n"
                   "The record is the file of `run --machine`: source distance and principal point of each "
                   "acquisition with their\n"
-                  "covariance, positioner angles and date; results of `run` and `sweep` hold them too. A "
+                  "covariance, positioner angles and date,\nand the distortion map of each image with a "
+                  "plate; results of `run` and `sweep` hold them too. A "
                   "check ends with exit code 3 and c_arm_changed "
                   "where a case lies beyond\n"
                   "what the record predicts for its positions (99.9 %) and beyond the record's "

@@ -22,6 +22,7 @@ struct SweepArguments {
   std::string check;  ///< FDK; empty: none
   std::optional<std::string> wire;
   std::optional<std::filesystem::path> against;
+  std::optional<std::filesystem::path> record;  ///< of the C-arm
 };
 namespace {
 
@@ -77,7 +78,9 @@ Expected<sweep::Sweep> swept(const SweepArguments& arguments, const std::filesys
     if (!arguments.path.empty()) options.path = value_or_throw(sweep::path_kind(arguments.path));
     options.threads = console.threads;
     const auto check = check_options(arguments, console.threads);
-    const auto the_case = value_or_throw(sweep::read_sweep_case(folder));
+    auto the_case = value_or_throw(sweep::read_sweep_case(folder));
+    if (arguments.record)
+      sweep::take_maps(the_case, value_or_throw(calibration::read_history(*arguments.record)));
     sweep::Sweep result = [&] {
       ProgressLine progress(console);
       return value_or_throw(
@@ -168,6 +171,12 @@ void add_sweep(CLI::App& app, Action& action) {
                    "check: ends of a straight wire in the images, \"x,y,z;x,y,z\" in mm, calibrator frame "
                    "(default: a line_end of the calibrator's file)")
       ->type_name("TEXT");
+  command
+      ->add_option(
+          "--machine", a.record,
+          "A C-arm's record (helicarm c-arm, run --machine), read only: images without plate and map "
+          "take their distortion from the maps that it holds of the positions about theirs")
+      ->type_name("FILE");
   command->add_option("--against", a.against,
                       "check: cameras of another program, in the calibrator's frame, compared too; a file as "
                       "`import` reads it");

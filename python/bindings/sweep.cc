@@ -17,10 +17,17 @@ using Ends = std::array<std::array<double, 3>, 2>;
 
 sweep::Sweep swept(const std::filesystem::path& folder, const std::optional<std::string>& path,
                    const std::optional<std::string>& check, const std::optional<Ends>& wire,
-                   const std::optional<std::filesystem::path>& against, unsigned threads,
+                   const std::optional<std::filesystem::path>& against,
+                   const std::optional<std::filesystem::path>& history, unsigned threads,
                    const py::object& progress) {
-  return run_sweep([&] { return sweep::read_sweep_case(folder); }, path,
-                   check_options(check, wire, against, threads), threads, progress);
+  const auto read = [&] {
+    return guarded([&] {
+      auto the_case = value_or_throw(sweep::read_sweep_case(folder));
+      if (history) sweep::take_maps(the_case, value_or_throw(calibration::read_history(*history)));
+      return the_case;
+    });
+  };
+  return run_sweep(read, path, check_options(check, wire, against, threads), threads, progress);
 }
 
 /// (n, rows, columns), NaN where a frame is refused.
@@ -125,7 +132,7 @@ void add_sweep(py::module_& module) {
 folder: holds case.json, whose view has "frames". path: "smooth", "free" or None (smooth for 16 or more images of one
 run). check: "FDK" reconstructs balls and a wire with plastimatch, with these cameras and with the ideal circle: .check;
 where it is not possible a warning says why. wire: its two ends, mm, calibrator frame. against: file of another program's
-cameras, compared too. progress: called with the share of the images that are done; an exception from it ends the run, and Ctrl-C does.
+cameras, compared too. history: a C-arm's record, whose maps rectify images without a plate by their angles. progress: called with the share of the images that are done; an exception from it ends the run, and Ctrl-C does.
 Releases the GIL. Returns a Sweep.
 Raises InputError; RefusedError with .result if the run as a whole is refused.)");
 }

@@ -170,7 +170,7 @@ def sweep(folder=None, *, images=None, calibrator=None, plate=None, pixel_mm=Non
           mirrored=None, **options):
     """Calibrates every image of a rotation or tomosynthesis and all of them on one path: of a case, or of arrays.
 
-    sweep(folder, *, path=None, check=None, wire=None, against=None, threads=0, progress=None): folder holds case.json, whose view has "frames".
+    sweep(folder, *, path=None, check=None, wire=None, against=None, history=None, threads=0, progress=None): folder holds case.json, whose view has "frames".
 
     sweep(images=..., calibrator=..., ...): images: (n, height, width) array, or a list of arrays, XrayImages, paths or pydicom
     datasets, in the order of the path. calibrator: Calibrator, its path, or "udcsc". plate: Plate, its path or "plate48", seen
@@ -179,7 +179,8 @@ def sweep(folder=None, *, images=None, calibrator=None, plate=None, pixel_mm=Non
 
     path: "smooth", "free" or None (smooth for 16 or more images of one run). check: "FDK" reconstructs balls and a wire with
     plastimatch, with these cameras and with the ideal circle; .check holds their widths. wire: its two ends, mm, calibrator
-    frame. against: file of another program's cameras, compared too. progress: called with the share of the images
+    frame. against: file of another program's cameras, compared too. history: a C-arm's record, whose maps rectify images without a
+    plate by their angles. progress: called with the share of the images
     that are done; an exception from it ends the run, and Ctrl-C does. Releases the GIL. Returns a Sweep.
     Raises InputError; RefusedError with .result if the run as a whole is refused.
     """

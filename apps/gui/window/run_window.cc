@@ -9,6 +9,7 @@
 #include <QThreadPool>
 #include <QVBoxLayout>
 #include <algorithm>
+#include <utility>
 
 #include "gui/controller/steps.h"
 #include "gui/replay/print_svg.h"
@@ -81,6 +82,7 @@ RunWindow::RunWindow(QWidget* parent) : QDialog(parent) {
   view_ = new XrayView;
   view_->set_layer(Layer::raw);
   column->addWidget(view_, 3);
+  connect(view_, &XrayView::shown, this, &RunWindow::end_frame);
   bar_ = new FilmBar("run");
   connect(bar_, &FilmBar::frame_wanted, this, &RunWindow::read_frame);
   column->addWidget(bar_);
@@ -237,10 +239,8 @@ void RunWindow::read_frame() {
         qApp,
         [self, of, number, image] {
           if (!self) return;
-          self->reading_ = false;
-          self->bar_->set_waiting(false);
           if (self->shown_ == of) self->show_frame(number, *image);
-          self->read_frame();  // another one is wanted meanwhile
+          if (self->shown_ != of || !*image) self->end_frame();
         },
         Qt::QueuedConnection);
   });
@@ -266,7 +266,13 @@ void RunWindow::show_frame(int number, const Expected<xray::XrayImage>& image) {
     }
     view_->show_view(result, 0, true);
   }
-  if (film_) film_frame(number);
+}
+
+void RunWindow::end_frame() {
+  if (!std::exchange(reading_, false)) return;
+  bar_->set_waiting(false);
+  if (film_ && displayed_ >= 0) film_frame(displayed_);
+  read_frame();  // another one is wanted meanwhile
 }
 
 void RunWindow::fill_images() {
@@ -308,13 +314,15 @@ void RunWindow::ask_and_write() {
 
 void RunWindow::ask_and_film() {
   ask_files(this, tr("Folder for the images of the film"), QFileDialog::Directory, {},
-            [this](const std::vector<fs::path>& chosen) {
-              film_ = chosen.front();
-              displayed_ = -1;
-              set_frame(0);
-              allow();
-              read_frame();
-            });
+            [this](const std::vector<fs::path>& chosen) { save_film(chosen.front()); });
+}
+
+void RunWindow::save_film(const fs::path& folder) {
+  film_ = folder;
+  displayed_ = -1;
+  set_frame(0);
+  allow();
+  read_frame();
 }
 
 void RunWindow::film_frame(int number) {

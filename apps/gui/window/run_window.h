@@ -45,6 +45,8 @@ class RunWindow : public QDialog {
   /// Of the run's images, from 0.
   int frame() const;
   void set_frame(int number);
+  /// Plays the run once and writes each image as displayed into the folder, image-00001.png and so on.
+  void save_film(const std::filesystem::path& folder);
 
  private:
   using Done = Expected<std::shared_ptr<const CalibratedRun>>;
@@ -58,6 +60,7 @@ class RunWindow : public QDialog {
   void allow();
   void read_frame();
   void show_frame(int number, const Expected<xray::XrayImage>& image);
+  void end_frame();
   void fill_images();
   void show_curves();
   void ask_and_write();

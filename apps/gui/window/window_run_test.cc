@@ -7,6 +7,7 @@
 #include "gui/window/run_window.h"
 #include "gui/window/sequence_window.h"
 #include "gui/window/window_test.h"
+#include "gui/xray/xray_view.h"
 #include "helicarm/sweep/drawn_run_test.h"
 
 namespace helicarm::gui {
@@ -66,6 +67,21 @@ TEST_F(WindowRun, IsCalibratedListedPlayedAndDrawn) {
   EXPECT_EQ(illegible_parts(*run()).join('\n').toStdString(), "");
   click("runPlay");
   ASSERT_TRUE(wait("it plays to its end", [&] { return run()->frame() == images_of_run - 1; }));
+}
+
+TEST_F(WindowRun, SavedFilmHasEachImageWithItsOwnLabels) {
+  ASSERT_NO_FATAL_FAILURE(open());
+  click("runCalibrate");
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  run()->save_film(folder_);
+  ASSERT_TRUE(wait("it is saved", [&] { return says().find("film's images") != std::string::npos; }));
+  run()->set_frame(5);
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  auto* view = run()->findChild<XrayView*>();
+  QImage displayed(view->size(), QImage::Format_RGB32);
+  view->render(&displayed);
+  QImage saved((folder_ / "image-00006.png").c_str());
+  EXPECT_EQ(saved.convertToFormat(QImage::Format_RGB32), displayed);
 }
 
 TEST_F(WindowRun, ACancelledCalibrationLeavesTheRunAsItWas) {

@@ -34,18 +34,19 @@ void XrayView::show_view(std::shared_ptr<const pipeline::Result> result, std::si
   const QString name = QString::fromStdString(next.name);
   if (!next.xray_image || next.xray_image->pixels.empty())
     return clear(name.isEmpty() ? tr("No image yet") : tr("No image yet: acquire %1").arg(name));
-  const bool stays = result_ && (keeps_zoom || same_image(view(), next));
+  const bool is_same = result_ && same_image(view(), next), stays = result_ && (keeps_zoom || is_same);
   // The previous layer stays until the new one is ready, to avoid flicker.
   const bool stands = stays && shown_ && layer_at_hand(next, shown_->layer) == shown_->layer;
   auto layer = stands ? shown_ : nullptr;
   QImage grey = stands ? grey_ : QImage();
+  report::ViewMarks marks = marks_;
   clear({});
   result_ = std::move(result);
   view_ = index;
   if (stands) {
     shown_ = std::move(layer);
     grey_ = std::move(grey);
-    marks_ = marks_of(*result_, view_, shown_->layer);
+    marks_ = is_same ? marks_of(*result_, view_, shown_->layer) : std::move(marks);
   }
   if (!stays) {
     window_.reset();

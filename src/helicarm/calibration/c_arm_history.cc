@@ -65,6 +65,27 @@ void describe_acquisition(Codec& codec, Entry& entry) {
         if constexpr (!std::is_const_v<Entry>) entry.date = reader.optional_text("date").value_or("");
       },
       [&] { return std::optional(entry.date.empty() ? Json() : Json(entry.date)); });
+  codec.custom(
+      "map", false, {{"type", {"object", "null"}}},
+      "distortion [map](#mapjson) by the image's own plate, without covariance; absent without a plate",
+      [&](JsonReader& reader) {
+        const Json& map = reader.raw("map");
+        if constexpr (!std::is_const_v<Entry>)
+          if (!map.is_null()) entry.map = value_or_throw(rectification::distortion_map_from_json(map, "map"));
+      },
+      [&] { return entry.map ? std::optional(to_json(*entry.map)) : std::nullopt; });
+  codec.custom(
+      "field_radius_px", false, {{"type", "number"}, {"minimum", 0}},
+      "of a map: farthest distance of its dots from their middle",
+      [&](JsonReader& reader) {
+        if constexpr (!std::is_const_v<Entry>)
+          entry.field_radius_px = reader.optional_number("field_radius_px", {0, 1e5}).value_or(0);
+      },
+      [&] { return entry.map ? std::optional<Json>(entry.field_radius_px) : std::nullopt; });
+  codec.check([&](JsonReader& reader) {
+    if (entry.map && !(entry.field_radius_px > 0))
+      reader.refuse(Reason::bad_value, "field_radius_px", "must be positive where there is a map");
+  });
 }
 
 template <class Codec, class Entries>

@@ -11,6 +11,7 @@
 
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/core/json.h"
+#include "helicarm/rectification/distortion_map.h"
 
 namespace helicarm::calibration {
 
@@ -22,8 +23,10 @@ struct HistoryEntry {
   Eigen::Vector3d estimate_mm;
   Eigen::Matrix3d information;  ///< inverse covariance, 1 / mm^2
   std::optional<double> primary_deg = {},
-                        secondary_deg = {};  ///< positioner angles, if the image states them
-  std::string date = {};                     ///< UTC, on which it was added: 2026-11-26
+                        secondary_deg = {};              ///< positioner angles, if the image states them
+  std::string date = {};                                 ///< UTC, on which it was added: 2026-11-26
+  std::optional<rectification::DistortionMap> map = {};  ///< by the image's own plate; without covariance
+  double field_radius_px = 0;  ///< of a map: distance of its dots from their middle, at most
 };
 
 /// Differences from what the history predicts that are no change of the C-arm, mm.

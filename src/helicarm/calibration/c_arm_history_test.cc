@@ -104,6 +104,19 @@ TEST(CArmHistoryJson, RoundTrip) {
   EXPECT_TRUE(again->entries[0].information.isApprox(history.entries[0].information));
 }
 
+TEST(CArmHistoryJson, KeepsAMapWithItsField) {
+  HistoryEntry entry{"a", "AP", {901, 2, 3}, Eigen::Matrix3d::Identity()};
+  entry.map = rectification::identity_map(512, 384, 0.3);
+  entry.field_radius_px = 250;
+  Json json = to_json(CArmHistory{{entry}});
+  const HistoryEntry read = history_from_json(json, "machine.json").value().entries.at(0);
+  ASSERT_TRUE(read.map);
+  EXPECT_EQ(read.map->height, 384);
+  EXPECT_EQ(read.field_radius_px, 250);
+  json["shots"][0].erase("field_radius_px");
+  EXPECT_EQ(history_from_json(json, "machine.json").error().reason, Reason::bad_value);
+}
+
 Json result_with(const std::vector<HistoryEntry>& entries) {
   return {{"format", "helicarm-result/1"}, {"status", "ok"}, {"acquisitions", acquisitions_json(entries)}};
 }

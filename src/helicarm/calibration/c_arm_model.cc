@@ -5,10 +5,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include <Eigen/Cholesky>
 
+#include "helicarm/calibration/c_arm_maps.h"
+#include "helicarm/calibration/c_arm_position.h"
 #include "helicarm/calibration/c_arm_variations.h"
 #include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
@@ -23,23 +24,8 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr std::size_t most_used = 150;
-constexpr double correlated_deg = 40;
 constexpr double largest_sigma_mm = 100;  // of an entry along a direction that it does not determine
 constexpr double usual_repeat = 0.1;      // of the sag
-
-std::optional<Vector3d> direction_of(const HistoryEntry& entry) {
-  if (!entry.primary_deg) return {};
-  constexpr double radian = std::numbers::pi / 180;
-  const double primary = *entry.primary_deg * radian, secondary = entry.secondary_deg.value_or(0) * radian;
-  return Vector3d(std::sin(primary) * std::cos(secondary), std::sin(secondary),
-                  std::cos(primary) * std::cos(secondary));
-}
-
-double correlation(const std::optional<Vector3d>& a, const std::optional<Vector3d>& b) {
-  if (!a || !b) return 0;
-  const double apart_deg = std::acos(std::clamp(a->dot(*b), -1.0, 1.0)) * 180 / std::numbers::pi;
-  return std::exp(-0.5 * std::pow(apart_deg / correlated_deg, 2));
-}
 
 Matrix3d noise_of(const HistoryEntry& entry) {
   const auto [values, vectors] = geometry::symmetric_eigen(entry.information);
@@ -61,12 +47,12 @@ MatrixXd covariance_between(const CArmModel& model, std::span<const HistoryEntry
                             std::span<const HistoryEntry> b, bool same) {
   MatrixXd between = MatrixXd::Zero(3 * Index(a.size()), 3 * Index(b.size()));
   std::vector<std::optional<Vector3d>> in_a, in_b;
-  for (const HistoryEntry& entry : a) in_a.push_back(direction_of(entry));
-  for (const HistoryEntry& entry : b) in_b.push_back(direction_of(entry));
+  for (const HistoryEntry& entry : a) in_a.push_back(c_arm_direction(entry.primary_deg, entry.secondary_deg));
+  for (const HistoryEntry& entry : b) in_b.push_back(c_arm_direction(entry.primary_deg, entry.secondary_deg));
   for (std::size_t i = 0; i < a.size(); ++i)
     for (std::size_t j = 0; j < b.size(); ++j) {
       const bool itself = same && i == j;
-      const double alike = itself ? 1 : correlation(in_a[i], in_b[j]);
+      const double alike = itself ? 1 : position_correlation(in_a[i], in_b[j]);
       for (int axis = 0; axis < 3; ++axis) {
         const CArmVariation& variation = of(model, axis);
         between(3 * Index(i) + axis, 3 * Index(j) + axis) =
@@ -188,10 +174,27 @@ void mark_those_that_tell(CArmCheck& check) {
 
 }  // namespace
 
+namespace {
+
+std::vector<MapDifference> check_maps(const CArmModel& model, std::span<const HistoryEntry> acquired) {
+  constexpr double significant = 3, noticeable_px = 0.2;
+  std::vector<MapDifference> differences;
+  const auto maps = c_arm_maps(model.entries);
+  if (!maps) return differences;
+  for (const HistoryEntry& entry : acquired)
+    if (const auto check = check_map(*maps, entry))
+      differences.push_back({entry.view, check->error_px, check->predicted_px,
+                             check->error_px > std::max(noticeable_px, significant * check->predicted_px)});
+  return differences;
+}
+
+}  // namespace
+
 CArmCheck check_c_arm(const CArmModel& model, std::span<const HistoryEntry> acquired,
                       const CArmTolerances& tolerances) {
   CArmCheck check;
   if (acquired.empty()) return check;
+  check.maps = check_maps(model, acquired);
   const IntrinsicsPrediction predicted = predict_intrinsics(model, acquired);
   MatrixXd covariance = predicted.covariance_mm2;
   add_noise(covariance, acquired);

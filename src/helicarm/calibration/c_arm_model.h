@@ -48,12 +48,20 @@ struct AcquisitionCheck {
   bool is_changed = false;
 };
 
+/// A new acquisition's distortion beside that of the history, root mean square per axis over the field, px.
+struct MapDifference {
+  std::string view;
+  double error_px = 0, sigma_px = 0;
+  bool is_changed = false;
+};
+
 /// New acquisitions of one case beside a history that does not hold them.
 struct CArmCheck {
   std::vector<AcquisitionCheck> acquisitions;
-  double chi2 = 0;       ///< of all together
-  double limit = 0;      ///< its 99.9 % quantile
-  bool changed = false;  ///< significant, and beyond the history's tolerances in one acquisition
+  double chi2 = 0;                  ///< of all together
+  double limit = 0;                 ///< its 99.9 % quantile
+  bool changed = false;             ///< significant, and beyond the history's tolerances in one acquisition
+  std::vector<MapDifference> maps;  ///< of the acquisitions with a map, beside those of the history
 };
 
 CArmCheck check_c_arm(const CArmModel& model, std::span<const HistoryEntry> acquired,

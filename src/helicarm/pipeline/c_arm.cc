@@ -117,6 +117,16 @@ Expected<calibration::HistoryGrowth> add_to_record(const std::filesystem::path& 
 }
 
 std::optional<Failure> c_arm_change(const calibration::CArmCheck& check) {
+  if (const auto map = std::ranges::find_if(check.maps, &calibration::MapDifference::is_changed);
+      !check.changed && map != check.maps.end())
+    return Failure{
+        Reason::c_arm_changed,
+        fmt::format("the distortion is {:.2f} px rms from what the record predicts (sigma {:.2f}): the "
+                    "intensifier or its settings have changed, the record is another C-arm's, or "
+                    "the plate's file is wrong",
+                    map->error_px, map->sigma_px),
+        map->view,
+        {{"distortion_px", map->error_px}, {"sigma_px", map->sigma_px}}};
   if (!check.changed) return {};
   const auto& worst = *std::ranges::max_element(
       check.acquisitions, {}, [](const auto& one) { return one.is_changed ? one.chi2 : -1; });

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "helicarm/calibration/c_arm_maps.h"
 #include "helicarm/pipeline/c_arm.h"
 #include "helicarm/pipeline/diagnosis/calibrator_checks.h"
 #include "helicarm/pipeline/diagnosis/causes.h"
@@ -44,6 +45,7 @@ std::vector<calibration::HistoryEntry> entries_of(const LabelledViews& views,
     if (auto entry = calibration::history_entry_of(fiducials[i], acquisition.instance_key, common)) {
       entry->primary_deg = acquisition.primary_angle_deg;
       entry->secondary_deg = acquisition.secondary_angle_deg;
+      calibration::keep_map(*entry, views[i].rectification);
       entries.push_back(*std::move(entry));
     }
   }

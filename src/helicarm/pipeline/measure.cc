@@ -24,7 +24,7 @@ bool ask_for_one_calibration(const RunOptions& a, const RunOptions& b) {
     return one.image == other.image && one.estimate_mm == other.estimate_mm &&
            one.information == other.information;
   };
-  return a.method == b.method && a.history.has_value() == b.history.has_value() &&
+  return a.method == b.method && a.maps == b.maps && a.history.has_value() == b.history.has_value() &&
          (!a.history || std::ranges::equal(a.history->entries, b.history->entries, same));
 }
 

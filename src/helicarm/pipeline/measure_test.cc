@@ -95,6 +95,29 @@ TEST_F(SimulatedNavigation, RecordOfAChangedCArmIsNotUsed) {
   EXPECT_EQ(add_to_record(folder.path() / "arm.json", result)->added, 0u);
 }
 
+TEST_F(SimulatedNavigation, WithoutAPlateTheRecordsMapsRectify) {
+  const Result by_plate = result_of(given_, {}).value();
+  RunOptions options;
+  options.history.emplace();
+  options.history->entries = by_plate.calibration->entries;
+  ASSERT_EQ(options.history->entries.size(), 2u);
+  EXPECT_TRUE(options.history->entries[0].map);
+  EXPECT_GT(options.history->entries[0].field_radius_px, 150);
+  given_.plate.reset();
+  const Result by_record = result_of(given_, options).value();
+  ASSERT_FALSE(by_record.failure) << by_record.failure->message;
+  EXPECT_EQ(by_record.views[0].rectification->source, rectification::MapSource::record);
+  EXPECT_GT(by_record.views[0].rectification->map.sigma_px({100, 100}), 0.01);
+  for (const simulation::TunnelPoint& real : truth_.navigation->points) {
+    const auto point = std::ranges::find(by_record.points, real.name, &PointResult::name);
+    ASSERT_TRUE(point->place) << real.name;
+    const Eigen::Vector3d off = point->place->in_calibrator - real.in_calibrator;
+    EXPECT_LT(off.norm(), 0.5) << real.name;
+  }
+  // What the record told is not told to it again.
+  for (const calibration::HistoryEntry& entry : by_record.calibration->entries) EXPECT_FALSE(entry.map);
+}
+
 TEST_F(SimulatedNavigation, MirroredCalibratorFileIsRefused) {
   for (phantom::CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
   const auto result = result_of(given_, {});

@@ -25,6 +25,10 @@
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/xray/xray_image.h"
 
+namespace helicarm::calibration {
+struct CArmMaps;
+}
+
 namespace helicarm::pipeline {
 
 /// The step of a measurement whose result a finding concerns.
@@ -41,6 +45,8 @@ struct RunOptions {
       max_error_mm;      ///< refuse (uncertain) if a point's 95 % error, also in the tool's frame, exceeds it
   unsigned threads = 0;  ///< 0: all cores
   std::optional<calibration::CArmHistory> history = {};  ///< C-arm history, used as prior
+  /// Distortion over the C-arm's positions, for views without plate and map; by default that of `history`.
+  std::shared_ptr<const calibration::CArmMaps> maps = {};
   /// Motion of an untracked bone between the acquisitions, per axis; in the covariance of its points.
   double motion_sigma_mm = 0;
   /// Folder for the maps of plate images (`plate_image_map`), which changes no result; nothing: none are

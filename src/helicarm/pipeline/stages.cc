@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/calibration/c_arm_maps.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/parallel.h"
 #include "helicarm/detection/find_dots.h"
@@ -46,15 +47,28 @@ OrRefusal<std::vector<Next>> joined(Stage stage, std::vector<View> views,
   return next;
 }
 
-Expected<rectification::DistortionMap> map_of(const xray::XrayImage& xray_image, const CaseView& from,
-                                              const std::optional<phantom::Plate>& plate,
-                                              const RunOptions& options) {
-  if (from.map)
-    return read_json(*from.map).and_then([&](const Json& json) {
-      return rectification::distortion_map_from_json(json, from.map->filename().string());
-    });
-  if (from.plate_image) return plate_image_map(from, *plate, options.method, options.cache);
-  return rectification::flat_panel_map(xray_image);
+struct KnownMap {
+  rectification::DistortionMap map;
+  rectification::MapSource source;
+};
+
+Expected<KnownMap> map_of(const xray::XrayImage& xray_image, const CaseView& from,
+                          const std::optional<phantom::Plate>& plate, const RunOptions& options) {
+  using rectification::MapSource;
+  return guarded([&]() -> KnownMap {
+    if (from.map)
+      return {value_or_throw(rectification::distortion_map_from_json(value_or_throw(read_json(*from.map)),
+                                                                     from.map->filename().string())),
+              MapSource::file};
+    if (from.plate_image)
+      return {value_or_throw(plate_image_map(from, *plate, options.method, options.cache)),
+              MapSource::plate_image};
+    const xray::Acquisition& acquisition = xray_image.acquisition;
+    if (options.maps)
+      return {map_at(*options.maps, acquisition.primary_angle_deg, acquisition.secondary_angle_deg),
+              MapSource::record};
+    return {rectification::flat_panel_map(xray_image), MapSource::none};
+  });
 }
 
 /// Whether the map comes from the plate in the image itself.
@@ -62,16 +76,28 @@ bool shows_plate(const CaseView& view, const std::optional<phantom::Plate>& plat
   return plate && !view.map && !view.plate_image;
 }
 
+bool has_no_map(const CaseView& view, const std::optional<phantom::Plate>& plate) {
+  return !plate && !view.map && !view.plate_image;
+}
+
+std::shared_ptr<const calibration::CArmMaps> maps_of_record(const RunOptions& options) {
+  if (!options.history) return nullptr;
+  auto maps = calibration::c_arm_maps(options.history->entries);
+  return maps ? std::make_shared<const calibration::CArmMaps>(*std::move(maps)) : nullptr;
+}
+
 Expected<rectification::Rectification> rectify_view(DetectedView& view, const CaseView& from,
                                                     const std::optional<phantom::Plate>& plate,
                                                     const RunOptions& options) {
   const xray::XrayImage& xray_image = *view.xray_image;
-  auto rectified =
-      shows_plate(from, plate)
-          ? rectification::rectify(xray_image, view.dots, *plate, {options.method, {}})
-          : map_of(xray_image, from, plate, options).and_then([&](const rectification::DistortionMap& map) {
-              return rectification::with_map(xray_image, view.dots, map, plate);
-            });
+  auto source = rectification::MapSource::plate;
+  auto rectified = shows_plate(from, plate)
+                       ? rectification::rectify(xray_image, view.dots, *plate, {options.method, {}})
+                       : map_of(xray_image, from, plate, options).and_then([&](const KnownMap& known) {
+                           source = known.source;
+                           return rectification::with_map(xray_image, view.dots, known.map, plate);
+                         });
+  if (rectified) rectified->source = source;
   if (rectified) detection::dots_of(view.dots, xray_image, rectified->metal);
   return rectified;
 }
@@ -177,8 +203,13 @@ OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<ReadView> views
 
 OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<DetectedView> views, const Case& the_case,
                                                     const RunOptions& options, const Progress& progress) {
+  RunOptions with_maps = options;
+  if (!options.maps && std::ranges::any_of(the_case.views, [&](const CaseView& view) {
+        return has_no_map(view, the_case.plate);
+      }))
+    with_maps.maps = maps_of_record(options);
   auto rectified = of_each(views.size(), options, progress, [&](std::size_t i) {
-    return rectify_view(views[i], the_case.views[i], the_case.plate, options);
+    return rectify_view(views[i], the_case.views[i], the_case.plate, with_maps);
   });
   return joined<RectifiedView>(Stage::rectify, std::move(views), std::move(rectified));
 }

@@ -19,9 +19,14 @@ enum class Method { best, paper };
 inline constexpr std::array<std::string_view, 2> method_words{"best", "paper"};
 constexpr std::string_view word(Method method) { return method_words[std::size_t(method)]; }
 
+/// Where a map comes from: nowhere (a flat panel), the plate in the image, a plate image of the same
+/// position, a file, or a C-arm's record.
+enum class MapSource { none, plate, plate_image, file, record };
+
 /// The distortion map of one image, and which of its dots are the plate's.
 struct Rectification {
   DistortionMap map;
+  MapSource source = MapSource::none;
   std::vector<detection::Dot> plate_dots;  ///< used for the map
   std::vector<double> residual_px;         ///< of each
   int dots_found = 0;

@@ -20,6 +20,7 @@ namespace helicarm::report {
 namespace {
 
 using calibration::AcquisitionCheck;
+using calibration::CArmMaps;
 using calibration::CArmModel;
 
 constexpr std::array<const char*, 3> intrinsic_names{"focal", "u0", "v0"};
@@ -166,6 +167,84 @@ Json json_of(std::span<const AcquisitionCheck> acquisitions) {
 
 }  // namespace
 
+Table c_arm_map_table(const CArmMaps& maps) {
+  using calibration::MapCheck;
+  const auto entry_of = [&](const MapCheck& check) -> const calibration::HistoryEntry& {
+    return maps.entries[check.entry];
+  };
+  const auto pixels = [](const char* title, const char* definition, double MapCheck::*value) {
+    return ColumnOf<MapCheck>{{title, definition, true},
+                              [value](const MapCheck& check) { return Cell{fixed(check.*value, 3)}; }};
+  };
+  return without_empty_columns(table_of<MapCheck>(
+      "Distortion",
+      {{{"View", "Its name"}, [=](const MapCheck& c) { return Cell{entry_of(c).view}; }},
+       {{"Date", "On which it was added, UTC"}, [=](const MapCheck& c) { return Cell{entry_of(c).date}; }},
+       {{"Primary, degrees", "Positioner angle", true},
+        [=](const MapCheck& c) { return angle_cell(entry_of(c).primary_deg); }},
+       {{"Secondary, degrees", "Positioner angle", true},
+        [=](const MapCheck& c) { return angle_cell(entry_of(c).secondary_deg); }},
+       pixels("By position, px", "From the map that the others predict there, rms per axis over the field",
+              &MapCheck::error_px),
+       pixels("By one map, px", "From the mean of the others' maps, likewise", &MapCheck::of_one_map_px),
+       pixels("Expected, px", "Of the difference by position, as its standard deviation states",
+              &MapCheck::predicted_px)},
+      maps.checks));
+}
+
+namespace {
+
+/// Root mean square of a column of the maps' checks.
+double rms_of(const CArmMaps& maps, double calibration::MapCheck::*value) {
+  double sum = 0;
+  for (const calibration::MapCheck& check : maps.checks) sum += check.*value * check.*value;
+  return std::sqrt(sum / double(std::max<std::size_t>(1, maps.checks.size())));
+}
+
+std::string map_text(const CArmModel& model) {
+  using calibration::MapCheck;
+  const auto maps = calibration::c_arm_maps(model.entries);
+  if (!maps) return "";
+  if (maps->checks.empty()) return "  distortion: one map\n";
+  return fmt::format(
+      "  distortion: {} maps; each is {:.2f} px rms off its prediction by the others ({:.2f} expected), "
+      "{:.2f} px "
+      "off one map for all\n",
+      maps->checks.size(), rms_of(*maps, &MapCheck::error_px), rms_of(*maps, &MapCheck::predicted_px),
+      rms_of(*maps, &MapCheck::of_one_map_px));
+}
+
+Json map_json(const CArmModel& model) {
+  const auto maps = calibration::c_arm_maps(model.entries);
+  if (!maps) return {};
+  Json list = Json::array();
+  for (const calibration::MapCheck& check : maps->checks)
+    list.push_back({{"view", maps->entries[check.entry].view},
+                    {"error_px", check.error_px},
+                    {"one_map_px", check.of_one_map_px},
+                    {"expected_px", check.predicted_px}});
+  return {{"maps", maps->entries.size()}, {"left_out", std::move(list)}};
+}
+
+std::string map_csv(const CArmMaps& maps) {
+  std::string csv = "view,date,primary_deg,secondary_deg,error_px,one_map_px,expected_px\n";
+  const auto angle = [](const std::optional<double>& deg) { return deg ? fmt::format("{:.6g}", *deg) : ""; };
+  for (const calibration::MapCheck& check : maps.checks) {
+    const calibration::HistoryEntry& entry = maps.entries[check.entry];
+    csv += fmt::format("{},{},{},{},{:.4f},{:.4f},{:.4f}\n", csv_field(entry.view), entry.date,
+                       angle(entry.primary_deg), angle(entry.secondary_deg), check.error_px,
+                       check.of_one_map_px, check.predicted_px);
+  }
+  return csv;
+}
+
+std::string map_html(const CArmModel& model) {
+  const auto maps = calibration::c_arm_maps(model.entries);
+  return maps && !maps->checks.empty() ? html_of(c_arm_map_table(*maps)) : "";
+}
+
+}  // namespace
+
 std::string c_arm_text(const CArmModel& model) {
   const calibration::CArmVariations found = calibration::c_arm_variations(model);
   std::string text = fmt::format("{} acquisitions; standard deviations (95 %):\n", model.entries.size());
@@ -176,12 +255,13 @@ std::string c_arm_text(const CArmModel& model) {
   line("source distance", found.focal);
   line("principal point", found.principal);
   if (!found.at_positions)
-    return text + "  no acquisition states its angles: sag is not told from repeatability\n";
+    return text + "  no acquisition states its angles: sag is not told from repeatability\n" +
+           map_text(model);
   text += "  predicted at the recorded positions, mm:";
   for (int axis = 0; axis < 3; ++axis)
     text += fmt::format("{} {} {:.1f} to {:.1f}", axis == 0 ? "" : ",", intrinsic_names[std::size_t(axis)],
                         found.at_positions->first[axis], found.at_positions->second[axis]);
-  return text + "\n";
+  return text + "\n" + map_text(model);
 }
 
 Json to_json(const CArmModel& model) {
@@ -202,11 +282,21 @@ Json to_json(const CArmModel& model) {
   return {{"focal_mm", variation(found.focal)},
           {"principal_mm", variation(found.principal)},
           {"at_positions_mm", at_positions},
-          {"acquisitions", json_of(calibration::leave_one_out(model))}};
+          {"acquisitions", json_of(calibration::leave_one_out(model))},
+          {"distortion", map_json(model)}};
 }
 
 Json to_json(const calibration::CArmCheck& check) {
-  return {{"chi2", check.chi2}, {"limit", check.limit}, {"acquisitions", json_of(check.acquisitions)}};
+  Json maps = Json::array();
+  for (const calibration::MapDifference& map : check.maps)
+    maps.push_back({{"view", map.view},
+                    {"error_px", map.error_px},
+                    {"sigma_px", map.sigma_px},
+                    {"changed", map.is_changed}});
+  return {{"chi2", check.chi2},
+          {"limit", check.limit},
+          {"acquisitions", json_of(check.acquisitions)},
+          {"distortion", std::move(maps)}};
 }
 
 std::string c_arm_report_html(const CArmModel& model, std::span<const AcquisitionCheck> left_out) {
@@ -214,7 +304,7 @@ std::string c_arm_report_html(const CArmModel& model, std::span<const Acquisitio
   return page_html(
       "helicarm C-arm", "C-arm",
       summary(model, left_out) + (charts.empty() ? std::string() : chart_svg(charts)) +
-          html_of(c_arm_table(left_out)),
+          html_of(c_arm_table(left_out)) + map_html(model),
       ". Millimetres on the detector; focal is the source distance, u0 and v0 the principal point "
       "from the image's centre.");
 }
@@ -231,6 +321,8 @@ std::string c_arm_report_pdf(const CArmModel& model, std::span<const Acquisition
                             inside_95(left_out), left_out.size()));
   for (const Chart& chart : charts_of(model)) pdf.chart(chart);
   pdf.table(c_arm_table(left_out));
+  if (const auto maps = calibration::c_arm_maps(model.entries); maps && !maps->checks.empty())
+    pdf.table(c_arm_map_table(*maps));
   pdf.blanks({"C-arm, serial number", "Measured by", "Checked by", "Date", "Signature"});
   return pdf.bytes();
 }
@@ -238,11 +330,14 @@ std::string c_arm_report_pdf(const CArmModel& model, std::span<const Acquisition
 Expected<void> write_c_arm_report(const CArmModel& model, const std::filesystem::path& folder) {
   const std::vector<AcquisitionCheck> left_out = calibration::leave_one_out(model);
   const std::vector<Chart> charts = charts_of(model);
-  forget_files(folder, {"report.html", "report.pdf", "c_arm.csv", "c_arm.svg"});
+  forget_files(folder, {"report.html", "report.pdf", "c_arm.csv", "c_arm_maps.csv", "c_arm.svg"});
+  const auto maps = calibration::c_arm_maps(model.entries);
   return write_file(folder / "c_arm.csv", c_arm_csv(left_out))
       .and_then([&] {
         return charts.empty() ? Expected<void>() : write_file(folder / "c_arm.svg", chart_svg(charts));
       })
+      .and_then(
+          [&] { return maps ? write_file(folder / "c_arm_maps.csv", map_csv(*maps)) : Expected<void>(); })
       .and_then([&] { return write_file(folder / "report.pdf", c_arm_report_pdf(model, left_out)); })
       .and_then([&] { return write_file(folder / "report.html", c_arm_report_html(model, left_out)); });
 }

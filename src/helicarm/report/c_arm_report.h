@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <span>
 
+#include "helicarm/calibration/c_arm_maps.h"
 #include "helicarm/calibration/c_arm_model.h"
 #include "helicarm/core/json.h"
 #include "helicarm/report/table.h"
@@ -16,6 +17,10 @@ Table c_arm_table(std::span<const calibration::AcquisitionCheck> acquisitions);
 /// The same numbers: view, date, primary_deg, secondary_deg, then of focal_mm, u0_mm and v0_mm the value, the
 /// prediction and the sigma of their difference, and chi2.
 std::string c_arm_csv(std::span<const calibration::AcquisitionCheck> acquisitions);
+
+/// A row per acquisition with a distortion map: position, date, how far the map is off the prediction by all
+/// others, and off one map for all.
+Table c_arm_map_table(const calibration::CArmMaps& maps);
 
 /// Lines of text: both variations with their intervals, and the range predicted at the positions.
 std::string c_arm_text(const calibration::CArmModel& model);
@@ -36,8 +41,8 @@ std::string c_arm_report_html(const calibration::CArmModel& model,
 std::string c_arm_report_pdf(const calibration::CArmModel& model,
                              std::span<const calibration::AcquisitionCheck> left_out);
 
-/// Writes report.html, report.pdf, c_arm.csv and c_arm.svg of a history into `folder`, without files of an
-/// earlier report.
+/// Writes report.html, report.pdf, c_arm.csv, c_arm.svg and, of distortion maps, c_arm_maps.csv of a history
+/// into `folder`, without files of an earlier report.
 Expected<void> write_c_arm_report(const calibration::CArmModel& model, const std::filesystem::path& folder);
 
 }  // namespace helicarm::report

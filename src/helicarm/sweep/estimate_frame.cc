@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/calibration/c_arm_maps.h"
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/pipeline/stages.h"
 #include "helicarm/pipeline/view_image.h"
@@ -66,6 +67,9 @@ void estimate_from(FrameEstimate& estimate, const Frame& frame, xray::XrayImage 
   if (map.rectified_plane == rectification::RectifiedPlane::detector || map.is_identity())
     estimate.pixel_mm = map.rectified_pixel_mm;
   if (!map.is_identity()) estimate.map = map;
+  calibration::HistoryEntry entry;
+  calibration::keep_map(entry, rectified.front().rectification);
+  if (entry.map) estimate.own_map = std::move(entry);
   const pipeline::LabelledView labelled =
       expected ? labelled_near(std::move(rectified.front()), *expected, one, options)
                : passed(pipeline::label_views(std::move(rectified), one, options)).front();
@@ -80,8 +84,9 @@ Expected<xray::XrayImage> rectified_image_of(const Frame& frame, const SweepCase
   return guarded([&] {
     const auto file = the_case.files.find(frame.view.image);
     xray::XrayImage image = image_of(frame, file == the_case.files.end() ? nullptr : file->second.get());
-    if (!the_case.base.plate && !frame.view.map && !frame.view.plate_image) return image;
+    if (!the_case.base.plate && !frame.view.map && !frame.view.plate_image && !the_case.maps) return image;
     pipeline::RunOptions options;
+    options.maps = the_case.maps;
     options.threads = 1;
     pipeline::Case one = the_case.base;
     one.views = {frame.view};

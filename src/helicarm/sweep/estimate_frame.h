@@ -21,7 +21,8 @@ struct FrameEstimate {
   std::optional<double> primary_angle_deg, secondary_angle_deg;  ///< as the file states
   std::optional<double> source_detector_mm;                      ///< likewise
   std::string image;                                             ///< digest of the pixels
-  std::optional<rectification::DistortionMap> map;               ///< of a plate in the image
+  std::optional<rectification::DistortionMap> map;               ///< unless it is the identity
+  std::optional<calibration::HistoryEntry> own_map;              ///< map and field of its own plate
   calibration::ViewFiducials fiducials;  ///< labelled by the evidence of this image; outliers are `rejected`
   std::optional<calibration::CalibratedView> alone;
   double variance_scale = 1;  ///< of the residuals over the noise model, where inconsistent

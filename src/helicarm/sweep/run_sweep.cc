@@ -34,6 +34,7 @@ std::vector<FrameEstimate> estimates_of(const SweepCase& the_case, const SweepOp
   const std::size_t count = the_case.frames.size();
   std::vector<Expected<FrameEstimate>> estimated(count, FrameEstimate{});
   pipeline::RunOptions run;
+  run.maps = the_case.maps;
   std::mutex guard;
   std::size_t done = 0;
   parallel_for(count, options.threads, [&](std::size_t i) {
@@ -204,13 +205,15 @@ std::optional<fiducials::ExpectedView> expected_at(std::ptrdiff_t frame,
 int label_by_neighbours(double factor, const SweepCase& the_case, std::vector<FrameEstimate>& estimates,
                         unsigned threads) {
   const std::vector<FrameEstimate> alone = estimates;
+  pipeline::RunOptions run;
+  run.maps = the_case.maps;
   std::atomic<int> labelled = 0;
   parallel_for(estimates.size(), threads, [&](std::size_t index) {
     if (!alone[index].failure || alone[index].failure->reason != Reason::ambiguous_labels) return;
     const auto expected = expected_at(std::ptrdiff_t(index), alone);
     if (!expected) return;
     const Frame& frame = the_case.frames[index];
-    auto again = estimate_frame(frame, file_of(frame, the_case), the_case.base, {}, expected);
+    auto again = estimate_frame(frame, file_of(frame, the_case), the_case.base, run, expected);
     if (!again || again->failure) return;
     calibrate_with(factor, the_case, *again, frame.view.name);
     if (again->failure) return;
@@ -237,6 +240,7 @@ std::vector<calibration::HistoryEntry> acquisitions_of(const std::vector<FrameEs
     auto entry = calibration::history_entry_of(at.fiducials, at.image, common);
     if (!entry) continue;
     entry->primary_deg = at.primary_angle_deg;
+    if (at.own_map) entry->map = at.own_map->map, entry->field_radius_px = at.own_map->field_radius_px;
     entry->secondary_deg = at.secondary_angle_deg;
     entries.push_back(*std::move(entry));
   }

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/calibration/c_arm_maps.h"
 #include "helicarm/case_registration/follow_case.h"
 #include "helicarm/core/number_ranges.h"
 #include "helicarm/pipeline/case_frames.h"
@@ -117,6 +118,11 @@ Expected<SweepCase> read_runs(const fs::path& path, pipeline::Purpose purpose) {
 
 Expected<SweepCase> read_sweep_case(const fs::path& path) {
   return read_runs(path, pipeline::Purpose::sweep);
+}
+
+void take_maps(SweepCase& the_case, const calibration::CArmHistory& record) {
+  if (auto maps = calibration::c_arm_maps(record.entries))
+    the_case.maps = std::make_shared<const calibration::CArmMaps>(*std::move(maps));
 }
 
 Expected<pipeline::Case> read_phantom_case(const fs::path& path) {

@@ -187,6 +187,14 @@ double kernel(double squared_distance, double length) {
   return (1 + s) * std::exp(-s);
 }
 
+Trend trend_through(const PlateDots& dots, int order) {
+  constexpr double length = 0.57, least_noise = 1e-4;  // of the dots' variance over the remainder's
+  const MatrixX2d knots = thinned(dots.points);
+  const LinearFit fit =
+      fit_linear(dots, rows_of_dots(dots, order, knots, length), least_noise * gram_of(knots, length));
+  return {order, {dots.normalised, fit.coefficients, {}}, knots, length, 0};
+}
+
 VectorXd KrigingModel::basis(const Vector2d& t) const { return basis_row(t, order(), knots_, length_); }
 
 MatrixX2d KrigingModel::slopes(const Vector2d& t) const {

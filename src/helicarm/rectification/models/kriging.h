@@ -40,6 +40,9 @@ class KrigingModel : public PolynomialModel {
 /// Matern covariance of smoothness 3/2: matches the roughness of real screens between dots.
 double kernel(double squared_distance, double length);
 
+/// Passes through dots without noise; without covariance.
+Trend trend_through(const PlateDots& dots, int order);
+
 /// Keys of map.json that identity, polynomial and kriging share.
 void write_trend(const Trend& trend, Json& json);
 ModelPointer read_trend(JsonReader& reader);

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/calibration/c_arm_maps.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/calibration/c_arm_position.h"
+#include "helicarm/core/random.h"
+#include "helicarm/rectification/fit_map.h"
+
+namespace helicarm::calibration {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr int side = 512;
+
+/// An intensifier in the earth's field: its S distortion follows the field along the central ray, its shear
+/// and a quadratic part the field across it.
+struct Intensifier {
+  explicit Intensifier(std::uint64_t seed) {
+    RandomStream random{seed, 0};
+    field = Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
+  }
+
+  HistoryEntry at(double primary_deg, double secondary_deg, int size = side) const {
+    const Eigen::Vector3d ray = *c_arm_direction(primary_deg, secondary_deg);
+    const double along = field.dot(ray), across = field.cross(ray).x();
+    RandomStream random{std::uint64_t(1000 * (primary_deg + 400) + secondary_deg + 90), 1};
+    std::vector<rectification::Correspondence> dots;
+    const Vector2d middle = Vector2d::Constant((size - 1) / 2.0);
+    for (int i = -8; i <= 8; ++i)
+      for (int j = -8; j <= 8; ++j) {
+        const Vector2d mm(13.0 * i, 13.0 * j), t = mm / 104;
+        const double r2 = t.squaredNorm();
+        Vector2d raw = middle + 2.3 * size / side * mm + 6 * r2 * t +
+                       1.2 * along * r2 * Vector2d(-t.y(), t.x()) +
+                       0.5 * across * Vector2d(t.x() * t.x(), t.x() * t.y());
+        raw += 0.03 * Vector2d(random.normal(), random.normal());
+        dots.push_back({mm, raw, 0.03});
+      }
+    HistoryEntry recorded;
+    recorded.map = value_or_throw(rectification::fit_map(dots, size, size, {})).map;
+    recorded.field_radius_px = 330;
+    recorded.primary_deg = primary_deg;
+    recorded.secondary_deg = secondary_deg;
+    return recorded;
+  }
+  std::vector<HistoryEntry> around(const std::vector<double>& primary_deg) const {
+    std::vector<HistoryEntry> maps;
+    for (const double angle : primary_deg) maps.push_back(at(angle, 0));
+    return maps;
+  }
+
+  Eigen::Vector3d field;
+};
+
+Eigen::MatrixX2d off(const rectification::DistortionMap& a, const rectification::DistortionMap& b,
+                     const rectification::MapField& field) {
+  return displacements(a, field) - displacements(b, field);
+}
+
+double rms(const Eigen::MatrixX2d& of) { return std::sqrt(of.squaredNorm() / double(of.size())); }
+
+const std::vector<double> steps_deg{-90, -60, -30, 0, 30, 60, 90};
+
+TEST(CArmMaps, BetweenRecordedPositionsIsNearerThanOneMapForAll) {
+  double by_position = 0, by_one = 0;
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const Intensifier intensifier(seed);
+    const CArmMaps model = c_arm_maps(intensifier.around(steps_deg)).value();
+    const rectification::DistortionMap truth = *intensifier.at(15, 0).map;
+    by_position += rms(off(map_at(model, 15, 0), truth, model.field));
+    by_one += rms(off(map_at(model, {}, {}), truth, model.field));
+  }
+  EXPECT_LT(by_position, 0.3 * by_one);
+}
+
+TEST(CArmMaps, StatedErrorsHold) {
+  double inside = 0, count = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const Intensifier intensifier(seed);
+    const CArmMaps model = c_arm_maps(intensifier.around(steps_deg)).value();
+    for (const double angle : {-75.0, -20.0, 10.0, 50.0, 110.0}) {
+      const rectification::DistortionMap map = map_at(model, angle, 0);
+      const Eigen::MatrixX2d errors = off(map, *intensifier.at(angle, 0).map, model.field);
+      const Eigen::VectorXd sigmas = map.covariance_px2(model.field.places).diagonal().cwiseSqrt();
+      for (Eigen::Index i = 0; i < errors.rows(); ++i)
+        for (int axis = 0; axis < 2; ++axis) inside += std::abs(errors(i, axis)) < 1.96 * sigmas[i];
+      count += double(errors.size());
+    }
+  }
+  EXPECT_GT(inside / count, 0.9);
+}
+
+TEST(CArmMaps, FartherFromRecordedPositionsErrorsAreLarger) {
+  const CArmMaps model = c_arm_maps(Intensifier(1).around(steps_deg)).value();
+  const Vector2d edge = model.field.places.back();
+  const double between = map_at(model, 15, 0).sigma_px(edge), beyond = map_at(model, 150, 0).sigma_px(edge),
+               unknown = map_at(model, {}, {}).sigma_px(edge);
+  EXPECT_LT(between, 0.7 * beyond);
+  EXPECT_LE(beyond, 1.01 * unknown);
+}
+
+TEST(CArmMaps, OfOneMapIsThatMapWithUsualErrors) {
+  const Intensifier intensifier(1);
+  const CArmMaps model = c_arm_maps(intensifier.around({0})).value();
+  EXPECT_TRUE(model.checks.empty());
+  const rectification::DistortionMap there = map_at(model, 0, 0), elsewhere = map_at(model, 90, 0);
+  EXPECT_LT(rms(off(there, *model.entries[0].map, model.field)), 5e-3);
+  const Vector2d edge = model.field.places.back();
+  EXPECT_GT(elsewhere.sigma_px(edge), 3 * there.sigma_px(edge));
+}
+
+TEST(CArmMaps, EachMapIsCheckedByTheOthers) {
+  const CArmMaps model = c_arm_maps(Intensifier(2).around(steps_deg)).value();
+  ASSERT_EQ(model.checks.size(), steps_deg.size());
+  const MapCheck& middle = model.checks[3];
+  EXPECT_LT(middle.error_px, 0.5 * middle.of_one_map_px);
+  EXPECT_LT(middle.error_px, 3 * middle.predicted_px);
+}
+
+TEST(CArmMaps, WithoutMapsThereIsNoModel) { EXPECT_FALSE(c_arm_maps(std::vector<HistoryEntry>(3))); }
+
+TEST(CArmMaps, MapsOfAnotherImageSizeAreLeftOut) {
+  const Intensifier intensifier(1);
+  std::vector<HistoryEntry> maps = intensifier.around({0, 30});
+  maps.insert(maps.begin(), intensifier.at(0, 0, 2 * side));
+  EXPECT_EQ(c_arm_maps(maps)->entries.size(), 2u);
+}
+
+}  // namespace
+}  // namespace helicarm::calibration
