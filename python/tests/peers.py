@@ -229,6 +229,67 @@ def pydicom_writes_segmentations(folder, count=COUNT):
     return count, far, off
 
 
+def pydicom_writes_label_maps(folder, count=60):
+    """(files, largest distance in mm, voxels that differ): LABELMAP segmentations of 8 and 16 bits by pydicom; uncompressed,
+    deflated, in RLE, and compressed by DCMTK's programs: lossless JPEG and JPEG-LS."""
+    pydicom = importlib.import_module("pydicom")
+    random, far, off = np.random.default_rng(8), 0.0, 0
+    digits, Dataset, Sequence, uid = pydicom.valuerep.format_number_as_ds, pydicom.Dataset, pydicom.Sequence, pydicom.uid
+
+    def item(**values):
+        made = Dataset()
+        for name, value in values.items():
+            setattr(made, name, value)
+        return made
+
+    for n in range(count):
+        datasets, shape, place, _ = ct_datasets(pydicom, random, 4 * n)  # of a gantry that is not tilted
+        bits = (8, 16)[n // 6 % 2]
+        numbers = np.unique(random.integers(1, 2**bits, 4))
+        labels = np.append(numbers, 0)[random.integers(0, len(numbers) + 1, shape)]
+        dataset = datasets[0]
+        meta = dataset.file_meta
+        meta.MediaStorageSOPClassUID = dataset.SOPClassUID = "1.2.840.10008.5.1.4.1.1.66.7"
+        meta.TransferSyntaxUID = (uid.ExplicitVRLittleEndian, uid.ImplicitVRLittleEndian, uid.DeflatedExplicitVRLittleEndian,
+                                  uid.ExplicitVRLittleEndian, uid.ExplicitVRLittleEndian, uid.ExplicitVRLittleEndian)[n % 6]
+        dataset.is_little_endian, dataset.is_implicit_VR = True, n % 6 == 1
+        axes, spacing = dataset.ImageOrientationPatient, dataset.PixelSpacing
+        for name in ("ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "RescaleSlope", "RescaleIntercept",
+                     "RescaleType", "PixelData"):
+            delattr(dataset, name)
+        dataset.Modality, dataset.SegmentationType, dataset.PixelPaddingValue = "SEG", "LABELMAP", 0
+        dataset["PixelPaddingValue"].VR = "US"
+        dataset.BitsAllocated, dataset.BitsStored, dataset.HighBit, dataset.PixelRepresentation = bits, bits, bits - 1, 0
+        dataset.SegmentSequence = Sequence([item(SegmentNumber=int(k), SegmentLabel=f"part {k}") for k in [0, *numbers]])
+        dataset.SharedFunctionalGroupsSequence = Sequence([item(
+            PlaneOrientationSequence=Sequence([item(ImageOrientationPatient=axes)]),
+            PixelMeasuresSequence=Sequence([item(PixelSpacing=spacing)]))])
+        order = random.permutation(shape[2])
+        dataset.PerFrameFunctionalGroupsSequence = Sequence([item(PlanePositionSequence=Sequence([item(
+            ImagePositionPatient=[digits(float(x)) for x in place[:3, 2] * z + place[:3, 3]])])) for z in order])
+        dataset.NumberOfFrames = len(order)
+        frames = np.stack([labels[:, :, z].T for z in order]).astype("<u2" if bits == 16 else "u1")
+        dataset.PixelData = frames.tobytes() + bytes(frames.nbytes % 2)
+        dataset["PixelData"].VR = "OW" if bits == 16 else "OB"
+        if n % 6 == 3:
+            dataset.compress(uid.RLELossless)
+        path = folder / f"l{n}.dcm"
+        dataset.save_as(path, write_like_original=False)
+        if n % 6 > 3 and shutil.which("dcmcjpeg") and shutil.which("dcmcjpls"):
+            plain, path = path, folder / f"c{n}.dcm"
+            subprocess.run((["dcmcjpeg"], ["dcmcjpls"])[n % 6 - 4] + [str(plain), str(path)], check=True, capture_output=True)
+            assert pydicom.dcmread(path).file_meta.TransferSyntaxUID != meta.TransferSyntaxUID
+        volume = helicarm.read_volume(path)
+        flipped = volume.affine[:3, 2] @ place[:3, 2] < 0
+        expected = place.copy()
+        if flipped:
+            expected[:3, 3] += place[:3, 2] * (shape[2] - 1)
+            expected[:3, 2] *= -1
+        far = max(far, apart(shape, volume.affine, expected))
+        off = max(off, int((volume.array != (labels[:, :, ::-1] if flipped else labels)).sum()))
+    return count, far, off
+
+
 def pydicom_reads_images(folder, count=6):
     """(files, largest difference of a pixel, largest of spacing and distance in mm): simulated X-ray images."""
     pydicom = importlib.import_module("pydicom")
@@ -584,6 +645,7 @@ JUDGES = [
     (nibabel_writes, "nibabel", "NIfTI-1 and NIfTI-2: `.nii`, pairs of `.hdr` and `.img`, each plain or `.gz`, and images in memory", "read", (0.05, 1e-6), ("mm", "of the largest voxel")),
     (pydicom_writes_series, "pydicom", "DICOM CT series, and datasets in memory", "read", (0.005, 0), ("mm", "HU")),
     (pydicom_writes_segmentations, "pydicom", "DICOM segmentation, BINARY", "read", (0.005, 0), ("mm", "voxels")),
+    (pydicom_writes_label_maps, "pydicom", "DICOM segmentation, LABELMAP", "read", (0.005, 0), ("mm", "voxels")),
     (pydicom_reads_images, "pydicom", "DICOM X-ray image", "written", (0, 1e-6), ("grey values", "mm")),
     (vtk_writes, "vtk", "STL, PLY, VTP, OBJ, legacy VTK (4.2 and 5.1, strips), and `vtkPolyData` in memory", "read", (1e-3,), ("mm",)),
     (vtk_image, "vtk", "`vtkImageData` in memory", "read", (1e-9, 1e-12), ("mm", "of a voxel")),

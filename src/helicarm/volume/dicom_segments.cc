@@ -10,9 +10,9 @@
 #include "helicarm/core/text.h"
 #include "helicarm/volume/read_volume.h"
 #include "helicarm/volume/voxels.h"
+#include "helicarm/xray/compressed_frame.h"
 #include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/frame_fragments.h"
-#include "helicarm/xray/rle.h"
 #include "helicarm/xray/transfer_syntax.h"
 
 namespace helicarm::volume {
@@ -23,6 +23,9 @@ using xray::DicomElements;
 using xray::DicomTag;
 
 constexpr std::string_view segmentation_class = "1.2.840.10008.5.1.4.1.1.66.4";
+constexpr std::string_view label_map_class = "1.2.840.10008.5.1.4.1.1.66.7";  // Supplement 243
+constexpr DicomTag pixel_padding{0x00280120, "Pixel Padding Value"};
+constexpr DicomTag lossy_compression{0x00282110, "Lossy Image Compression"};
 constexpr DicomTag segmentation_type{0x00620001, "Segmentation Type"};
 constexpr DicomTag fractional_type{0x00620010, "Segmentation Fractional Type"};
 constexpr DicomTag fractional_maximum{0x0062000E, "Maximum Fractional Value"};
@@ -40,7 +43,8 @@ constexpr DicomTag slice_spacing{0x00180088, "Spacing Between Slices"};
 constexpr double farthest_coordinate_mm = 1e5, same_slice_mm = 0.01;
 constexpr std::size_t most_group_bytes = std::size_t{64} << 20;
 
-/// A frame shows one segment in one slice. Columns of `axes`: along a row, along a column, mm per pixel.
+/// A frame shows one segment in one slice, of a LABELMAP (segment 0) all of them. Columns of `axes`: along a
+/// row, along a column, mm per pixel.
 struct SegmentFrame {
   int segment = 0;
   Vector3d corner;
@@ -74,9 +78,12 @@ DicomElements group_of(const DicomElements& frame, const DicomElements& shared, 
   frame.refuse(Reason::bad_value, tag, "is missing");
 }
 
-SegmentFrame frame_of(const DicomElements& frame, const DicomElements& shared) {
+enum class Kind { binary, fractional, label_map };
+
+SegmentFrame frame_of(const DicomElements& frame, const DicomElements& shared, Kind kind) {
   SegmentFrame segment_frame;
-  segment_frame.segment = word_in(group_of(frame, shared, segment_identification), referenced_segment, 1);
+  if (kind != Kind::label_map)
+    segment_frame.segment = word_in(group_of(frame, shared, segment_identification), referenced_segment, 1);
   const auto corner = numbers_in(group_of(frame, shared, plane_position), xray::tags::image_position, 3,
                                  -farthest_coordinate_mm, farthest_coordinate_mm);
   const DicomElements orientation = group_of(frame, shared, plane_orientation);
@@ -99,41 +106,64 @@ SegmentFrame frame_of(const DicomElements& frame, const DicomElements& shared) {
   return segment_frame;
 }
 
-bool is_fractional(const DicomElements& elements) {
+Kind kind_of(const DicomElements& elements) {
   const auto type = elements.text(segmentation_type);
-  if (type != "BINARY" && type != "FRACTIONAL")
-    elements.refuse(
-        Reason::unsupported, segmentation_type,
-        fmt::format("is {}, must be BINARY or FRACTIONAL: export the segmentation as binary, or as a label "
-                    "map in NRRD or NIfTI",
-                    xray::quote(type)));
-  return type == "FRACTIONAL";
+  if (type == "BINARY") return Kind::binary;
+  if (type == "FRACTIONAL") return Kind::fractional;
+  if (type == "LABELMAP") return Kind::label_map;
+  elements.refuse(Reason::unsupported, segmentation_type,
+                  fmt::format("is {}, must be BINARY, FRACTIONAL or LABELMAP: export the segmentation as "
+                              "binary, or as a label map in NRRD or NIfTI",
+                              xray::quote(type)));
 }
 
-/// Refuses values that are no bits (BINARY) or bytes (FRACTIONAL), and other compression than RLE of bytes.
-void check_kind(const DicomElements& elements) {
-  const int needed = is_fractional(elements) ? 8 : 1;
-  if (const int bits = word_in(elements, xray::tags::bits_allocated, 1); bits != needed)
+/// Refuses values that are no bits (BINARY), bytes (FRACTIONAL) or words (LABELMAP).
+void check_bits(const DicomElements& elements, Kind kind) {
+  const int bits = word_in(elements, xray::tags::bits_allocated, 1);
+  const auto refuse = [&](const char* needed) {
     elements.refuse(Reason::unsupported, xray::tags::bits_allocated,
                     fmt::format("is {}, must be {}", bits, needed));
-  const xray::TransferSyntax* syntax = xray::transfer_syntax(elements.transfer_syntax);
-  const bool is_rle = syntax != nullptr && syntax->coding == xray::Coding::rle;
-  if (!elements.fragments.empty() && !(is_rle && needed == 8))
-    elements.refuse(Reason::unsupported, xray::tags::pixel_data,
-                    "is compressed: decompress the file, for example with dcmconv or gdcmconv --raw");
-  if (!elements.find(xray::tags::pixel_data))
-    elements.refuse(Reason::bad_value, xray::tags::pixel_data, "is missing");
+  };
+  if (kind == Kind::binary && bits != 1) refuse("1");
+  if (kind == Kind::fractional && bits != 8) refuse("8");
+  if (kind == Kind::label_map && bits != 8 && bits != 16) refuse("8 or 16");
 }
 
+/// Values that changed in compression would be other labels, or another outline.
+void check_compression(const DicomElements& elements, Kind kind) {
+  if (elements.fragments.empty()) return;
+  const xray::TransferSyntax* syntax = xray::transfer_syntax(elements.transfer_syntax);
+  if (kind == Kind::binary || syntax == nullptr)
+    elements.refuse(Reason::unsupported, xray::tags::pixel_data,
+                    "is compressed: decompress the file, for example with dcmconv or gdcmconv --raw");
+  if (syntax->coding == xray::Coding::jpeg ||
+      (syntax->may_be_lossy && elements.text(lossy_compression) != "00"))
+    elements.refuse(Reason::unsupported, xray::tags::pixel_data,
+                    "is compressed with loss, or may be (Lossy Image Compression (0028,2110) is not 00): a "
+                    "segmentation must be stored without loss");
+}
+
+/// Refuses what `Frames` does not read.
+Kind checked_kind(const DicomElements& elements) {
+  const Kind kind = kind_of(elements);
+  check_bits(elements, kind);
+  check_compression(elements, kind);
+  if (!elements.find(xray::tags::pixel_data))
+    elements.refuse(Reason::bad_value, xray::tags::pixel_data, "is missing");
+  return kind;
+}
+
+/// Without number 0, which is a label map's background.
 std::map<int, std::string> segments_of(const DicomElements& elements) {
+  const int least = kind_of(elements) == Kind::label_map ? 0 : 1;
   std::map<int, std::string> segments;
   for (const DicomElements& item : xray::sequence_items(elements, segment_sequence))
-    segments[word_in(item, segment_number, 1)] =
-        without_control_characters(std::string(item.text(segment_label).substr(0, 64)));
+    if (const int number = word_in(item, segment_number, least); number > 0)
+      segments[number] = without_control_characters(std::string(item.text(segment_label).substr(0, 64)));
   return segments;
 }
 
-std::vector<SegmentFrame> frames_of(const DicomElements& elements) {
+std::vector<SegmentFrame> frames_of(const DicomElements& elements, Kind kind) {
   const auto count = std::size_t(numbers_in(elements, xray::tags::frames, 1, 1, 1e6)[0]);
   const auto* groups = elements.find(xray::tags::frame_groups);
   if (!groups) elements.refuse(Reason::bad_value, xray::tags::frame_groups, "is missing");
@@ -149,8 +179,8 @@ std::vector<SegmentFrame> frames_of(const DicomElements& elements) {
   std::vector<SegmentFrame> frames;
   for (std::size_t i = 0; i < count; ++i) {
     items[i].origin = fmt::format("{}: frame {}", elements.origin, i + 1);
-    frames.push_back(frame_of(items[i], shared.empty() ? DicomElements{} : shared.front()));
-    if (!segments.contains(frames.back().segment))
+    frames.push_back(frame_of(items[i], shared.empty() ? DicomElements{} : shared.front(), kind));
+    if (kind != Kind::label_map && !segments.contains(frames.back().segment))
       throw BadInput(Reason::bad_value,
                      fmt::format("{}: shows segment {}, which Segment Sequence does not list",
                                  items[i].origin, frames.back().segment));
@@ -203,56 +233,84 @@ Vector3d place_frames(std::vector<SegmentFrame>& frames, const std::string& orig
   return along;
 }
 
-/// Which voxels of each frame belong to its segment.
+/// Which voxels of each frame belong to which segment.
 class Frames {
  public:
   /// `threshold`: of a FRACTIONAL segmentation.
-  Frames(const DicomElements& elements, std::size_t area, std::size_t count, std::optional<double> threshold)
-      : elements_(elements), area_(area), is_fractional_(is_fractional(elements)) {
-    if (is_fractional_) least_ = *threshold * word_in(elements, fractional_maximum, 1);
+  Frames(const DicomElements& elements, const Eigen::Vector2i& size, std::size_t count,
+         std::optional<double> threshold)
+      : elements_(elements),
+        size_(size),
+        area_(std::size_t(size.x()) * std::size_t(size.y())),
+        kind_(kind_of(elements)),
+        bits_(std::size_t(word_in(elements, xray::tags::bits_allocated, 1))) {
+    if (kind_ == Kind::fractional) least_ = *threshold * word_in(elements, fractional_maximum, 1);
+    if (kind_ == Kind::label_map) {
+      segments_ = segments_of(elements);
+      padding_ = elements.word(pixel_padding, "US");
+    }
     if (!elements.fragments.empty()) {
       compressed_ = xray::fragments_of_frames(elements, int(count)).frames;
       return;
     }
     values_ = elements.find(xray::tags::pixel_data)->value;
-    const std::size_t needed = is_fractional_ ? area * count : (area * count + 7) / 8;
+    const std::size_t needed = (area_ * count * bits_ + 7) / 8;
     if (values_.size() < needed)
-      elements.refuse(
-          Reason::truncated, xray::tags::pixel_data,
-          fmt::format("has {} bytes, {} frames of {} x {} {} need {}", values_.size(), count,
-                      word_in(elements, xray::tags::columns, 1), word_in(elements, xray::tags::rows, 1),
-                      is_fractional_ ? "bytes" : "bits", needed));
+      elements.refuse(Reason::truncated, xray::tags::pixel_data,
+                      fmt::format("has {} bytes, {} frames of {} x {} {} need {}", values_.size(), count,
+                                  size.x(), size.y(),
+                                  bits_ == 1   ? "bits"
+                                  : bits_ == 8 ? "bytes"
+                                               : "words",
+                                  needed));
   }
 
-  /// Calls `take(i)` for each such voxel of a frame.
+  /// Calls `take(i, segment)` for each voxel of a frame that belongs to one; `of_frame`: its own.
   template <class Take>
-  void for_each_inside(std::size_t frame, const Take& take) const {
+  void for_each_inside(std::size_t frame, int of_frame, const Take& take) const {
     const std::string unpacked = compressed_.empty() ? std::string() : decoded(frame);
     const std::size_t first = compressed_.empty() ? frame * area_ : 0;
     const std::string_view values = compressed_.empty() ? values_ : std::string_view(unpacked);
     for (std::size_t i = 0; i < area_; ++i)
-      if (is_fractional_ ? static_cast<unsigned char>(values[first + i]) >= least_ : bit(values, first + i))
-        take(i);
+      if (const int segment = segment_of(value_at(values, first + i), of_frame, frame)) take(i, segment);
   }
 
  private:
-  /// Bits are packed from the least significant one on.
-  static bool bit(std::string_view bits, std::size_t at) {
-    return (static_cast<unsigned char>(bits[at / 8]) >> (at % 8) & 1U) != 0;
+  /// Bits are packed from the least significant one on; words are little-endian.
+  int value_at(std::string_view values, std::size_t at) const {
+    const auto byte = [&](std::size_t i) { return int(static_cast<unsigned char>(values[i])); };
+    if (bits_ == 1) return byte(at / 8) >> (at % 8) & 1;
+    return bits_ == 8 ? byte(at) : byte(2 * at) | byte(2 * at + 1) << 8;
+  }
+
+  /// 0: of none.
+  int segment_of(int value, int of_frame, std::size_t frame) const {
+    if (kind_ == Kind::binary) return value != 0 ? of_frame : 0;
+    if (kind_ == Kind::fractional) return value >= least_ ? of_frame : 0;
+    if (value == 0 || segments_.contains(value)) return value;
+    if (value == padding_) return 0;
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: frame {} has a pixel of value {}, which Segment Sequence does not list",
+                               elements_.origin, frame + 1, value));
   }
 
   std::string decoded(std::size_t frame) const {
     std::string bytes;
     for (std::size_t i = compressed_[frame].first; i < compressed_[frame].last; ++i)
       bytes += elements_.fragments[i];
-    return value_or_throw(
-        xray::decode_rle(bytes, area_, 1, fmt::format("{}: frame {}", elements_.origin, frame + 1)));
+    return value_or_throw(xray::decode_compressed(
+        std::move(bytes), xray::transfer_syntax(elements_.transfer_syntax)->coding, size_, int(bits_ / 8),
+        fmt::format("{}: frame {}", elements_.origin, frame + 1)));
   }
 
   const DicomElements& elements_;
+  Eigen::Vector2i size_;
   std::size_t area_;
-  bool is_fractional_;
+  Kind kind_;
+  std::size_t bits_;  ///< of a value
   double least_ = 0;
+  std::map<int, std::string> segments_;  ///< of a LABELMAP
+  std::optional<int> padding_;
   std::string_view values_;
   std::vector<xray::FrameFragments> compressed_;
 };
@@ -260,12 +318,14 @@ class Frames {
 /// Before the file is walked.
 bool may_be_segmentation(std::string_view bytes) {
   constexpr std::size_t looked_at = 4000;
-  return xray::looks_like_dicom(bytes) &&
-         bytes.substr(0, looked_at).find(segmentation_class) != std::string_view::npos;
+  const std::string_view begin = bytes.substr(0, looked_at);
+  return xray::looks_like_dicom(bytes) && (begin.find(segmentation_class) != std::string_view::npos ||
+                                           begin.find(label_map_class) != std::string_view::npos);
 }
 
 bool is_segmentation_class(const DicomElements& elements) {
-  return elements.text(xray::tags::sop_class) == segmentation_class;
+  const auto sop_class = elements.text(xray::tags::sop_class);
+  return sop_class == segmentation_class || sop_class == label_map_class;
 }
 
 /// Frames in the order of their slices, and an empty volume of these.
@@ -274,15 +334,14 @@ struct Segmentation {
   std::vector<SegmentFrame> frames;
   std::vector<std::size_t> stored_at;  ///< of each frame, in the file
 
-  std::size_t area() const { return std::size_t(volume.size.x()) * std::size_t(volume.size.y()); }
+  Eigen::Vector2i plane() const { return volume.size.head<2>(); }
   float* voxels_of(std::size_t frame) {
-    return volume.voxels.data() + area() * std::size_t(frames[frame].slice);
+    return volume.voxels.data() + std::ptrdiff_t(plane().prod()) * frames[frame].slice;
   }
 };
 
 Segmentation whole_segmentation(const DicomElements& elements) {
-  check_kind(elements);
-  const std::vector<SegmentFrame> frames = frames_of(elements);
+  const std::vector<SegmentFrame> frames = frames_of(elements, checked_kind(elements));
   Segmentation made;
   made.stored_at.resize(frames.size());
   for (std::size_t i = 0; i < frames.size(); ++i) made.stored_at[i] = i;
@@ -332,10 +391,10 @@ int chosen_segment(const std::map<int, std::string>& segments, const SegmentChoi
 }
 
 void check_threshold(const DicomElements& elements, const SegmentChoice& choice) {
-  if (is_fractional(elements) == choice.threshold.has_value()) return;
+  if ((kind_of(elements) == Kind::fractional) == choice.threshold.has_value()) return;
   elements.refuse(Reason::bad_value, segmentation_type,
                   choice.threshold
-                      ? std::string("is BINARY: it takes no \"mask_threshold\"")
+                      ? fmt::format("is {}: it takes no \"mask_threshold\"", elements.text(segmentation_type))
                       : fmt::format("is FRACTIONAL ({}): state by \"mask_threshold\" from which share on a "
                                     "voxel belongs to the body, such as 0.5",
                                     without_control_characters(std::string(elements.text(fractional_type)))));
@@ -348,21 +407,21 @@ std::optional<Volume> read_segmentation(const std::filesystem::path& path, std::
   const std::string origin = path.string();
   const DicomElements elements = value_or_throw(xray::walk_dicom(bytes, origin));
   if (!is_segmentation_class(elements)) return std::nullopt;
-  if (is_fractional(elements))
+  if (kind_of(elements) == Kind::fractional)
     elements.refuse(Reason::unsupported, segmentation_type,
                     "is FRACTIONAL, which is read as a model's mask, with \"mask_threshold\"");
   Segmentation made = whole_segmentation(elements);
-  const Frames values(elements, made.area(), made.frames.size(), {});
+  const Frames values(elements, made.plane(), made.frames.size(), {});
   for (std::size_t f = 0; f < made.frames.size(); ++f) {
     float* voxels = made.voxels_of(f);
     const SegmentFrame& frame = made.frames[f];
-    values.for_each_inside(made.stored_at[f], [&](std::size_t i) {
-      if (voxels[i] != 0 && voxels[i] != float(frame.segment))
+    values.for_each_inside(made.stored_at[f], frame.segment, [&](std::size_t i, int segment) {
+      if (voxels[i] != 0 && voxels[i] != float(segment))
         throw BadInput(Reason::unsupported,
                        fmt::format("{}: segments {} and {} overlap in slice {}: choose one by "
                                    "\"mask_label\", or export them to one file each",
-                                   origin, voxels[i], frame.segment, frame.slice + 1));
-      voxels[i] = float(frame.segment);
+                                   origin, voxels[i], segment, frame.slice + 1));
+      voxels[i] = float(segment);
     });
   }
   return std::move(made.volume);
@@ -392,11 +451,13 @@ Expected<std::optional<Volume>> read_segment(const std::filesystem::path& path, 
     const int segment = chosen_segment(segments_of(elements), choice, elements.origin);
     check_threshold(elements, choice);
     Segmentation made = whole_segmentation(elements);
-    const Frames values(elements, made.area(), made.frames.size(), choice.threshold);
+    const Frames values(elements, made.plane(), made.frames.size(), choice.threshold);
     for (std::size_t f = 0; f < made.frames.size(); ++f)
-      if (made.frames[f].segment == segment)
-        values.for_each_inside(made.stored_at[f],
-                               [voxels = made.voxels_of(f)](std::size_t i) { voxels[i] = 1; });
+      if (const int of_frame = made.frames[f].segment; of_frame == segment || of_frame == 0)
+        values.for_each_inside(made.stored_at[f], of_frame,
+                               [voxels = made.voxels_of(f), segment](std::size_t i, int of_voxel) {
+                                 if (of_voxel == segment) voxels[i] = 1;
+                               });
     return std::move(made.volume);
   });
 }

@@ -188,11 +188,70 @@ TEST_F(Segments, SharesInRleAreDecoded) {
   EXPECT_THAT((*first)->voxels, ElementsAre(1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0));
 }
 
+/// A word for each voxel of two slices of 3 x 3: 300 in the corner, 2 in the middle of the second, 0 and 9
+/// elsewhere; 9 is padding.
+DicomBuilder label_map(int bits = 16) {
+  auto builder = two_segments();
+  builder.text(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.66.7").text(0x00620001, "CS", "LABELMAP");
+  builder.word(0x00280100, bits).word(0x00280101, bits).word(0x00280102, bits - 1).word(0x00280120, 9);
+  const int first = bits == 16 ? 300 : 3;
+  builder.raw(0x00620002, "SQ",
+              items_of({segment(0, "Background"), segment(first, "Femur"), segment(2, "Tibia")}));
+  builder.text(0x00280008, "IS", "2");
+  builder.raw(0x52009230, "SQ",
+              items_of({sequence(0x00209113, {text_element(0x00200032, "DS", "-3\\4\\10")}),
+                        sequence(0x00209113, {text_element(0x00200032, "DS", "-3\\4\\12")})}));
+  std::vector<int> values(18, 0);
+  values[0] = first, values[8] = 9, values[13] = 2;
+  std::string words;
+  for (const int value : values) words += DicomBuilder::number(value, bits / 8);
+  return builder.raw(0x7FE00010, "OW", words);
+}
+
+TEST_F(Segments, AreReadFromALabelMap) {
+  const auto volume = read_seg(label_map());
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_THAT(volume->voxels, ElementsAre(300, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0));
+  EXPECT_EQ(volume->patient_from_voxel * Vector3d(0, 0, 1), Vector3d(-3, 4, 12));
+  EXPECT_THAT(**segments_in(folder_ / "seg.dcm"),
+              ElementsAre(testing::Pair(2, "Tibia"), testing::Pair(300, "Femur")));
+  const auto femur = read_segment(folder_ / "seg.dcm", {{}, "Femur", {}});
+  ASSERT_TRUE(femur) << femur.error().message;
+  EXPECT_THAT((*femur)->voxels, ElementsAre(1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0));
+  EXPECT_THAT(read_segment(folder_ / "seg.dcm", {2, {}, 0.5}).error().message,
+              HasSubstr("is LABELMAP: it takes no \"mask_threshold\""));
+}
+
+TEST_F(Segments, OfALabelMapOfBytesToo) {
+  const auto volume = read_seg(label_map(8));
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_THAT(volume->voxels, ElementsAre(3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0));
+}
+
+TEST_F(Segments, ALabelThatIsNotDescribedIsRefused) {
+  expect_refused(label_map().word(0x00280120, 0), Reason::bad_value,
+                 "frame 1 has a pixel of value 9, which Segment Sequence does not list");
+  expect_refused(label_map().word(0x00280100, 1), Reason::unsupported,
+                 "Bits Allocated (0028,0100) is 1, must be 8 or 16");
+  expect_refused(label_map().raw(0x7FE00010, "OW", std::string(20, '\0')), Reason::truncated,
+                 "has 20 bytes, 2 frames of 3 x 3 words need 36");
+}
+
+TEST_F(Segments, CompressedLabelsMustBeWithoutLoss) {
+  const auto packed = [](const char* syntax, const char* lossy) {
+    return label_map(8).syntax(syntax).text(0x00282110, "CS", lossy).fragments({"ab", "cd"});
+  };
+  const char *jpeg = "1.2.840.10008.1.2.4.50", *jpeg_2000 = "1.2.840.10008.1.2.4.91";
+  expect_refused(packed(jpeg, "00"), Reason::unsupported, "is compressed with loss, or may be");
+  expect_refused(packed(jpeg_2000, "01"), Reason::unsupported, "is compressed with loss, or may be");
+  expect_refused(packed(jpeg_2000, "00"), Reason::bad_value, "frame 1");  // damaged, so it was decoded
+}
+
 TEST_F(Segments, WhatIsNotReadIsNamed) {
   expect_refused(two_segments().text(0x00620001, "CS", "FRACTIONAL"), Reason::unsupported,
                  "is FRACTIONAL, which is read as a model's mask");
-  expect_refused(two_segments().text(0x00620001, "CS", "LABELMAP"), Reason::unsupported,
-                 "is \"LABELMAP\", must be BINARY or FRACTIONAL");
+  expect_refused(two_segments().text(0x00620001, "CS", "SURFACE"), Reason::unsupported,
+                 "is \"SURFACE\", must be BINARY, FRACTIONAL or LABELMAP");
   expect_refused(two_segments().word(0x00280100, 8), Reason::unsupported,
                  "Bits Allocated (0028,0100) is 8, must be 1");
   expect_refused(two_segments().syntax("1.2.840.10008.1.2.5").fragments({"ab"}), Reason::unsupported,
@@ -241,13 +300,13 @@ TEST_F(Segments, AnItemThatEndsBeyondItsSequenceIsRefused) {
 }
 
 TEST_F(Segments, TruncationsAndMutationsNeverCrash) {
-  const std::string whole = two_segments().bytes();
-  for (std::size_t at = 128; at < whole.size(); ++at) {
-    std::string other = whole;
-    other[at] = static_cast<char>(other[at] ^ 0x15);
-    for (const std::string& bytes : {whole.substr(0, at), other})
-      guarded([&] { return read_segmentation("seg.dcm", bytes).has_value(); });
-  }
+  for (const std::string& whole : {two_segments().bytes(), label_map().bytes()})
+    for (std::size_t at = 128; at < whole.size(); ++at) {
+      std::string other = whole;
+      other[at] = static_cast<char>(other[at] ^ 0x15);
+      for (const std::string& bytes : {whole.substr(0, at), other})
+        guarded([&] { return read_segmentation("seg.dcm", bytes).has_value(); });
+    }
 }
 
 }  // namespace

@@ -23,6 +23,9 @@ constexpr std::uintmax_t most_slice_bytes = std::uintmax_t{64} << 20;
 constexpr xray::DicomTag rescale_type{0x00281054, "Rescale Type"};
 constexpr std::string_view enhanced_ct = "1.2.840.10008.5.1.4.1.1.2.1";
 constexpr std::string_view segmentation_of = "1.2.840.10008.5.1.4.1.1.66.4";
+constexpr std::string_view label_map_of = "1.2.840.10008.5.1.4.1.1.66.7";
+
+bool is_segmentation(std::string_view kind) { return kind == segmentation_of || kind == label_map_of; }
 constexpr double most_coordinate_mm = 1e5;
 // Positions are decimal text with few digits; the relative limit allows for more rounding in thick slices.
 constexpr double uneven_mm = 0.1;
@@ -121,9 +124,9 @@ std::string no_slice(const FolderOfSlices& found, const std::string& origin) {
   for (const auto& [kind, count] : found.other_classes)
     message +=
         fmt::format("; {} of SOP class {}", count,
-                    kind == enhanced_ct       ? "Enhanced CT: convert the file to one file for each slice"
-                    : kind == segmentation_of ? "Segmentation: as a mask give the file itself, not its folder"
-                                              : xray::quote(kind));
+                    kind == enhanced_ct     ? "Enhanced CT: convert the file to one file for each slice"
+                    : is_segmentation(kind) ? "Segmentation: as a mask give the file itself, not its folder"
+                                            : xray::quote(kind));
   return message;
 }
 

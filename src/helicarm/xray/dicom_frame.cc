@@ -3,11 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/xray/dicom_tags.h"
-#include "helicarm/xray/jpeg.h"
-#include "helicarm/xray/jpeg_2000.h"
-#include "helicarm/xray/jpeg_ls.h"
-#include "helicarm/xray/rle.h"
+#include "helicarm/xray/compressed_frame.h"
 #include "helicarm/xray/transfer_syntax.h"
 
 namespace helicarm::xray {
@@ -21,23 +17,10 @@ std::string frame_bytes(const DicomOutline& outline, std::size_t frame) {
 }
 
 std::string decompressed(const DicomOutline& outline, int frame) {
-  std::string bytes = frame_bytes(outline, static_cast<std::size_t>(frame));
-  if (bytes.empty()) outline.elements.refuse(Reason::truncated, tags::pixel_data, "has an empty frame");
-  const std::size_t pixels =
-      static_cast<std::size_t>(outline.rows) * static_cast<std::size_t>(outline.columns);
-  const std::string& origin = outline.elements.origin;
-  const int width = outline.columns, height = outline.rows, word_bytes = outline.bits_allocated / 8;
-  switch (const Coding coding = transfer_syntax(outline.elements.transfer_syntax)->coding) {
-    case Coding::rle:
-      return value_or_throw(decode_rle(bytes, pixels, word_bytes, origin));
-    case Coding::jpeg_ls:
-      return value_or_throw(decode_jpeg_ls(bytes, width, height, word_bytes, origin));
-    case Coding::jpeg_2000:
-      return value_or_throw(decode_jpeg_2000(bytes, width, height, word_bytes, origin));
-    default:
-      return value_or_throw(
-          decode_jpeg(std::move(bytes), coding == Coding::jpeg_lossless, width, height, word_bytes, origin));
-  }
+  return value_or_throw(decode_compressed(frame_bytes(outline, static_cast<std::size_t>(frame)),
+                                          transfer_syntax(outline.elements.transfer_syntax)->coding,
+                                          {outline.columns, outline.rows}, outline.bits_allocated / 8,
+                                          outline.elements.origin));
 }
 
 /// Some writers state a High Bit that the values do not reach: then nothing is set above the lowest bits.

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include <Eigen/Core>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/xray/transfer_syntax.h"
+
+namespace helicarm::xray {
+
+/// The words (little-endian, `word_bytes` 1 or 2) of one compressed grey frame of width x height pixels.
+/// Refuses: truncated, bad_value (another size, damaged). Not for `Coding::native`.
+Expected<std::string> decode_compressed(std::string bytes, Coding coding, const Eigen::Vector2i& size,
+                                        int word_bytes, const std::string& origin);
+
+}  // namespace helicarm::xray
