@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/case_registration/register_case.h"
+#include "helicarm/geometry/rotation.h"
 #include "helicarm/measures/measure.h"
 
 namespace helicarm::case_registration {
@@ -35,6 +36,29 @@ std::optional<Landmark> found_by_name(const std::string& name, const PosedModel&
   return std::nullopt;
 }
 
+bool has_moved(const PosedModel& model) {
+  return std::ranges::any_of(model.at_acquisitions, [&](const auto& at) {
+    return !at.second.matrix().isApprox(model.world_from_model.matrix(), 1e-9);
+  });
+}
+
+/// The views as if the bone were where it was at the first acquisition.
+std::vector<measures::NamedView> views_of_bone_at_first(const PosedModel& model,
+                                                        std::vector<measures::NamedView> views) {
+  if (!has_moved(model)) return views;
+  for (measures::NamedView& view : views) {
+    const auto then = model.at_acquisitions.find(view.name);
+    if (then == model.at_acquisitions.end())
+      throw BadInput(Reason::bad_value,
+                     fmt::format("view \"{}\": \"{}\" moved between the acquisitions and was not registered "
+                                 "in this view: the registration is of other views",
+                                 view.name, model.name));
+    view.view.camera_from_world =
+        view.view.camera_from_world * then->second * model.world_from_model.inverse();
+  }
+  return views;
+}
+
 std::vector<Landmark> landmarks_of(const LandmarkSet& set, const BoneScene& scene) {
   const PosedModel* model = posed_model(scene, set.model);
   std::vector<Landmark> landmarks;
@@ -56,6 +80,12 @@ std::vector<Landmark> landmarks_of(const LandmarkSet& set, const BoneScene& scen
     landmarks.push_back(*std::move(found));
   }
   return landmarks;
+}
+
+RigidTransform pose_in(JsonReader& reader, const char* key) {
+  const Eigen::Matrix4d matrix =
+      Eigen::Map<const Eigen::Matrix4d>(reader.matrix(key, 4, 4, world_mm).data()).transpose();
+  return value_or_throw(geometry::rigid_transform_from(matrix, reader.where() + ": " + key));
 }
 
 PosedModel posed(const RegisteredModel& model) {
@@ -146,17 +176,15 @@ Expected<std::vector<PosedModel>> posed_models_from(const Json& registration, co
     std::vector<PosedModel> models;
     for (JsonReader& model : reader.objects("models", true)) {
       if (model.text("decision") == "refuse" || !model.has("world_from_model")) continue;
-      const Eigen::Matrix4d matrix =
-          Eigen::Map<const Eigen::Matrix4d>(model.matrix("world_from_model", 4, 4, world_mm).data())
-              .transpose();
-      PosedModel posed{model.text("name"),
-                       {matrix.topLeftCorner<3, 3>(), matrix.topRightCorner<3, 1>()},
+      PosedModel posed{model.text("name"), pose_in(model, "world_from_model"),
                        Eigen::Map<const registration::RigidCovariance>(
                            model.matrix("covariance", 6, 6, {-1e12, 1e12}).data()),
                        Vector3d(model.numbers("centre_mm", 3, world_mm).data())};
       for (JsonReader& point : model.objects("points", false))
         posed.planned[point.text("name")] =
             posed.world_from_model.inverse() * Vector3d(point.numbers("xyz_mm", 3, world_mm).data());
+      for (JsonReader& view : model.objects("acquisitions", false))
+        posed.at_acquisitions[view.text("view")] = pose_in(view, "world_from_model");
       models.push_back(std::move(posed));
     }
     return models;
@@ -195,9 +223,10 @@ Landmark in_model(const std::string& name, const WorldPoint& point, const PosedM
 Expected<InBone> measured_in_bone(const LandmarkSet& set, const BoneScene& scene) {
   return guarded([&] {
     const PosedModel* model = posed_model(scene, set.model);
-    return value_or_throw(measures::measure_in_bone(
-        set.name, set.model, set.kind, landmarks_of(set, scene), scene.zones,
-        model ? std::optional(model->world_from_model) : std::nullopt, scene.views));
+    return value_or_throw(
+        measures::measure_in_bone(set.name, set.model, set.kind, landmarks_of(set, scene), scene.zones,
+                                  model ? std::optional(model->world_from_model) : std::nullopt,
+                                  model ? views_of_bone_at_first(*model, scene.views) : scene.views));
   });
 }
 

@@ -36,6 +36,8 @@ struct PosedModel {
   registration::RigidCovariance covariance;
   Eigen::Vector3d centre;                               ///< of the covariance, in the world
   std::map<std::string, Eigen::Vector3d> planned = {};  ///< points of its plan, in the model, exact
+  /// world_from_model at each view's acquisition, by the view's name; empty: the same in every view.
+  std::map<std::string, geometry::RigidTransform> at_acquisitions = {};
 };
 
 /// Of registration.json, without the models that were refused. Fails as JsonReader.
@@ -56,8 +58,9 @@ struct BoneScene {
 };
 
 /// A point without coordinates is one of the model's plan, or a located one carried into the model. Refuses
-/// (bad_value) a point that is neither and a model that is not registered, and as `measure_in_bone`. A set
-/// whose landmarks all have coordinates needs no model; without one it has no lateral views.
+/// (bad_value) a point that is neither, a model that is not registered, and a view that a bone which moved
+/// was not registered in, and as `measure_in_bone`. A set whose landmarks all have coordinates needs no
+/// model; without one it has no lateral views.
 Expected<measures::InBone> measured_in_bone(const measures::LandmarkSet& set, const BoneScene& scene);
 
 /// A model's table of landmarks and zones.

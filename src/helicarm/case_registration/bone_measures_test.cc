@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/case_registration/bone_measures.h"
 
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -117,6 +118,44 @@ TEST(BoneMeasures, EveryInterfaceHasTheSameFiguresAndWords) {
       *posed_models_from(saved, "registration.json"), {}, {{"LAT", lateral_view()}}, *measures::zones_of({})};
   const auto sets = *measures::read_landmark_table(*tibia.the_case.models[0].measures);
   EXPECT_EQ(measures::to_json(*measured_in_bone(sets.at(0), scene)), json["models"][0]["measures"][0]);
+}
+
+/// The view as if the bone, which moved by `motion` after the first acquisition, had stayed.
+geometry::View of_bone_at_first(geometry::View view, const geometry::RigidTransform& motion) {
+  view.camera_from_world = view.camera_from_world * motion;
+  return view;
+}
+
+TEST(BoneMeasures, OfAFileABoneIsWhereItWasInEachView) {
+  // Between the acquisitions the tibia turns by 10 degrees: its axis then points away from the beam.
+  const geometry::RigidTransform motion{
+      Eigen::AngleAxisd(EIGEN_PI / 18, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {3, 0, 0}};
+  Tibia tibia(plateau + "t,tibia_ap,tibia,FS,,,\n");
+  CaseRegistration result;
+  for (const char* name : {"LAT", "LATER"}) result.loaded.views.emplace_back().name = name;
+  for (auto& view : result.loaded.views) view.view = lateral_view();
+  tibia.model.views = {lateral_view(), of_bone_at_first(lateral_view(), motion)};
+  result.models.push_back(tibia.model);
+  Json saved = to_json(result);
+  saved["models"][0]["points"] = Json::array({{{"name", "FS"}, {"xyz_mm", {0, 2, 0}}}});
+  BoneScene scene{*posed_models_from(saved, "registration.json"),
+                  {},
+                  {{"LAT", lateral_view()}, {"LATER", lateral_view()}},
+                  *measures::zones_of({})};
+  const auto set = measures::read_landmark_table(*tibia.the_case.models[0].measures)->at(0);
+  const auto found = measured_in_bone(set, scene);
+  ASSERT_TRUE(found) << found.error().message;
+  ASSERT_EQ(found->laterals.size(), 2U);
+  EXPECT_LT(found->laterals[0].lateral.off_deg, 0.1);
+  EXPECT_NEAR(found->laterals[1].lateral.off_deg, 10, 0.5);
+  EXPECT_FALSE(found->laterals[1].is_lateral);
+  // Where the bone was in another view is not known.
+  scene.views[1].name = "elsewhere";
+  EXPECT_THAT(measured_in_bone(set, scene).error().message, HasSubstr("\"elsewhere\": \"tibia\" moved"));
+  // Of a bone that did not move it is.
+  saved["models"][0]["acquisitions"] = Json::array();
+  scene.models = *posed_models_from(saved, "registration.json");
+  EXPECT_TRUE(measured_in_bone(set, scene)->laterals.at(1).is_lateral);
 }
 
 TEST(BoneMeasures, BadTablesAreRefusedBeforeTheRegistration) {

@@ -49,12 +49,14 @@ Expected<Measurement> measure_case(const pipeline::Case& the_case, const Registe
                                    const Progress& progress) {
   return guarded([&] {
     auto done = value_or_throw(pipeline::measure(the_case, options.run, progress.of_views()));
-    if (done.failure || the_case.models.empty()) return Measurement{std::move(done), {}};
+    std::vector<guidance::Poses> poses;
+    for (const pipeline::CaseView& view : the_case.views) poses.push_back(view.poses);
+    if (done.failure || the_case.models.empty()) return Measurement{std::move(done), {}, std::move(poses)};
     auto registration =
         value_or_throw(register_loaded(the_case, views_of_calibration(the_case, *done.calibration), options,
                                        progress, located_points_of(done)));
     pipeline::Result result = with_models(std::move(done), registration);
-    return Measurement{std::move(result), std::move(registration)};
+    return Measurement{std::move(result), std::move(registration), std::move(poses)};
   });
 }
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/pipeline/case.h"
@@ -15,6 +16,7 @@ namespace helicarm::case_registration {
 struct Measurement {
   pipeline::Result result;                       ///< `with_models`
   std::optional<CaseRegistration> registration;  ///< nothing: no models, or refused before
+  std::vector<guidance::Poses> poses = {};       ///< of each view, at its acquisition
 };
 
 /// Calibrates once, locates the picks and registers the models, if the case names any. A refusal is in

@@ -9,8 +9,8 @@
 namespace helicarm::case_registration {
 
 /// The located point, the planned point (also as "MODEL: NAME") or the model's centre of this name, in the
-/// calibrator's frame. Refuses bad_value where there is none that was located, with the names that there are,
-/// and name_clash where there are several.
+/// calibrator's frame, with the motions of its bone if poses follow it. Refuses bad_value where there is none
+/// that was located, with the names that there are, and name_clash where there are several.
 Expected<report::SpacingObject> object_named(const Measurement& measured, const std::string& name);
 
 }  // namespace helicarm::case_registration

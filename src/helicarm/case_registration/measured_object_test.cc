@@ -41,6 +41,26 @@ TEST(MeasuredObject, APlannedPointIsNamedWithItsModelWhereTwoHaveIt) {
   EXPECT_EQ(object_named(measured(), "tibia: entry")->at, Eigen::Vector3d(4, 5, 6));
 }
 
+TEST(MeasuredObject, OfATrackedBoneHasItsMotionUpToEachView) {
+  Measurement of = measured();
+  of.result.points[1].moves_with = "tibia";
+  of.registration->models[0].moves_with = "femur";
+  for (const double moved : {0.0, 30.0}) {
+    guidance::Poses& poses = of.poses.emplace_back();
+    poses.tracker_from_calibrator = geometry::RigidTransform{};
+    poses.tracker_from_bone["femur"] = {Eigen::Matrix3d::Identity(), {100, moved, 0}};
+  }
+  for (const char* name : {"femur", "femur: entry"}) {
+    const auto object = object_named(of, name);
+    ASSERT_TRUE(object) << object.error().message;
+    ASSERT_EQ(object->motions.size(), 2U) << name;
+    EXPECT_EQ(object->motions[0] * object->at, object->at);
+    EXPECT_EQ(object->motions[1] * object->at, object->at + Eigen::Vector3d(0, 30, 0));
+  }
+  // The tibia has no marker: it is taken as fixed.
+  EXPECT_TRUE(object_named(of, "FS")->motions.empty());
+}
+
 TEST(MeasuredObject, WhatIsNotLocatedIsRefusedWithTheNamesThereAre) {
   const auto lost = object_named(measured(), "lost");
   EXPECT_EQ(lost.error().reason, Reason::bad_value);

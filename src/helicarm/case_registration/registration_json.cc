@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <string_view>
 
@@ -137,8 +138,24 @@ std::vector<Json> measures_json(const RegisteredModel& model) {
   return list;
 }
 
+struct PoseAtView {
+  std::string view;
+  geometry::RigidTransform world_from_model;
+};
+
+/// `RegisteredModel::views` have a tracked bone where it was at the first acquisition.
+std::vector<PoseAtView> poses_at_views(const RegisteredModel& model,
+                                       const std::vector<registration::RegistrationView>& views) {
+  std::vector<PoseAtView> poses;
+  for (std::size_t i = 0; i < std::min(model.views.size(), views.size()); ++i)
+    poses.push_back(
+        {views[i].name, views[i].view.camera_from_world.inverse() * model.views[i].camera_from_world *
+                            model.registration.world_from_model});
+  return poses;
+}
+
 template <class Output>
-void describe_model(Output& output, const RegisteredModel& model, const std::vector<guidance::Bone>& bones) {
+void describe_model(Output& output, const RegisteredModel& model, const CaseRegistration& result) {
   const Registration& found = model.registration;
   output.value("name", found.name, "");
   describe_verdict(output, found.failure);
@@ -155,13 +172,21 @@ void describe_model(Output& output, const RegisteredModel& model, const std::vec
       "point p moves "
       "by `w x (p - centre) + t`. `null` where the images do not determine the pose (refused)");
   output.value("centre_mm", found.centre, "of the model, in the world");
+  output.list(
+      "acquisitions", [&] { return poses_at_views(model, result.loaded.views); },
+      "where the model was in each view: a tracked bone moves between them",
+      [](auto& row, const PoseAtView& at) {
+        row.value("view", at.view, "");
+        row.value(
+            "world_from_model", [&] { return at.world_from_model.matrix(); }, "at its acquisition, mm");
+      });
   describe_search(output, found);
   output.object("landmarks", model.landmarks.has_value(), "`null` if there are none",
                 [&](auto& row) { describe_landmarks(row, model); });
   output.list("views", found.views, "",
               [](auto& row, const registration::RegisteredView& view) { describe_view(row, view); });
   output.list("points", model.points, "of the plan",
-              [&](auto& row, const RegisteredPoint& point) { describe_point(row, point, bones); });
+              [&](auto& row, const RegisteredPoint& point) { describe_point(row, point, result.bones); });
   output.list(
       "tunnels", [&] { return tunnels_of(model); }, "as in [result.json](#resultjson)",
       [](auto& row, const CheckedTunnel& planned) {
@@ -186,7 +211,7 @@ void describe_registration(Output& output, const CaseRegistration& result) {
       "views", result.loaded.views, "their overlays are NAME_overlay.png",
       [](auto& row, const registration::RegistrationView& view) { row.value("name", view.name, ""); });
   output.list("models", result.models, "see below",
-              [&](auto& row, const RegisteredModel& model) { describe_model(row, model, result.bones); });
+              [&](auto& row, const RegisteredModel& model) { describe_model(row, model, result); });
   output.value("version", HELICARM_VERSION, "of the program");
 }
 

@@ -143,7 +143,10 @@ Expected<CaseRegistration> register_models(const OperationPlan& plan, const pipe
 
 Json recorded(const CaseRegistration& registration) {
   Json json = case_registration::to_json(registration);
-  for (Json& model : json["models"]) model.erase("seconds");
+  for (Json& model : json["models"]) {
+    model.erase("seconds");
+    model.erase("acquisitions");  // follow from other records; sessions of earlier versions lack them
+  }
   return json;
 }
 

@@ -257,7 +257,10 @@ Expected<std::map<std::size_t, xray::ObjectSpacing>> spacings_at(const pipeline:
     for (std::size_t i = 0; i < result.views.size(); ++i) {
       const pipeline::ViewResult& view = result.views[i];
       if (!view.calibrated) continue;
-      auto plane = measures::plane_through(*view.calibrated, object.at, object.covariance);
+      const geometry::RigidTransform motion =
+          i < object.motions.size() ? object.motions[i] : geometry::RigidTransform{};
+      auto plane = measures::plane_through(*view.calibrated, motion * object.at,
+                                           motion.rotation * object.covariance * motion.rotation.transpose());
       if (!plane) {
         plane.error().view = view.name;
         plane.error().message = fmt::format("{}: {}", object.name, plane.error().message);

@@ -57,11 +57,14 @@ Expected<std::vector<Export>> exports_named(const std::vector<std::string>& word
 /// An object at whose depth the Pixel Spacing of rectified images holds.
 struct SpacingObject {
   std::string name;
-  Eigen::Vector3d at;  ///< calibrator's frame, mm
+  Eigen::Vector3d at;  ///< calibrator's frame at the first acquisition, mm
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  /// Of its tracked bone in the calibrator's frame, from the first acquisition to each view's; empty: none.
+  std::vector<geometry::RigidTransform> motions = {};
 };
 
-/// Pixel Spacing at the object's depth in each calibrated view, by the view's index; refuses `behind_source`,
+/// Pixel Spacing at the object's depth in each calibrated view at its acquisition, by the view's index;
+/// refuses `behind_source`,
 /// naming the view.
 Expected<std::map<std::size_t, xray::ObjectSpacing>> spacings_at(const pipeline::Result& result,
                                                                  const SpacingObject& object);

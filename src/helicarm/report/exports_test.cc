@@ -111,6 +111,17 @@ TEST_F(Exports, PixelSpacingMeasuresLengthsAtTheObjectsDepth) {
   }
 }
 
+TEST_F(Exports, AMovedObjectHasTheSpacingOfItsDepthInEachView) {
+  const SpacingObject at_rest{"FS", {20, -10, 30}};
+  const geometry::View& second = result_.views[1].calibrated->view;
+  SpacingObject moved = at_rest;
+  moved.motions.resize(2);
+  moved.motions[1].translation = second.camera_from_world.rotation.transpose() * Eigen::Vector3d(0, 0, 40);
+  const auto before = *spacings_at(result_, at_rest), after = *spacings_at(result_, moved);
+  EXPECT_EQ(after.at(0).source_object_mm, before.at(0).source_object_mm);
+  EXPECT_NEAR(after.at(1).source_object_mm, before.at(1).source_object_mm + 40, 1e-9);
+}
+
 TEST_F(Exports, RectifiedImagesStateTheSpacingOfAnObject) {
   for (pipeline::ViewResult& view : result_.views) {
     view.rectification.emplace();
