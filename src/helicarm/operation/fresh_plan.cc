@@ -5,6 +5,18 @@
 #include "helicarm/xray/digest.h"
 
 namespace helicarm::operation {
+namespace {
+
+/// Where the order's waypoints lie in the bone: with the tool in or before the tunnel its motion counts here.
+std::vector<Eigen::Vector3d> waypoints_in_bone(const robot::RobotOrder& order, const PlanBasis& basis) {
+  std::vector<Eigen::Vector3d> points;
+  for (const robot::Waypoint& waypoint : order.waypoints)
+    points.push_back(basis.tracker_from_bone.inverse() *
+                     (basis.tracker_from_base * waypoint.base_from_tcp.translation));
+  return points;
+}
+
+}  // namespace
 
 /// Before registration the tool's expected pose is unknown.
 robot::Watch Operation::sees_tool() const {
@@ -28,13 +40,12 @@ PlanBasis Operation::basis_of(const OperationTunnel& tunnel, const PoseWindow& w
   const auto see = [&](const std::string& marker) {
     return value_or_throw(see_tool(window, plan_.tracker, marker)).tracker_from_marker;
   };
-  const TunnelInBone ends = value_or_throw(tunnel_in_bone(*result_, tunnel));
   const std::string& bone = plan_.tracker.marker_of(tunnel.bone);
   const geometry::RigidTransform from_tcp = marker_from_tcp(*hand_eye_, plan_.robot.tool);
   return {window.middle_s,
           bone,
           see(bone),
-          {ends.enter, ends.leave},
+          {},
           from_tcp,
           base_by_tool(see(plan_.tracker.tool), from_tcp, present.base_from_tcp),
           present.base_from_tcp};
@@ -63,10 +74,13 @@ Expected<void> Operation::withdraw(const robot::RobotOrder& order, const robot::
   return guarded([&] {
     notify_(Step::navigate, order.name + ": withdraw");
     const OperationTunnel& tunnel = tunnel_named(order.name);
-    if (!result_ || !hand_eye_) throw BadInput(Reason::usage, "no measurement or no registration yet");
+    // Not the measurement: the tool must leave a bone of which further images were taken.
+    if (!hand_eye_) throw BadInput(Reason::usage, "no registration of the robot yet");
     const PoseWindow window = look(record::Look::withdraw);
     const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
-    const PlanWatch watch(plan_.limits, plan_.tracker, basis_of(tunnel, window, present));
+    PlanBasis basis = basis_of(tunnel, window, present);
+    basis.points_in_bone = waypoints_in_bone(order, basis);
+    const PlanWatch watch(plan_.limits, plan_.tracker, std::move(basis));
     const Withdrawal from{present.base_from_tcp, rest.base_from_tcp};
     record(record::Withdraw{xray::digest(to_text(robot::to_json(order))), from});
     const robot::RobotOrder back = withdraw_order(order, from, present.joints, plan_.robot.approach.limits);

@@ -241,7 +241,9 @@ Expected<robot::RobotOrder> Operation::plan_order(const std::string& name) {
     const guidance::Poses now = value_or_throw(poses_now(window, plan_.tracker));
     if (tunnel.of_model) value_or_throw(check_error_at_tip(plan_, tunnel, *result_, now, tool()));
     const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
-    const PlanBasis basis = basis_of(tunnel, window, present);
+    PlanBasis basis = basis_of(tunnel, window, present);
+    const TunnelInBone ends = value_or_throw(tunnel_in_bone(*result_, tunnel));
+    basis.points_in_bone = {ends.enter, ends.leave};
     value_or_throw(refuse_moved_base(*hand_eye_, basis, present, plan_.limits));
     robot::RobotOrder order =
         value_or_throw(tunnel_order(plan_, tunnel, *result_, *hand_eye_, now, present.joints));
@@ -290,6 +292,7 @@ Expected<PathPreview> Operation::preview(const robot::RobotOrder& order) const {
   return guarded([&] {
     PathPreview preview;
     const OperationTunnel& tunnel = tunnel_named(order.name);
+    if (!result_) throw BadInput(Reason::usage, "no measurement yet");
     const geometry::RigidTransform bone_from_base =
         value_or_throw(gate_.planned(order.name)).bone_from_target *
         order.waypoints.back().base_from_tcp.inverse();

@@ -155,7 +155,8 @@ class Operation {
   Expected<void> plan_again(const std::string& order, const Failure& why, const Again& again);
 
   /// Retreats along the tool's axis to the stand-off distance, then moves to the tool's initial pose
-  /// (`rest`). Planned at the present poses, so also after a stop, once a person has unlocked the robot.
+  /// (`rest`). Planned at the present poses, so also after a stop, once a person has unlocked the robot, and
+  /// after further images, which end a registration: the way out of the bone stays open.
   Expected<void> withdraw(const robot::RobotOrder& order, const robot::RobotState& rest,
                           const Confirm& confirm);
 
@@ -228,6 +229,7 @@ class Operation {
   bool answers_again() const;
 
   OperationPlan plan_;
+  /// Without `points_in_bone`.
   std::filesystem::path folder_;
   const tracker::PoseBoard& board_;
   robot::RobotLink* robot_;  ///< null for a hand-held drill

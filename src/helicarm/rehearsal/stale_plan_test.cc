@@ -6,6 +6,7 @@
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/operation/replay.h"
+#include "helicarm/rehearsal/ct_plan.h"
 #include "helicarm/rehearsal/rehearse.h"
 #include "helicarm/virtual_devices/any_ports_test.h"
 
@@ -29,7 +30,7 @@ class StalePlan : public testing::Test {
  protected:
   void SetUp() override {
     virtual_or_ = VirtualDevices::open(virtual_devices::on_any_ports(60)).value();
-    plan_ = plan_for(*virtual_or_, virtual_or_->tracker().port());
+    plan_ = planned(plan_for(*virtual_or_, virtual_or_->tracker().port()));
     plan_.check_points = check_points();
     devices_ = std::make_unique<operation::Connections>(
         plan_, receiver::Inbox::open(folder_.path() / "inbox").value());
@@ -48,6 +49,7 @@ class StalePlan : public testing::Test {
   }
   void TearDown() override { operation_.reset(); }
   virtual std::vector<operation::PlannedCheck> check_points() const { return {}; }
+  virtual operation::OperationPlan planned(operation::OperationPlan plan) const { return plan; }
 
   robot::RobotLink& robot() { return devices_->robot(); }
 
@@ -312,6 +314,50 @@ TEST_F(StalePlan, CreepingBoneStopsTheToolWhichIsThenWithdrawn) {
     return;
   }
   FAIL() << "the machine is too busy for this test";
+}
+
+/// The tunnels are of a CT's plan.
+class StaleRegistration : public StalePlan {
+ protected:
+  operation::OperationPlan planned(operation::OperationPlan plan) const override {
+    return with_ct_plan(std::move(plan), virtual_or_->simulated_scene().simulated_case(), folder_.path());
+  }
+};
+
+TEST_F(StaleRegistration, TheToolLeavesTheBoneAndDoesNotReturnToIt) {
+  const auto registered = operation_->register_models();
+  ASSERT_TRUE(registered) << registered.error().message;
+  ASSERT_TRUE(operation_->confirm_registration());
+  const robot::RobotState rest = robot().wait_connected(5s).value();
+  std::optional<robot::RobotOrder> order;
+  try_to([&]() -> Expected<void> {
+    order = plan();
+    return operation_->go(*order, robot().confirm(*order)).map([](const auto&) {});
+  });
+  const auto distance_mm = [&] {
+    const auto state = robot().wait_connected(20s);
+    return (state.value().base_from_tcp.translation - rest.base_from_tcp.translation).norm();
+  };
+  EXPECT_GT(distance_mm(), 20);
+  // With the tool in the bone an image is taken again: the registration is of other images now.
+  expose("AP");
+  unlock();
+  EXPECT_EQ(operation_->go(*order, robot().confirm(*order)).error().reason, Reason::registration_stale);
+  EXPECT_EQ(operation_->plan_order("femur").error().reason, Reason::usage);  // nothing is measured
+  EXPECT_EQ(operation_->preview(*order).error().reason, Reason::usage);
+  try_to([&] { return operation_->withdraw(*order, rest, nod_); });
+  EXPECT_LT(distance_mm(), 0.5);
+  // Out of the bone, and measured again without the models.
+  ASSERT_TRUE(operation_->measure());
+  EXPECT_EQ(operation_->plan_order("femur").error().reason, Reason::registration_stale);
+  unlock();
+  EXPECT_EQ(operation_->go(*order, robot().confirm(*order)).error().reason, Reason::registration_stale);
+  EXPECT_LT(distance_mm(), 0.5);
+  ASSERT_TRUE(operation_->finish());
+  operation_.reset();
+  const auto replayed = operation::replay(folder_.path() / "session");
+  ASSERT_TRUE(replayed) << replayed.error().message;
+  EXPECT_THAT(replayed->differences, testing::IsEmpty());
 }
 
 class StalePlanToACheckedBone : public StalePlan {
