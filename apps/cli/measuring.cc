@@ -63,9 +63,9 @@ void add_run_options(CLI::App* command, RunArguments& arguments, const char* mac
       ->excludes(cache);
 }
 
-void add_dicom_option(CLI::App* command, RunArguments& arguments) {
+void add_dicom_option(CLI::App* command, bool& dicom) {
   command->add_flag(
-      "--dicom", arguments.dicom,
+      "--dicom", dicom,
       "Also write measurements.dcm, a DICOM measurement report (SR, TID 1500) with the patient and study of "
       "the X-ray images, and for each model MODEL_registration.dcm, a DICOM Spatial Registration with those "
       "of its CT (a folder of a DICOM series)");

@@ -26,7 +26,7 @@ struct RunArguments {
 void add_run_options(CLI::App* command, RunArguments& arguments, const char* machine_help);
 
 /// --dicom.
-void add_dicom_option(CLI::App* command, RunArguments& arguments);
+void add_dicom_option(CLI::App* command, bool& dicom);
 
 /// Writes the DICOM files of a measurement of the case into `out`, those of its models into `registrations`,
 /// and says what is left out.

@@ -37,7 +37,8 @@ struct NavigateArguments {
   Overrides<operation::OperationPlan> overrides;  ///< of the plan
   std::optional<std::filesystem::path> history;   ///< the C-arm's, read only
   receiver::ReceiverOptions receiver;
-  bool yes = false;  ///< confirm every order automatically: for rehearsals
+  bool dicom = false;  ///< also a DICOM measurement report and registrations
+  bool yes = false;    ///< confirm every order automatically: for rehearsals
 };
 
 namespace {
@@ -312,6 +313,12 @@ void put_options(const NavigateArguments& arguments, operation::OperationPlan& p
     plan.measuring.run.history = value_or_throw(calibration::read_history(*arguments.history));
 }
 
+/// What was measured, and the tunnels that were reached.
+void write_dicom_of(const operation::Operation& operation, const fs::path& folder, Console& console) {
+  write_dicom_files(*operation.measured_case(), value_or_throw(operation.measurement()), folder,
+                    folder / "registration", console);
+}
+
 }  // namespace
 
 /// A whole operation from a plan: images, measurement, robot or hand-held drill, verification.
@@ -329,8 +336,12 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     const auto operation = begin(plan, arguments.out, devices, console);
     const auto done = guarded([&] { carry_out(plan, arguments, *operation, devices, stop, console); });
     const auto recorded = operation->finish(done ? std::nullopt : std::optional(done.error()));
+    Expected<void> written;
+    if (arguments.dicom && operation->measured_case())
+      written = guarded([&] { write_dicom_of(*operation, arguments.out, console); });
     value_or_throw(done);
     value_or_throw(recorded);
+    value_or_throw(written);
   });
 }
 
@@ -352,6 +363,7 @@ void add_navigate(CLI::App& app, Action& action) {
       ->capture_default_str();
   add_overrides(command, a.overrides, "the plan", operation::plan_fields);
   command->add_option("--machine", a.history, "The C-arm's history (JSON), read only");
+  add_dicom_option(command, a.dicom);
   add_fields(command, a.receiver, receiver::receiver_fields);
   command->add_option("--title", a.receiver.negotiation.title, "Application entity title of this receiver")
       ->capture_default_str();

@@ -243,7 +243,7 @@ void add_register(CLI::App& app, Action& action) {
       "Follow the models through the frames A-B[:STEP] of files with several frames, or of "
       "numbered files (\"image\": \"ap_{frame:03d}.tif\"); writes registration.csv, bodies.csv, "
       "smoothed.csv, relative.csv, sequence.json and report.html");
-  add_dicom_option(command, a.run);
+  add_dicom_option(command, a.run.dicom);
   command->add_flag("--resume", a.resume, "Go on after the frames that an interrupted run left in --out");
 }
 

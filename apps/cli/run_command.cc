@@ -84,7 +84,7 @@ void add_run(CLI::App& app, Action& action) {
   add_run_options(command, a,
                   "The C-arm's history (JSON): used as prior; this case's acquisitions are added");
   add_fields(command, a.options.search, case_registration::search_fields);
-  add_dicom_option(command, a);
+  add_dicom_option(command, a.dicom);
   command->add_flag("--no-report", a.no_report, "Write result.json only");
 }
 

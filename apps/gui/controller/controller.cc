@@ -11,9 +11,11 @@
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/replay/pdf_report.h"
+#include "helicarm/case_registration/dicom_measurements.h"
 #include "helicarm/case_registration/measure_case.h"
 #include "helicarm/case_registration/register_fields.h"
 #include "helicarm/core/files.h"
+#include "helicarm/report/earlier_results.h"
 #include "helicarm/report/exports.h"
 #include "helicarm/report/report.h"
 
@@ -32,6 +34,18 @@ void forget_measurement(ApplicationState& state) {
   state.refusals.clear();
   state.measured_picks.clear();
   state.has_arrived = false;
+}
+
+/// Writes the DICOM report and registrations if images and volumes are of DICOM; returns what went wrong.
+QString dicom_written(const Equipment& equipment, const case_registration::Measurement& measured,
+                      const fs::path& folder) {
+  fs::remove(folder / report::dicom_measurements_name);
+  const std::optional<pipeline::Case>& the_case =
+      equipment.operation ? equipment.operation->measured_case() : equipment.the_case;
+  if (measured.result.failure || !the_case) return {};
+  const auto written =
+      case_registration::write_available_dicom(*the_case, measured, folder, folder / "registration");
+  return written ? QString() : Controller::tr("the DICOM report: %1").arg(sentence_of(written.error()));
 }
 
 }  // namespace
@@ -231,14 +245,16 @@ void Controller::export_to(const fs::path& folder) {
   std::optional<case_registration::CaseRegistration> registration;
   if (state_.registration) registration = present_registration(state_);
   begin(Phase::verify, "writing the report",
-        [this, result = std::move(result), registration = std::move(registration), folder,
-         record = std::move(record)]() -> Change {
+        [this, equipment = equipment_, result = std::move(result), registration = std::move(registration),
+         folder, record = std::move(record)]() mutable -> Change {
           const pipeline::Result whole =
               registration ? case_registration::with_models(result, *registration) : result;
           report::forget_exports(folder);
           value_or_throw(write_pdf_report(whole, folder / "report.pdf"));
           if (!whole.failure) value_or_throw(report::write_exports(whole, folder));
           value_or_throw(case_registration::write_models(registration, folder));
+          if (const QString lack = dicom_written(*equipment, {whole, registration}, folder); !lack.isEmpty())
+            record.lacks << lack;
           value_or_throw(report::write_result(whole, folder));
           return [this, record](ApplicationState& state) {
             state.exported = record;

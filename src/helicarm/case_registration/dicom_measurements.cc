@@ -268,9 +268,9 @@ Expected<std::optional<std::string>> write_dicom_measurements(const pipeline::Ca
   });
 }
 
-Expected<DicomResults> write_dicom_results(const pipeline::Case& the_case, const Measurement& measured,
-                                           const std::filesystem::path& folder,
-                                           const std::filesystem::path& registrations) {
+Expected<DicomResults> write_available_dicom(const pipeline::Case& the_case, const Measurement& measured,
+                                             const std::filesystem::path& folder,
+                                             const std::filesystem::path& registrations) {
   return guarded([&] {
     DicomResults results;
     if (!measured.result.failure) {
@@ -287,10 +287,19 @@ Expected<DicomResults> write_dicom_results(const pipeline::Case& the_case, const
       else
         results.left_out.emplace_back(no_series);
     }
-    if (results.files.empty() && !results.left_out.empty())
-      throw BadInput(Reason::bad_value, fmt::format("--dicom: {}", fmt::join(results.left_out, "; ")));
     return results;
   });
+}
+
+Expected<DicomResults> write_dicom_results(const pipeline::Case& the_case, const Measurement& measured,
+                                           const std::filesystem::path& folder,
+                                           const std::filesystem::path& registrations) {
+  return write_available_dicom(the_case, measured, folder, registrations)
+      .and_then([](DicomResults results) -> Expected<DicomResults> {
+        if (results.files.empty() && !results.left_out.empty())
+          return fail(Reason::bad_value, fmt::format("--dicom: {}", fmt::join(results.left_out, "; ")));
+        return results;
+      });
 }
 
 }  // namespace helicarm::case_registration

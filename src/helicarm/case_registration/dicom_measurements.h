@@ -29,8 +29,13 @@ struct DicomResults {
 };
 
 /// Writes measurements.dcm (`write_dicom_measurements`, unless the measurement was refused) into `folder`,
-/// and `write_dicom_registrations` into `registrations`. Refuses as these, and bad_value where all is
-/// left out.
+/// and `write_dicom_registrations` into `registrations`, as far as the case has what they need. Refuses as
+/// these.
+Expected<DicomResults> write_available_dicom(const pipeline::Case& the_case, const Measurement& measured,
+                                             const std::filesystem::path& folder,
+                                             const std::filesystem::path& registrations);
+
+/// The same for who asked for it: bad_value where all is left out.
 Expected<DicomResults> write_dicom_results(const pipeline::Case& the_case, const Measurement& measured,
                                            const std::filesystem::path& folder,
                                            const std::filesystem::path& registrations);

@@ -162,6 +162,7 @@ void Operation::forget_measurement() {
   measured_case_.reset();
   result_.reset();
   by_images_.reset();
+  verifications_.clear();
 }
 
 Expected<void> Operation::measure() {
@@ -170,6 +171,7 @@ Expected<void> Operation::measure() {
       throw BadInput(Reason::usage, fmt::format("{}: no image received; acquire this view", missing.front()));
     notify_(Step::measure, fmt::format("{} views", views_.size()));
     forget_registration();
+    verifications_.clear();
     result_ = run({}, {});
   });
 }
@@ -290,9 +292,9 @@ Expected<LiveTool> Operation::live_tool() const {
 
 Expected<PathPreview> Operation::preview(const robot::RobotOrder& order) const {
   return guarded([&] {
+    if (!result_) throw BadInput(Reason::usage, "no measurement yet");
     PathPreview preview;
     const OperationTunnel& tunnel = tunnel_named(order.name);
-    if (!result_) throw BadInput(Reason::usage, "no measurement yet");
     const geometry::RigidTransform bone_from_base =
         value_or_throw(gate_.planned(order.name)).bone_from_target *
         order.waypoints.back().base_from_tcp.inverse();
@@ -354,7 +356,16 @@ TunnelOutcome Operation::check(const OperationTunnel& tunnel) {
   const pipeline::Result checked = run(now, {line});
   TunnelOutcome outcome = value_or_throw(outcome_of(tunnel, checked, tracked));
   record(record::Outcome{outcome.tunnel, outcome.start, outcome.end});
+  if (outcome.verification) verifications_.insert_or_assign(tunnel.name, *outcome.verification);
   return outcome;
+}
+
+Expected<case_registration::Measurement> Operation::measurement() const {
+  if (!result_) return fail(Reason::usage, "no measurement of the present images");
+  case_registration::Measurement measured{*result_, registration_, exposures()};
+  for (const auto& [tunnel, verification] : verifications_)
+    measured.result.verifications.push_back(verification);
+  return measured;
 }
 
 }  // namespace helicarm::operation

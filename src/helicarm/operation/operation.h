@@ -98,8 +98,13 @@ class Operation {
   /// no longer the one that was received. The calibration is kept until the next image.
   Expected<void> measure();
   const pipeline::Result& result() const { return *result_; }
+  /// Of `result`; nothing without a measurement of the present images.
+  const std::optional<pipeline::Case>& measured_case() const { return measured_case_; }
   /// The last measurement, also a refused one.
   const std::optional<pipeline::Result>& newest_result() const { return newest_result_; }
+  /// The result with the comparisons of the tool with the tunnels reached so far (Eq. 17), and the
+  /// registration: as of a case, for a report. Refuses (usage) without a measurement of the present images.
+  Expected<case_registration::Measurement> measurement() const;
   /// Number of calibrations.
   int calibrations() const { return calibrations_; }
   /// Poses at each view's acquisition, in the plan's order.
@@ -224,12 +229,12 @@ class Operation {
   // fresh_plan.cc, plan_again.cc
   robot::Watch sees_tool() const;
   robot::Watch in_place(PlanWatch watch) const;
+  /// Without `points_in_bone`.
   PlanBasis basis_of(const OperationTunnel& tunnel, const PoseWindow& window,
                      const robot::RobotState& present) const;
   bool answers_again() const;
 
   OperationPlan plan_;
-  /// Without `points_in_bone`.
   std::filesystem::path folder_;
   const tracker::PoseBoard& board_;
   robot::RobotLink* robot_;  ///< null for a hand-held drill
@@ -253,7 +258,8 @@ class Operation {
   std::optional<pipeline::Result> result_, newest_result_;
   std::optional<tracker::HandEye> hand_eye_;
   GuidanceGate gate_;
-  std::map<std::string, int> replans_;  ///< by order
+  std::map<std::string, int> replans_;                                ///< by order
+  std::map<std::string, guidance::Verification> verifications_ = {};  ///< by tunnel, of the present images
 };
 
 }  // namespace helicarm::operation
