@@ -38,17 +38,18 @@ std::vector<RegistrationView> following(std::vector<RegistrationView> views, con
 
 /// What no image shows of a body whose poses at the acquisitions are not known.
 Warning motion_note(const pipeline::CaseModel& case_model, double motion_sigma_mm) {
-  return {
-      case_model.moves_with ? Reason::bone_taken_as_fixed : Reason::unobservable_motion,
-      fmt::format("{}: motion between the acquisitions within the plane of the central rays is taken for a "
-                  "position; {}",
-                  case_model.name,
-                  motion_sigma_mm > 0 ? fmt::format("{:g} mm per axis is in the covariance", motion_sigma_mm)
-                  : case_model.moves_with
-                      ? "poses of the bone at every acquisition are missing"
-                      : "put a marker on the bone, give its poses and \"moves_with\", or --motion-sigma"),
-      {},
-      {{"motion_sigma_mm", motion_sigma_mm}}};
+  return {case_model.moves_with ? Reason::bone_taken_as_fixed : Reason::unobservable_motion,
+          fmt::format(
+              "{}: motion between the acquisitions within the plane of the central rays is taken for a "
+              "position; {}",
+              case_model.name,
+              motion_sigma_mm > 0 ? fmt::format("{:g} mm per axis is in the covariance", motion_sigma_mm)
+              : case_model.moves_with
+                  ? "poses of the bone at every acquisition are missing"
+                  : "put a marker on the bone, give its poses and \"moves_with\", or --motion-sigma; views "
+                    "that were exposed at the same moment need none"),
+          {},
+          {{"motion_sigma_mm", motion_sigma_mm}}};
 }
 
 /// What the model's files say in two ways, or hold beyond what they state; an orientation that they do not

@@ -23,8 +23,10 @@ Expected<calibration::LearnedIntrinsics> prior_from_history(const LabelledViews&
   const geometry::IntrinsicsPrior nominal = fiducials_of(views.front()).prior;
   for (const LabelledView& view : views)
     if (!fiducials_of(view).prior.focal_px)
-      return fail(Reason::bad_value,
-                  "a C-arm history (--machine) requires images with pixel size and source distance");
+      return fail(
+          Reason::bad_value,
+          "a C-arm history (--machine) requires images with pixel size and source distance: where the "
+          "files lack them, state \"pixel_mm\" and \"source_detector_mm\" of the views in case.json");
   std::vector<calibration::HistoryEntry> earlier;
   std::ranges::copy_if(history.entries, std::back_inserter(earlier),
                        [&](const calibration::HistoryEntry& entry) {

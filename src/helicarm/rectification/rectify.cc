@@ -128,11 +128,14 @@ Failure without_lattice(const xray::XrayImage& xray_image, detection::ImageDots&
   plate.lattice = square ? phantom::Lattice::hexagonal : phantom::Lattice::square;
   const std::size_t of_other_kind = find_lattice(xray_image, dots, plate, method, scale).size();
   if (of_other_kind >= least_plate_dots)
-    return {Reason::plate_mismatch,
-            fmt::format("{} dots form a {} lattice, that of \"{}\" is {}", of_other_kind,
-                        square ? "hexagonal" : "square", plate.name, square ? "square" : "hexagonal"),
-            {},
-            {{"dots_found", double(of_other_kind)}}};
+    return {
+        Reason::plate_mismatch,
+        fmt::format("{} dots form a {} lattice, that of \"{}\" is {}: name the plate that was used, such as "
+                    "a plate.json with \"lattice\": \"{}\"",
+                    of_other_kind, square ? "hexagonal" : "square", plate.name,
+                    square ? "square" : "hexagonal", square ? "hexagonal" : "square"),
+        {},
+        {{"dots_found", double(of_other_kind)}}};
   return {Reason::plate_not_found,
           fmt::format("only {} dots form a lattice like that of \"{}\", at least {} are needed", found,
                       plate.name, least_plate_dots),
