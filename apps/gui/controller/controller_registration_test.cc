@@ -96,6 +96,9 @@ TEST_F(ControllerRegistration, ExportsTheTunnelsOfTheModels) {
   tunnel["model"] = "bone";
   EXPECT_EQ(nlohmann::json(result["tunnels"][0]), nlohmann::json(tunnel));  // keys in any order
   EXPECT_TRUE(fs::exists(out.path() / "registration" / "report.html"));
+  // The images are DICOM files, the volume is none: a report without a registration, and nothing lacks.
+  EXPECT_TRUE(fs::exists(out.path() / "measurements.dcm"));
+  EXPECT_EQ(state().exported->lacks.filter("DICOM").size(), 0);
 }
 
 TEST_F(ControllerRegistration, AsksForNoPicksWhereModelsBringTheTunnels) {

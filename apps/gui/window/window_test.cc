@@ -57,7 +57,7 @@ class WholeOperation : public Window {
   void expect_export_and_replay() {
     window_->controller().export_to(folder_ / "export");
     ASSERT_TRUE(wait_idle());
-    for (const char* file : {"report.html", "report.pdf", "result.json"})
+    for (const char* file : {"report.html", "report.pdf", "result.json", "measurements.dcm"})
       EXPECT_TRUE(fs::exists(folder_ / "export" / file)) << file;
 
     window_->open_paths({state().folder});

@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include "helicarm/case_registration/dicom_measurements.h"
+#include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/operation/replay.h"
@@ -256,6 +258,15 @@ TEST_F(StalePlan, TwoTunnelsAreCarriedOutOnOneCalibration) {
     EXPECT_TRUE(done) << tunnel.name;
   }
   EXPECT_EQ(operation_->calibrations(), 1);
+  // What is reported of it.
+  const auto measured = operation_->measurement();
+  ASSERT_TRUE(measured) << measured.error().message;
+  EXPECT_EQ(measured->result.verifications.size(), plan_.tunnels.size());
+  const auto written = case_registration::write_dicom_results(*operation_->measured_case(), *measured,
+                                                              folder_.path(), folder_.path());
+  ASSERT_TRUE(written) << written.error().message;
+  const std::string report = read_file(written->files.at(0), 1 << 22).value();
+  for (const char* words : {"tool_line", "off_end", "femur"}) EXPECT_THAT(report, testing::HasSubstr(words));
 }
 
 TEST_F(StalePlan, OrderToABoneAtRestIsCarriedOutWithinTheLimits) {
