@@ -134,6 +134,7 @@ TEST(BoneMeasures, OfAFileABoneIsWhereItWasInEachView) {
   CaseRegistration result;
   for (const char* name : {"LAT", "LATER"}) result.loaded.views.emplace_back().name = name;
   for (auto& view : result.loaded.views) view.view = lateral_view();
+  tibia.model.moves_with = "tibia";
   tibia.model.views = {lateral_view(), of_bone_at_first(lateral_view(), motion)};
   result.models.push_back(tibia.model);
   Json saved = to_json(result);

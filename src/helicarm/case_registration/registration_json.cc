@@ -147,10 +147,12 @@ struct PoseAtView {
 std::vector<PoseAtView> poses_at_views(const RegisteredModel& model,
                                        const std::vector<registration::RegistrationView>& views) {
   std::vector<PoseAtView> poses;
-  for (std::size_t i = 0; i < std::min(model.views.size(), views.size()); ++i)
-    poses.push_back(
-        {views[i].name, views[i].view.camera_from_world.inverse() * model.views[i].camera_from_world *
-                            model.registration.world_from_model});
+  for (std::size_t i = 0; i < std::min(model.views.size(), views.size()); ++i) {
+    geometry::RigidTransform motion;
+    if (model.moves_with)
+      motion = views[i].view.camera_from_world.inverse() * model.views[i].camera_from_world;
+    poses.push_back({views[i].name, motion * model.registration.world_from_model});
+  }
   return poses;
 }
 
