@@ -8,6 +8,7 @@ import atexit
 import functools
 import importlib
 import importlib.util
+import io
 import json
 import os
 import pathlib
@@ -229,9 +230,9 @@ def pydicom_writes_segmentations(folder, count=COUNT):
     return count, far, off
 
 
-def pydicom_writes_label_maps(folder, count=60):
+def pydicom_writes_label_maps(folder, count=70):
     """(files, largest distance in mm, voxels that differ): LABELMAP segmentations of 8 and 16 bits by pydicom; uncompressed,
-    deflated, in RLE, and compressed by DCMTK's programs: lossless JPEG and JPEG-LS."""
+    deflated, in RLE, compressed by DCMTK's programs (lossless JPEG, JPEG-LS) and by Pillow (JPEG 2000)."""
     pydicom = importlib.import_module("pydicom")
     random, far, off = np.random.default_rng(8), 0.0, 0
     digits, Dataset, Sequence, uid = pydicom.valuerep.format_number_as_ds, pydicom.Dataset, pydicom.Sequence, pydicom.uid
@@ -242,17 +243,24 @@ def pydicom_writes_label_maps(folder, count=60):
             setattr(made, name, value)
         return made
 
+    pillow = importlib.util.find_spec("PIL")
+
+    def jpeg_2000(frame):
+        stream = io.BytesIO()
+        importlib.import_module("PIL.Image").fromarray(frame).save(stream, format="JPEG2000", no_jp2=True)
+        return stream.getvalue()
+
     for n in range(count):
         datasets, shape, place, _ = ct_datasets(pydicom, random, 4 * n)  # of a gantry that is not tilted
-        bits = (8, 16)[n // 6 % 2]
+        bits = (8, 16)[n // 7 % 2]
         numbers = np.unique(random.integers(1, 2**bits, 4))
         labels = np.append(numbers, 0)[random.integers(0, len(numbers) + 1, shape)]
         dataset = datasets[0]
         meta = dataset.file_meta
         meta.MediaStorageSOPClassUID = dataset.SOPClassUID = "1.2.840.10008.5.1.4.1.1.66.7"
-        meta.TransferSyntaxUID = (uid.ExplicitVRLittleEndian, uid.ImplicitVRLittleEndian, uid.DeflatedExplicitVRLittleEndian,
-                                  uid.ExplicitVRLittleEndian, uid.ExplicitVRLittleEndian, uid.ExplicitVRLittleEndian)[n % 6]
-        dataset.is_little_endian, dataset.is_implicit_VR = True, n % 6 == 1
+        meta.TransferSyntaxUID = {1: uid.ImplicitVRLittleEndian, 2: uid.DeflatedExplicitVRLittleEndian,
+                                  6: uid.JPEG2000Lossless if pillow else uid.ExplicitVRLittleEndian}.get(n % 7, uid.ExplicitVRLittleEndian)
+        dataset.is_little_endian, dataset.is_implicit_VR = True, n % 7 == 1
         axes, spacing = dataset.ImageOrientationPatient, dataset.PixelSpacing
         for name in ("ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "RescaleSlope", "RescaleIntercept",
                      "RescaleType", "PixelData"):
@@ -271,13 +279,16 @@ def pydicom_writes_label_maps(folder, count=60):
         frames = np.stack([labels[:, :, z].T for z in order]).astype("<u2" if bits == 16 else "u1")
         dataset.PixelData = frames.tobytes() + bytes(frames.nbytes % 2)
         dataset["PixelData"].VR = "OW" if bits == 16 else "OB"
-        if n % 6 == 3:
+        if n % 7 == 3:
             dataset.compress(uid.RLELossless)
+        if n % 7 == 6 and pillow:
+            dataset.PixelData = pydicom.encaps.encapsulate([jpeg_2000(frame) for frame in frames])
+            dataset["PixelData"].is_undefined_length = True
         path = folder / f"l{n}.dcm"
         dataset.save_as(path, write_like_original=False)
-        if n % 6 > 3 and shutil.which("dcmcjpeg") and shutil.which("dcmcjpls"):
+        if n % 7 in (4, 5) and shutil.which("dcmcjpeg") and shutil.which("dcmcjpls"):
             plain, path = path, folder / f"c{n}.dcm"
-            subprocess.run((["dcmcjpeg"], ["dcmcjpls"])[n % 6 - 4] + [str(plain), str(path)], check=True, capture_output=True)
+            subprocess.run((["dcmcjpeg"], ["dcmcjpls"])[n % 7 - 4] + [str(plain), str(path)], check=True, capture_output=True)
             assert pydicom.dcmread(path).file_meta.TransferSyntaxUID != meta.TransferSyntaxUID
         volume = helicarm.read_volume(path)
         flipped = volume.affine[:3, 2] @ place[:3, 2] < 0
