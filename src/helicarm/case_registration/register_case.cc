@@ -59,6 +59,9 @@ void add_warnings_of_files(const registration::Model& model, registration::Regis
     const bool note = warning.reason == Reason::spacing_missing;
     (note ? registration.notes : registration.warnings).push_back(warning);
     if (!note) registration.decision = std::max(registration.decision, registration::Decision::warn);
+    if (registration.failure && registration.failure->reason == Reason::wrong_model &&
+        warning.reason == Reason::not_hounsfield)
+      registration.failure->message += "; its values are hardly Hounsfield units: correct them first";
   }
 }
 

@@ -209,9 +209,13 @@ void describe_registration(Output& output, const CaseRegistration& result) {
   output.value("format", "helicarm-registration/1", "");
   describe_verdict(output, result.failure, result.refused());
   describe_failures(output, "warnings", result.warnings, "of the views");
-  output.list(
-      "views", result.loaded.views, "their overlays are NAME_overlay.png",
-      [](auto& row, const registration::RegistrationView& view) { row.value("name", view.name, ""); });
+  output.list("views", result.loaded.views, "their overlays are NAME_overlay.png",
+              [](auto& row, const registration::RegistrationView& view) {
+                row.value("name", view.name, "");
+                row.value(
+                    "camera_from_world", [&] { return view.view.camera_from_world.matrix(); },
+                    "pose of its camera, mm");
+              });
   output.list("models", result.models, "see below",
               [&](auto& row, const RegisteredModel& model) { describe_model(row, model, result); });
   output.value("version", HELICARM_VERSION, "of the program");

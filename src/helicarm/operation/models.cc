@@ -143,6 +143,7 @@ Expected<CaseRegistration> register_models(const OperationPlan& plan, const pipe
 
 Json recorded(const CaseRegistration& registration) {
   Json json = case_registration::to_json(registration);
+  for (Json& view : json["views"]) view.erase("camera_from_world");
   for (Json& model : json["models"]) {
     model.erase("seconds");
     model.erase("acquisitions");  // follow from other records; sessions of earlier versions lack them
