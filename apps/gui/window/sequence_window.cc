@@ -17,6 +17,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/track/track.h"
+#include "helicarm/track/view_map.h"
 #include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::gui {
@@ -151,7 +152,10 @@ void SequenceWindow::pick(std::size_t view, const Eigen::Vector2d& raw) {
   const int marker = markers_->currentRow();
   if (!shown_ || busy_ || marker < 0 || displayed_ < 0) return;
   const int frame = shown_->range.first + displayed_ * shown_->range.step;
-  corrections_.set({std::size_t(marker), view, raw, frame}, shown_->range);
+  const track::MarkerPick made{std::size_t(marker), view, raw, frame};
+  const auto checked = guarded([&] { track::check_pick_in_map(shown_->given, made, shown_->range.first); });
+  if (!checked) return says_->setText(sentence_of(checked.error()));
+  corrections_.set(made, shown_->range);
   take_picks();
 }
 

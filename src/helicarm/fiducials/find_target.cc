@@ -356,9 +356,10 @@ Expected<ImagePoint> snap_to_ball(const xray::XrayImage& xray_image, const recti
   const auto rough_uv = map.rectified_from_raw(best->centre_px);
   if (!rough_uv) return fail(Reason::not_seen, "the pick lies outside the rectified field");
   const Vector2d raw = best->centre_px - blob_offset(map, view, *rough_uv, depth_mm, diameter_mm);
-  const Vector2d uv = map.rectified_from_raw(raw).value_or(*rough_uv);
-  const double map_sigma = map.sigma_px(uv);
-  return ImagePoint{raw, uv,
+  const auto uv = map.rectified_from_raw(raw);
+  if (!uv) return fail(Reason::not_seen, "the pick lies outside the rectified field");
+  const double map_sigma = map.sigma_px(*uv);
+  return ImagePoint{raw, *uv,
                     std::sqrt(best->error_px() * best->error_px() + map_sigma * map_sigma +
                               template_floor_px * template_floor_px)};
 }

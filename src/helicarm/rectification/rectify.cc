@@ -204,7 +204,9 @@ Expected<Rectification> rectify(const xray::XrayImage& xray_image, detection::Im
     result.plate_dots.push_back(dots[i]);
     result.residual_px.push_back(fit->residual_px[i]);
     const double shift =
-        (seen[i].raw_px - fit->map.rectified_from_raw(seen[i].raw_px).value_or(seen[i].raw_px)).norm();
+        (seen[i].raw_px -
+         fit->map.rectified_from_raw(seen[i].raw_px).value_or(fit->rectified_from_plate * seen[i].place_mm))
+            .norm();
     result.raw_mean_px += shift;
     result.raw_max_px = std::max(result.raw_max_px, shift);
   }

@@ -8,6 +8,7 @@
 
 #include "helicarm/geometry/ray.h"
 #include "helicarm/geometry/triangulation.h"
+#include "helicarm/track/view_map.h"
 
 namespace helicarm::track {
 namespace {
@@ -30,9 +31,7 @@ std::vector<RayOfBody> rays_of(const SequenceData& work, const BodyPlan& plan, c
   if (at.poses.front())
     for (const MarkerPick& pick : work.the_case.picks) {
       if (pick.marker != m) continue;
-      const auto& map = work.the_case.views[pick.view].map;
-      const std::optional<Eigen::Vector2d> uv =
-          map ? map->rectified_from_raw(pick.uv_raw) : std::optional(pick.uv_raw);
+      const auto uv = rectified_in(work.the_case.views[pick.view], pick.uv_raw);
       if (!uv) continue;
       rays.push_back(
           {{&work.cameras[pick.view], *uv, pick_sigma_px}, at.poses.front()->pose, pick_sigma_px, 1, true});

@@ -9,14 +9,15 @@
 #include "helicarm/geometry/absolute_pose.h"
 #include "helicarm/geometry/ray.h"
 #include "helicarm/track/sighted_point.h"
+#include "helicarm/track/view_map.h"
 #include "helicarm/track/xmalab_points.h"
 
 namespace helicarm::track {
 namespace {
 
-/// A point of the file in raw pixels from 0, y downwards.
+/// A point of the file in raw pixels from 0, y downwards. `what`: marker and frame.
 Eigen::Vector2d raw_point(Eigen::Vector2d at, const TrackView& view, const PointsFile& points,
-                          const std::string& origin) {
+                          const std::string& origin, const std::string& what) {
   if (points.from_one) at.array() -= 1;
   if (points.y_up) {
     if (!view.image_size)
@@ -24,6 +25,7 @@ Eigen::Vector2d raw_point(Eigen::Vector2d at, const TrackView& view, const Point
                                                     origin, view.images.name));
     at.y() = view.image_size->y() - 1 - at.y();
   }
+  if (!rectified_in(view, at)) refuse_outside_map(fmt::format("{}: {}", origin, what), view, at);
   return at;
 }
 
@@ -32,9 +34,7 @@ std::optional<double> median_gap_mm(const TrackCase& read) {
   std::vector<double> gaps;
   const std::size_t views = read.views.size();
   const auto ray = [&](std::size_t view, const Eigen::Vector2d& raw) {
-    const auto& map = read.views[view].map;
-    return geometry::ray_through(read.views[view].camera,
-                                 map ? map->rectified_from_raw(raw).value_or(raw) : raw);
+    return geometry::ray_through(read.views[view].camera, rectified_in(read.views[view], raw).value());
   };
   for (const auto& frame : read.points)
     for (std::size_t i = 0; i < frame.size(); i += views)
@@ -70,11 +70,9 @@ std::optional<double> geometry_misfit(const TrackCase& read, const BodyPlan& bod
   for (std::size_t i = 0; i < body.markers.size(); ++i) {
     std::vector<Sight> seen;
     for (std::size_t k = 0; k < read.views.size(); ++k)
-      if (const auto& raw = read.points[frame][body.markers[i] * read.views.size() + k]) {
-        const auto& map = read.views[k].map;
-        seen.push_back({&read.views[k].camera, map ? map->rectified_from_raw(*raw).value_or(*raw) : *raw,
-                        read.point_sigma_px});
-      }
+      if (const auto& raw = read.points[frame][body.markers[i] * read.views.size() + k])
+        seen.push_back(
+            {&read.views[k].camera, rectified_in(read.views[k], *raw).value(), read.point_sigma_px});
     const auto met = seen.size() >= 2 ? sighted_point(seen) : std::nullopt;
     if (!met) continue;
     known.push_back(body.geometry[i]);
@@ -113,7 +111,9 @@ void take_points(TrackCase& read, const PointsFile& points, const case_registrat
   for (const int number : numbers) {
     auto row = given.rows[std::size_t(number - points.first_frame)];
     for (std::size_t i = 0; i < row.size(); ++i)
-      if (row[i]) row[i] = raw_point(*row[i], read.views[i % read.views.size()], points, origin);
+      if (row[i])
+        row[i] = raw_point(*row[i], read.views[i % read.views.size()], points, origin,
+                           fmt::format("\"{}\" of frame {}", given.markers[i / read.views.size()], number));
     if (number == numbers.front())
       for (std::size_t i = 0; i < row.size(); ++i)
         if (row[i]) read.picks.push_back({i / read.views.size(), i % read.views.size(), *row[i]});

@@ -12,6 +12,7 @@
 #include "helicarm/track/marker_image.h"
 #include "helicarm/track/sequence_images.h"
 #include "helicarm/track/sighted_point.h"
+#include "helicarm/track/view_map.h"
 
 namespace helicarm::track {
 namespace {
@@ -52,8 +53,10 @@ class FirstFrames {
     std::vector<Sight> middles;
     for (std::size_t k = 0; k < 2; ++k) {
       const auto& pixels = first_[k].pixels;
-      middles.push_back({&the_case.views[k].camera,
-                         rectified(k, {(pixels.width() - 1) / 2.0, (pixels.height() - 1) / 2.0}), 1.0});
+      const Eigen::Vector2d middle((pixels.width() - 1) / 2.0, (pixels.height() - 1) / 2.0);
+      const auto uv = rectified_in(the_case.views[k], middle);
+      if (!uv) refuse_outside_map("picks: none; the middle of the image", the_case.views[k], middle);
+      middles.push_back({&the_case.views[k].camera, *uv, 1.0});
     }
     const auto met = sighted_point(middles);
     if (!met)
@@ -71,14 +74,9 @@ class FirstFrames {
   int frame_count() const { return std::min(most_frames, frames_.count()); }
   Images frame(int index) const { return value_or_throw(images_.at(frames_.first + index * frames_.step)); }
 
-  Eigen::Vector2d rectified(std::size_t view, const Eigen::Vector2d& raw) const {
-    const auto& map = given_.views[view].map;
-    return map ? map->rectified_from_raw(raw).value_or(raw) : raw;
-  }
-  Eigen::Vector2d raw(std::size_t view, const Eigen::Vector3d& place) const {
-    const auto& map = given_.views[view].map;
-    const Eigen::Vector2d uv = given_.views[view].camera.project(place);
-    return map ? map->raw_from_rectified(uv) : uv;
+  /// Nothing outside the view's distortion map.
+  std::optional<Eigen::Vector2d> raw(std::size_t view, const Eigen::Vector3d& place) const {
+    return raw_in(given_.views[view], given_.views[view].camera.project(place));
   }
   double radius_px(std::size_t view, const Eigen::Vector3d& place) const {
     const geometry::View& camera = given_.views[view].camera;
@@ -86,27 +84,31 @@ class FirstFrames {
   }
   double middle_radius_px(std::size_t view) const { return radius_px(view, middle_); }
 
-  /// Clear discs of about the markers' size.
+  /// Clear discs of about the markers' size; `outside` counts those outside the view's distortion map.
   std::vector<FirstDisc> discs_in(std::size_t view, const xray::XrayImage& image,
-                                  const std::vector<SearchWindow>& windows) const {
+                                  const std::vector<SearchWindow>& windows, int* outside = nullptr) const {
     constexpr double vaguest = 0.12;  // of the radius: texture beyond
     std::vector<FirstDisc> discs;
     for (const MarkerImage& found : find_markers(image, windows, appearance_[view]))
       if (has_marker_size(found, windows.front().radius_px) && found.contrast > 0 &&
-          found.sigma_px < vaguest * windows.front().radius_px)
-        discs.push_back({found, rectified(view, found.uv_raw)});
+          found.sigma_px < vaguest * windows.front().radius_px) {
+        if (const auto uv = rectified_in(given_.views[view], found.uv_raw))
+          discs.push_back({found, *uv});
+        else if (outside)
+          ++*outside;
+      }
     return discs;
   }
 
   /// All of the first frame.
-  std::vector<FirstDisc> all_discs(std::size_t view) const {
+  std::vector<FirstDisc> all_discs(std::size_t view, int* outside = nullptr) const {
     const auto& pixels = first_[view].pixels;
     const double radius = middle_radius_px(view), step = std::max(40.0, 12 * radius);
     std::vector<SearchWindow> windows;
     for (double v = step / 2; v < pixels.height() + step / 2; v += step)
       for (double u = step / 2; u < pixels.width() + step / 2; u += step)
         windows.push_back({{u, v}, step / 2 + 1, radius, 0});
-    std::vector<FirstDisc> discs = discs_in(view, first_[view], windows);
+    std::vector<FirstDisc> discs = discs_in(view, first_[view], windows, outside);
     std::ranges::sort(discs, std::greater<>(), [](const FirstDisc& disc) { return disc.image.contrast; });
     if (discs.size() > most_discs) discs.resize(most_discs);
     return discs;
@@ -117,8 +119,8 @@ class FirstFrames {
     const double radius = middle_radius_px(pick.view);
     const auto found =
         picked_marker(first_[pick.view], pick.uv_raw, radius, click_px + radius, appearance_[pick.view]);
-    if (!found) return std::nullopt;
-    return FirstDisc{found->image, rectified(pick.view, found->image.uv_raw)};
+    const auto uv = found ? rectified_in(given_.views[pick.view], found->image.uv_raw) : std::nullopt;
+    return uv ? std::optional(FirstDisc{found->image, *uv}) : std::nullopt;
   }
 
   /// Where the rays of two discs meet, if they do, as those of one marker.
@@ -165,12 +167,13 @@ std::vector<SearchWindow> windows_at(const FirstFrames& frames, std::size_t view
   for (const Match& match : matches) {
     if (!match.is_followed) continue;
     const Eigen::Vector3d place = match.place + match.velocity;
-    const Eigen::Vector2d at = frames.raw(view, place);
+    const auto at = frames.raw(view, place);
+    if (!at) continue;
     const double radius = frames.radius_px(view, place);
     const double reach = 2 * radius * fastest_mm + same_px;
-    if (std::ranges::none_of(windows,
-                             [&](const SearchWindow& other) { return (other.centre - at).norm() < same_px; }))
-      windows.push_back({at, reach, radius, 0});
+    if (std::ranges::none_of(
+            windows, [&](const SearchWindow& other) { return (other.centre - *at).norm() < same_px; }))
+      windows.push_back({*at, reach, radius, 0});
   }
   return windows;
 }
@@ -185,16 +188,16 @@ void follow(const FirstFrames& frames, std::size_t a, std::size_t b, const Image
   for (Match& match : matches) {
     if (!match.is_followed) continue;
     const Eigen::Vector3d expected = match.place + match.velocity;
-    const Eigen::Vector2d in_first = frames.raw(a, expected), in_second = frames.raw(b, expected);
+    const auto in_first = frames.raw(a, expected), in_second = frames.raw(b, expected);
     const double reach_mm = match.seen > 1 ? fastest_mm / 2 : fastest_mm;
     const double reach_a = 2 * frames.radius_px(a, expected) * reach_mm + 2;
     const double reach_b = 2 * frames.radius_px(b, expected) * reach_mm + 2;
     std::optional<SightedPoint> best;
     double least = 0;
     for (const FirstDisc& one : first) {
-      if ((one.image.uv_raw - in_first).norm() > reach_a) continue;
+      if (!in_first || !in_second || (one.image.uv_raw - *in_first).norm() > reach_a) continue;
       for (const FirstDisc& other : second) {
-        if ((other.image.uv_raw - in_second).norm() > reach_b) continue;
+        if ((other.image.uv_raw - *in_second).norm() > reach_b) continue;
         const auto met = frames.meeting(a, one, b, other);
         if (!met || (met->place - expected).norm() > reach_mm) continue;
         const double cost = met->chi2 + (met->place - expected).squaredNorm() / (reach_mm * reach_mm / 9);
@@ -260,7 +263,16 @@ void warn(TrackCase& the_case, Reason reason, std::size_t view, const Eigen::Vec
 }
 
 void find_all(TrackCase& the_case, const FirstFrames& frames, int frame) {
-  const auto first = frames.all_discs(0), second = frames.all_discs(1);
+  std::array<int, 2> outside{};
+  const auto first = frames.all_discs(0, &outside[0]), second = frames.all_discs(1, &outside[1]);
+  for (std::size_t k = 0; k < 2; ++k)
+    if (outside[k] > 0)
+      the_case.warnings.push_back(
+          {Reason::not_seen,
+           fmt::format("frame {}: {} {} outside the distortion map of {}: left out", frame, outside[k],
+                       outside[k] == 1 ? "disc is" : "discs are", the_case.views[k].images.name),
+           the_case.views[k].images.name,
+           {{"discs", double(outside[k])}}});
   Found found = found_markers(frames, 0, first, 1, second);
   const std::string &a = the_case.views[0].images.name, &b = the_case.views[1].images.name;
   if (found.certain.empty())
@@ -283,8 +295,9 @@ void find_all(TrackCase& the_case, const FirstFrames& frames, int frame) {
     the_case.picks.push_back({marker, 1, second[match.second].image.uv_raw});
     const auto met = frames.meeting(0, first[match.first], 1, second[match.second]);
     for (std::size_t k = 2; met && k < the_case.views.size(); ++k)
-      if (const auto disc = frames.picked({marker, k, frames.raw(k, met->place)}))
-        the_case.picks.push_back({marker, k, disc->image.uv_raw});
+      if (const auto at = frames.raw(k, met->place))
+        if (const auto disc = frames.picked({marker, k, *at}))
+          the_case.picks.push_back({marker, k, disc->image.uv_raw});
   }
   for (const std::size_t i : found.ambiguous) {
     const Eigen::Vector2d& at = first[i].image.uv_raw;

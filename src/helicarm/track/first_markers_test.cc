@@ -9,6 +9,8 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/image/png.h"
+#include "helicarm/track/half_map_test.h"
+#include "helicarm/track/track.h"
 #include "helicarm/track/two_cameras_test.h"
 
 namespace helicarm::track {
@@ -127,6 +129,33 @@ TEST_F(FirstMarkers, PartnerOfAPickInOneViewIsFound) {
   EXPECT_EQ(given_.picks.back().view, 1u);
   EXPECT_LT((given_.picks.back().uv_raw - given_.views[1].camera.project(bead_at(2, 1))).norm(), 0.3);
   EXPECT_TRUE(given_.warnings.empty());
+}
+
+TEST_F(FirstMarkers, DiscsOutsideTheDistortionMapAreLeftOut) {
+  draw();
+  const double last = given_.views[0].camera.project(bead_at(3, 1)).x() + 20;
+  given_.views[0].map = half_map(last, size_);
+  complete_picks(given_, range_);
+  EXPECT_EQ(given_.markers.size(), beads.size() - 1);
+  ASSERT_EQ(given_.warnings.size(), 1u);
+  EXPECT_EQ(given_.warnings[0].reason, Reason::not_seen);
+  EXPECT_TRUE(given_.warnings[0].message.ends_with("outside the distortion map of A: left out"));
+}
+
+TEST_F(FirstMarkers, MarkerThatLeavesTheDistortionMapIsHiddenThere) {
+  draw();
+  complete_picks(given_, range_);
+  ASSERT_EQ(given_.markers.size(), beads.size());
+  // Between the last bead's images of the third and the fourth frame.
+  const auto column = [&](int frame) { return given_.views[0].camera.project(bead_at(4, frame)).x(); };
+  given_.views[0].map = half_map((column(3) + column(4)) / 2, size_);
+  const auto followed = run_track(given_, range_, {}, {});
+  ASSERT_TRUE(followed) << followed.error().message;
+  for (std::size_t f = 0; f < std::size_t(frames_); ++f) {
+    const bool is_shown = followed->images[f][4 * 2].has_value();
+    EXPECT_EQ(is_shown, f < 3) << f;
+  }
+  EXPECT_EQ(followed->markers[5][4].status, MarkerStatus::lost);  // of no body, for too short a time
 }
 
 TEST_F(FirstMarkers, PickInOneViewWithoutAPartnerIsSaid) {

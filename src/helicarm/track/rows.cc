@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/csv.h"
+#include "helicarm/track/view_map.h"
 
 namespace helicarm::track {
 namespace {
@@ -172,7 +173,8 @@ std::vector<FrameSights> sights_from(const std::string& text, const TrackCase& t
             if (!value) return read;
             values[i] = *value;
           }
-          of[k] = MarkerImage{{values[0], values[1]}, values[2], values[3], values[4], values[5]};
+          const MarkerImage image{{values[0], values[1]}, values[2], values[3], values[4], values[5]};
+          if (rectified_in(the_case.views[k], image.uv_raw)) of[k] = image;
         }
         at = end + 1;
       }

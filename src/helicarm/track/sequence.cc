@@ -16,6 +16,7 @@
 #include "helicarm/track/delays.h"
 #include "helicarm/track/exchanges.h"
 #include "helicarm/track/image_errors.h"
+#include "helicarm/track/view_map.h"
 
 namespace helicarm::track {
 namespace {
@@ -84,12 +85,9 @@ SequenceData data_of(const TrackCase& the_case, const std::vector<FrameSights>& 
     for (std::size_t m = 0; m < work.markers; ++m)
       for (std::size_t k = 0; k < work.views; ++k) {
         const auto& image = frame.of[m][k];
-        images.push_back(image);
-        if (!image) continue;
-        const auto& map = the_case.views[k].map;
-        const Eigen::Vector2d uv =
-            map ? map->rectified_from_raw(image->uv_raw).value_or(image->uv_raw) : image->uv_raw;
-        of[m][k] = Sight{&work.cameras[k], uv, std::hypot(image->sigma_px, sight_floor_px)};
+        const auto uv = image ? rectified_in(the_case.views[k], image->uv_raw) : std::nullopt;
+        images.push_back(uv ? image : std::nullopt);
+        if (uv) of[m][k] = Sight{&work.cameras[k], *uv, std::hypot(image->sigma_px, sight_floor_px)};
       }
   }
   locate_all(work);
@@ -227,12 +225,40 @@ void warn_of_lost_markers(const SequenceData& work, Sequence& sequence) {
     if (!lost.empty())
       sequence.warnings.push_back(
           {Reason::marker_lost,
-           fmt::format("\"{}\" is lost in {} of {} frames, first in frame {}: {}", work.the_case.markers[m],
-                       lost.size(), work.frames, lost.front(),
-                       never_placed ? "it is picked in one view only, which places nothing"
-                                    : "hidden in both views for too long, or outside the images"),
+           fmt::format(
+               "\"{}\" is lost in {} of {} frames, first in frame {}: {}", work.the_case.markers[m],
+               lost.size(), work.frames, lost.front(),
+               never_placed
+                   ? "it is picked in one view only, which places nothing"
+                   : "hidden in both views for too long, or outside the images or their distortion maps"),
            {},
            {{"frames", double(lost.size())}, {"first", double(lost.front())}}});
+  }
+}
+
+/// In a view that does not show them there.
+void warn_of_places_outside_maps(const SequenceData& work, Sequence& sequence) {
+  for (std::size_t k = 0; k < work.views; ++k) {
+    const TrackView& view = work.the_case.views[k];
+    if (!view.map || view.map->is_identity()) continue;
+    for (std::size_t m = 0; m < work.markers; ++m) {
+      std::vector<int> outside;
+      for (std::size_t f = 0; f < work.frames; ++f) {
+        const auto& place = sequence.markers[f][m].place;
+        if (place && !work.sights[f][m][k] && view.camera.depth(place->place) > 1 &&
+            !raw_in(view, view.camera.project(place->place)))
+          outside.push_back(sequence.frames[f]);
+      }
+      if (outside.empty()) continue;
+      sequence.warnings.push_back(
+          {Reason::not_seen,
+           fmt::format("\"{}\" is outside the distortion map of {} in {} of {} frames, first in frame {}: it "
+                       "counts as hidden there",
+                       work.the_case.markers[m], view.images.name, outside.size(), work.frames,
+                       outside.front()),
+           view.images.name,
+           {{"frames", double(outside.size())}, {"first", double(outside.front())}}});
+    }
   }
 }
 
@@ -314,6 +340,7 @@ Sequence estimate_sequence(const TrackCase& the_case, const std::vector<FrameSig
       return marker.status == MarkerStatus::tracked;
     });
   warn_of_lost_markers(work, sequence);
+  warn_of_places_outside_maps(work, sequence);
   warn_of_bodies_that_are_not_rigid(work, sequence);
   sequence.relative = relative_motions(sequence.bodies);
   sequence.joints = joints_of(the_case, sequence.bodies);

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/track/half_map_test.h"
 #include "helicarm/track/two_cameras_test.h"
 
 namespace helicarm::track {
@@ -110,6 +111,28 @@ TEST(Sequence, PlacesAndPosesAreWithinTheirBands) {
   EXPECT_NEAR(double(inside) / all, 0.95, 0.03);
   EXPECT_EQ(sequence.repaired, 0);
   EXPECT_FALSE(warning_of(sequence, Reason::markers_swapped));
+}
+
+TEST(Sequence, DiscOutsideTheDistortionMapCountsAsHidden) {
+  TrackCase the_case = two_bodies();
+  const auto sights = drawn(the_case, none);
+  double last = 0;
+  for (const FrameSights& frame : sights) last = std::max(last, frame.of[4][0]->uv_raw.x());
+  const double limit = last - 1;
+  the_case.views[0].map = half_map(limit, 500);
+  const Sequence sequence = estimate_sequence(the_case, sights);
+  std::size_t outside = 0;
+  for (std::size_t f = 0; f < sights.size(); ++f) {
+    const bool is_inside = sights[f].of[4][0]->uv_raw.x() <= limit;
+    outside += !is_inside;
+    EXPECT_EQ(sequence.markers[f][4].status, is_inside ? MarkerStatus::tracked : MarkerStatus::one_view) << f;
+    EXPECT_LT((sequence.markers[f][4].place->place - place_of(4, int(f) + 1, none)).norm(), 0.3) << f;
+  }
+  EXPECT_GT(outside, 0u);
+  EXPECT_TRUE(std::ranges::any_of(sequence.warnings, [](const Warning& warning) {
+    return warning.reason == Reason::not_seen &&
+           warning.message.starts_with("\"s1\" is outside the distortion map of A in");
+  }));
 }
 
 TEST(Sequence, AMarkerOfOneViewIsPlacedByItsRaysAlongTheBodysPoses) {

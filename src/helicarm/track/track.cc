@@ -31,6 +31,7 @@ std::string identity_of(const TrackCase& the_case, const case_registration::Fram
         fmt::format("\n{} {} {}", view.images.name, view.images.image.filename().string(), view.frame_offset);
     const geometry::Projection projection = view.camera.projection();
     for (const double value : projection.reshaped()) text += fmt::format(" {}", value);
+    if (view.map) text += rectification::to_json(*view.map).dump();
   }
   for (const std::string& marker : the_case.markers) text += "\n" + marker;
   for (const MarkerPick& pick : the_case.picks)

@@ -15,6 +15,7 @@
 #include "helicarm/pipeline/case_frames.h"
 #include "helicarm/track/case_points.h"
 #include "helicarm/track/first_markers.h"
+#include "helicarm/track/view_map.h"
 #include "helicarm/track/xmalab_points.h"
 
 namespace helicarm::track {
@@ -274,8 +275,10 @@ Expected<TrackCase> read_track_case(const fs::path& path, const case_registratio
     else
       calibrate(read, base, frames);
     if (points) take_points(read, *points, frames);
+    check_picks_in_maps(read, frames.first);
     if (!is_placed) complete_picks(read, frames);
     take_corrections(read, base, frames, origin);
+    check_picks_in_maps(read, frames.first);
     read_bodies(read, base.bodies, points || !is_found, origin);
     if (is_placed) check_geometry_of_points(read, points->file.filename().string());
     return read;

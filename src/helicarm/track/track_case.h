@@ -78,9 +78,9 @@ void check_butterworth(const TrackCase& the_case, int step);
 /// Reads a case with "markers", picks of the range's first frame and "bodies". Views have "camera" or
 /// "calibration", or are calibrated by the case's calibrator in their first image. No later image is read.
 /// Fails as `read_case`, `import_matrix`, `saved_calibration_from_json`, `calibrate_case` and
-/// `read_xmalab_points2d`; bad_value for picks of another frame, for bodies of unknown markers, and for
-/// frames that `points` does not have; residual_too_large where the rays of points of all frames miss each
-/// other.
+/// `read_xmalab_points2d`; bad_value for picks of another frame or outside a distortion map, for bodies of
+/// unknown markers, and for frames that `points` does not have; residual_too_large where the rays of points
+/// of all frames miss each other.
 Expected<TrackCase> read_track_case(const std::filesystem::path& path,
                                     const case_registration::FrameRange& frames,
                                     const std::optional<PointsFile>& points = {});

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "helicarm/geometry/triangulation.h"
+#include "helicarm/track/view_map.h"
 
 namespace helicarm::track {
 namespace {
@@ -48,6 +49,7 @@ Tracker::Snapshot Tracker::snapshot(const FrameSights& sights) const {
 Expected<Tracker> Tracker::begin(const TrackCase& the_case, int frame,
                                  const std::vector<xray::XrayImage>& images) {
   return guarded([&] {
+    check_picks_in_maps(the_case, frame);
     Tracker tracker(the_case);
     for (const TrackView& view : the_case.views) tracker.cameras_.push_back(view.camera);
     tracker.markers_.resize(the_case.markers.size());

@@ -29,7 +29,7 @@ class Tracker {
  public:
   /// Finds the markers of the first frame by their picks. Refuses (markers_swapped, residual_too_large) picks
   /// whose rays miss each other, and (markers_swapped, bodies_exchanged) markers that contradict the geometry
-  /// given; not_seen where no marker is found in two views.
+  /// given; not_seen where no marker is found in two views; bad_value for picks outside a distortion map.
   static Expected<Tracker> begin(const TrackCase& the_case, int frame,
                                  const std::vector<xray::XrayImage>& images);
 
@@ -80,8 +80,9 @@ class Tracker {
   FrameSights look_freely(int frame, const std::vector<xray::XrayImage>& images) const;
   void correct(FrameSights& sights, const std::vector<xray::XrayImage>& images) const;
   bool is_corrected(std::size_t marker, int frame) const;
+  /// Of a disc: discs outside the view's distortion map are left out where they are found.
   Eigen::Vector2d rectified(std::size_t view, const Eigen::Vector2d& raw) const;
-  Eigen::Vector2d raw(std::size_t view, const Eigen::Vector2d& uv) const;
+  bool is_in_map(std::size_t view, const MarkerImage& image) const;
   double radius_px(std::size_t view, const Eigen::Vector3d& place) const;
   std::optional<PosePrior> predicted_pose(const BodyState& body) const;
   ExpectedMarker expected(std::size_t marker) const;

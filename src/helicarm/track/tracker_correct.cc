@@ -3,19 +3,22 @@
 #include <cmath>
 
 #include "helicarm/track/tracker.h"
+#include "helicarm/track/view_map.h"
 
 namespace helicarm::track {
 namespace {
 
 /// The nearest of the discs that are not much weaker than the clearest one within reach.
-std::optional<MarkerImage> disc_at(const xray::XrayImage& image, const MarkerAppearance& appearance,
-                                   const Eigen::Vector2d& at, double radius) {
+std::optional<MarkerImage> disc_at(const xray::XrayImage& image, const TrackView& view,
+                                   const MarkerAppearance& appearance, const Eigen::Vector2d& at,
+                                   double radius) {
   constexpr double clear = 0.5;
   const double reach = pick_reach_px + radius;
   const SearchWindow window{at, reach + radius, radius, 0};
   std::vector<MarkerImage> discs = find_markers(image, {&window, 1}, appearance);
   std::erase_if(discs, [&](const MarkerImage& disc) {
-    return (disc.uv_raw - at).norm() > reach || !has_marker_size(disc, radius);
+    return (disc.uv_raw - at).norm() > reach || !has_marker_size(disc, radius) ||
+           !rectified_in(view, disc.uv_raw);
   });
   double strongest = 0;
   for (const MarkerImage& disc : discs) strongest = std::max(strongest, std::abs(disc.contrast));
@@ -40,7 +43,8 @@ void Tracker::correct(FrameSights& sights, const std::vector<xray::XrayImage>& i
     if (pick.frame != sights.frame) continue;
     const std::size_t k = pick.view;
     auto& image = sights.of[pick.marker][k];
-    image = disc_at(images[k], appearance_[k], pick.uv_raw, radius_px(k, markers_[pick.marker].place));
+    image = disc_at(images[k], given_->views[k], appearance_[k], pick.uv_raw,
+                    radius_px(k, markers_[pick.marker].place));
     if (image && may_be_noise(*image, pick, sights, images[k])) image.reset();
   }
   for (const MarkerPick& pick : given_->corrections) {

@@ -9,6 +9,7 @@
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/track/marker_fit.h"
 #include "helicarm/track/tracker.h"
+#include "helicarm/track/view_map.h"
 
 namespace helicarm::track {
 namespace {
@@ -66,8 +67,9 @@ void Tracker::seek_evidence(FrameSights& sights, const std::vector<ExpectedMarke
         const auto slope = geometry::projection_jacobian(cameras_[k], at[m]->place);
         Eigen::Matrix2d spread = slope * at[m]->covariance * slope.transpose();
         spread.diagonal().array() += std::pow(at[m]->images[k].shift_sigma, 2) + 0.01;
-        const Eigen::Vector2d uv = raw(k, cameras_[k].project(at[m]->place) + at[m]->images[k].shift_px);
-        if (uv.allFinite() && std::sqrt(spread.trace() / 2) < widest_px) where[m] = Where{uv, spread};
+        const auto uv =
+            raw_in(given_->views[k], cameras_[k].project(at[m]->place) + at[m]->images[k].shift_px);
+        if (uv && uv->allFinite() && std::sqrt(spread.trace() / 2) < widest_px) where[m] = Where{*uv, spread};
       }
       for (std::size_t m = 0; m < count; ++m) {
         auto& image = sights.of[m][k];
@@ -81,11 +83,12 @@ void Tracker::seek_evidence(FrameSights& sights, const std::vector<ExpectedMarke
           if (i != m && where[i]) others.push_back({where[i]->uv, radius_of(i)});
         const KnownMarker known{where[m]->uv, where[m]->covariance, radius_of(m), contrast_of(m, k)};
         const auto fit = fit_known_marker(images[k].pixels, known, others, appearance_[k]);
+        if (!fit || !is_in_map(k, fit->image)) continue;
         if (!is_search) {
-          if (fit) image = fit->image;
+          image = fit->image;
           continue;
         }
-        if (!fit || fit->evidence < enough) continue;
+        if (fit->evidence < enough) continue;
         bool is_taken = false;
         for (std::size_t i = 0; i < count; ++i)
           is_taken = is_taken ||

@@ -5,19 +5,18 @@
 
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/track/tracker.h"
+#include "helicarm/track/view_map.h"
 
 namespace helicarm::track {
 
 double Tracker::Delay::sigma() const { return 1 / std::sqrt(information); }
 
 Eigen::Vector2d Tracker::rectified(std::size_t view, const Eigen::Vector2d& raw) const {
-  const auto& map = given_->views[view].map;
-  return map ? map->rectified_from_raw(raw).value_or(raw) : raw;
+  return rectified_in(given_->views[view], raw).value();
 }
 
-Eigen::Vector2d Tracker::raw(std::size_t view, const Eigen::Vector2d& uv) const {
-  const auto& map = given_->views[view].map;
-  return map ? map->raw_from_rectified(uv) : uv;
+bool Tracker::is_in_map(std::size_t view, const MarkerImage& image) const {
+  return rectified_in(given_->views[view], image.uv_raw).has_value();
 }
 
 double Tracker::radius_px(std::size_t view, const Eigen::Vector3d& place) const {

@@ -88,7 +88,8 @@ void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) 
     // Weak discs are texture, where a clear one is near.
     for (const MarkerImage& image : found)
       if (const double distance = (image.uv_raw - pick.uv_raw).norm();
-          distance < reach && has_marker_size(image, radius) && nearest && image.sigma_px < 0.15 * radius &&
+          distance < reach && is_in_map(pick.view, image) && has_marker_size(image, radius) && nearest &&
+          image.sigma_px < 0.15 * radius &&
           std::abs(image.contrast) > 0.5 * std::abs(nearest->image.contrast))
         snaps.push_back({distance, &pick, image});
   }

@@ -5,6 +5,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/track/tracker.h"
+#include "helicarm/track/view_map.h"
 
 namespace helicarm::track {
 namespace {
@@ -24,13 +25,13 @@ std::vector<std::vector<Candidate>> Tracker::search(const std::vector<xray::Xray
       const auto slope = geometry::projection_jacobian(cameras_[k], marker.place);
       const Eigen::Matrix2d spread = slope * marker.covariance * slope.transpose();
       const double sigma = std::sqrt(spread.trace() / 2) + marker.images[k].shift_sigma;
-      const Eigen::Vector2d at = raw(k, cameras_[k].project(marker.place) + marker.images[k].shift_px);
-      if (!at.allFinite()) continue;
-      windows.push_back(
-          {at, reach_px.value_or(window_reach(sigma)), marker.images[k].radius_px, marker.images[k].visible});
+      const auto at = raw_in(given_->views[k], cameras_[k].project(marker.place) + marker.images[k].shift_px);
+      if (!at || !at->allFinite()) continue;
+      windows.push_back({*at, reach_px.value_or(window_reach(sigma)), marker.images[k].radius_px,
+                         marker.images[k].visible});
     }
     for (const MarkerImage& image : find_markers(images[k], windows, appearance_[k]))
-      discs[k].push_back({image, rectified(k, image.uv_raw)});
+      if (const auto uv = rectified_in(given_->views[k], image.uv_raw)) discs[k].push_back({image, *uv});
   });
   return discs;
 }
