@@ -41,7 +41,8 @@ void against_first(TrackedBody& frame, const FramePose& pose, const Eigen::Vecto
   FramePose made{pose.pose * first.pose.inverse(), pose.covariance};
   RigidCovariance turned = RigidCovariance::Zero();
   turned.topLeftCorner<3, 3>() = turned.bottomRightCorner<3, 3>() = made.pose.rotation;
-  made.covariance += turned * first.covariance * turned.transpose();
+  const RigidStep common = pose.common - turned * first.common;
+  made.covariance += turned * first.covariance * turned.transpose() + common * common.transpose();
   if (is_first) made = {RigidTransform{}, RigidCovariance::Zero()};
   frame.pose = made;
   frame.centre = pose.pose * centre_in_body;
@@ -57,6 +58,7 @@ void take_motion(BodySequence& body, const std::vector<std::optional<FramePose>>
   if (motion) {
     body.prior = motion->prior;
     body.noise_factor = motion->noise_factor;
+    body.turn_noise_factor = motion->turn_noise_factor;
     for (std::size_t f = 0; f < poses.size(); ++f) {
       TrackedBody& frame = body.smoothed[f];
       const TrackedBody& own = body.frames[f];

@@ -9,8 +9,8 @@
 
 namespace helicarm::track {
 
-/// A pose (world_from_body) against the first frame's. The first one's error is in it, unless it is the first
-/// itself.
+/// A pose (world_from_body) against the first frame's. The first one's error is in it, less what both share,
+/// unless it is the first itself.
 void against_first(TrackedBody& frame, const FramePose& pose, const Eigen::Vector3d& centre_in_body,
                    const FramePose& first, bool is_first);
 

@@ -24,14 +24,16 @@ Json to_json(const ModelSequence& sequence) {
     const BodySequence& body = sequence.bodies[i];
     std::array<int, 3> counts{};
     for (const auto& frame : sequence.registered) ++counts[std::size_t(frame.models[i].decision)];
-    json["models"].push_back({{"name", sequence.names[i]},
-                              {"accepted", counts[0]},
-                              {"warned", counts[1]},
-                              {"refused", counts[2]},
-                              {"noise_factor", body.prior ? Json(body.noise_factor) : Json(nullptr)},
-                              {"prior", body.prior ? Json{{"turn_rad2_per_frame5", body.prior->turn},
-                                                          {"shift_mm2_per_frame5", body.prior->shift}}
-                                                   : Json(nullptr)}});
+    json["models"].push_back(
+        {{"name", sequence.names[i]},
+         {"accepted", counts[0]},
+         {"warned", counts[1]},
+         {"refused", counts[2]},
+         {"noise_factor", body.prior ? Json(body.noise_factor) : Json(nullptr)},
+         {"turn_noise_factor", body.prior ? Json(body.turn_noise_factor) : Json(nullptr)},
+         {"prior", body.prior ? Json{{"turn_rad2_per_frame5", body.prior->turn},
+                                     {"shift_mm2_per_frame5", body.prior->shift}}
+                              : Json(nullptr)}});
   }
   json["seconds"] = sequence.seconds;
   json["version"] = HELICARM_VERSION;

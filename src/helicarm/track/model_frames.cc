@@ -42,6 +42,8 @@ Json json_of(const Registration& model) {
                {"translation_mm", numbers_json(model.world_from_model.translation)},
                {"centre_mm", numbers_json(model.centre)},
                {"covariance", numbers_json(model.covariance)},
+               {"by_scale", numbers_json(model.by_scale)},
+               {"anywhere", model.anywhere},
                {"residual_px", Json::object()}};
   for (const Warning& warning : model.warnings) json["warnings"].push_back(pipeline::to_json(warning));
   for (const registration::RegisteredView& view : model.views)
@@ -70,6 +72,8 @@ Registration registration_from(const Json& json) {
   take_numbers(model.world_from_model.translation, json.at("translation_mm"));
   take_numbers(model.centre, json.at("centre_mm"));
   take_numbers(model.covariance, json.at("covariance"));
+  if (json.contains("by_scale")) take_numbers(model.by_scale, json.at("by_scale"));
+  model.anywhere = json.value("anywhere", false);
   for (const auto& [name, value] : json.at("residual_px").items()) {
     registration::RegisteredView& view = model.views.emplace_back();
     view.name = name;

@@ -101,7 +101,12 @@ std::vector<ImageKeys> kept_keys(const fs::path& folder, std::size_t frames) {
   return keys;
 }
 
-FramePose pose_of(const Registration& model) { return {model.world_from_model, model.covariance}; }
+/// The error of the model's size is one in all frames.
+FramePose pose_of(const Registration& model) {
+  if (!model.by_scale.allFinite()) return {model.world_from_model, model.covariance};
+  return {model.world_from_model, model.covariance - model.by_scale * model.by_scale.transpose(),
+          model.by_scale};
+}
 
 bool has_pose(const Registration& model) { return !model.failure && model.is_determined(); }
 

@@ -84,12 +84,33 @@ TEST(ModelSequence, RefusedFramesAreGapsWithWiderBands) {
   EXPECT_LT(error_mm(body.smoothed[25], 25), 4 * std::sqrt(3 * body.smoothed[25].pose->covariance(3, 3)));
 }
 
+TEST(ModelSequence, ErrorOfTheSizeIsOneInAllFrames) {
+  ModelSequence sequence = sequence_of(40);
+  for (RegisteredFrame& frame : sequence.registered) {
+    Registration& model = frame.models[0];
+    model.by_scale << 0, 0, 0, 0, 0, 2;
+    // The last frame's views are others: there its size moves the body along another axis.
+    if (&frame == &sequence.registered.back()) model.by_scale << 0, 0, 0, 0, 2, 0;
+    model.covariance += model.by_scale * model.by_scale.transpose();
+  }
+  estimate_motion(sequence, {centre});
+  const auto sigma = [&](const TrackedBody& frame, int axis) {
+    return std::sqrt(frame.pose->covariance(axis, axis));
+  };
+  const BodySequence& body = sequence.bodies[0];
+  EXPECT_LT(sigma(body.frames[1], 5), 2 * sigma_mm);
+  EXPECT_LT(sigma(body.smoothed[20], 5), 0.7);  // the body has turned by 0.3 rad
+  EXPECT_GT(sigma(body.frames[39], 5), 1.5);
+  EXPECT_GT(sigma(body.frames[39], 4), 1.5);
+}
+
 TEST(ModelSequence, ALineOfAFrameIsReadBackToTheLastBit) {
   ModelSequence sequence = sequence_of(3);
   Registration& odd = sequence.registered[1].models[0];
   odd.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
   odd.failure = Failure{Reason::wrong_model, "femur: \"another\" bone", "AP", {{"score", 0.25}}};
   odd.warnings.push_back({Reason::covariance_missing, "no covariance", {}, {}});
+  odd.by_scale << 1, 2, 3, 4, 5, 1.0 / 3;
   odd.views.emplace_back().name = "AP";
   odd.views.back().residual_px = 0.1;
   std::string lines;
@@ -102,6 +123,7 @@ TEST(ModelSequence, ALineOfAFrameIsReadBackToTheLastBit) {
   EXPECT_EQ(read[2].models[0].world_from_model.matrix(),
             sequence.registered[2].models[0].world_from_model.matrix());
   EXPECT_FALSE(read[1].models[0].is_determined());
+  EXPECT_EQ(read[1].models[0].by_scale, odd.by_scale);
   EXPECT_EQ(read[1].models[0].failure->figures.at("score"), 0.25);
 }
 

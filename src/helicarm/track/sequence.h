@@ -25,7 +25,7 @@ struct BodySequence {
   double condition_per_m = 0;  ///< of its markers' configuration, as radiostereometry states it
   std::vector<TrackedBody> frames, smoothed;
   std::optional<MotionPrior> prior;
-  double noise_factor = 1;  ///< as `SmoothMotion`
+  double noise_factor = 1, turn_noise_factor = 1;  ///< as `SmoothMotion`
 };
 
 /// Delay of a view against the first one.

@@ -12,7 +12,8 @@ namespace helicarm::track {
 namespace {
 
 using geometry::RigidTransform;
-constexpr int state_size = 18;  // errors: rotation, centre, their rates, their second derivatives
+constexpr int enough_updates = 10;  // for the noise by the data
+constexpr int state_size = 18;      // errors: rotation, centre, their rates, their second derivatives
 using StateVector = Eigen::Matrix<double, state_size, 1>;
 using StateMatrix = Eigen::Matrix<double, state_size, state_size>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -83,9 +84,8 @@ struct Filtered {
 
   /// Of the measured covariances. The first three frames begin the motion and its rates.
   double variance_factor(NoiseScale scale) const {
-    constexpr int enough = 10;
-    constexpr double least = 1e-2, most = 1e2;
-    if (scale == NoiseScale::stated || updates < enough) return 1;
+    constexpr double least = 1e-3, most = 1e2;
+    if (scale == NoiseScale::stated || updates < enough_updates) return 1;
     return std::clamp(squares / (6.0 * (updates - 3)), least, most);
   }
   double log_likelihood(NoiseScale scale) const {
@@ -145,22 +145,49 @@ Filtered filter(std::span<const double> times, std::span<const std::optional<Mea
   return result;
 }
 
-/// The prior of the largest likelihood, found on a grid of factors that is refined.
-MotionPrior likeliest(std::span<const double> times, std::span<const std::optional<Measured>> measured,
-                      bool turns, NoiseScale scale) {
-  constexpr double least_factor = 1.3;
-  MotionPrior best{turns ? 1e-7 : 1e-12, 1e-2};
-  double most = filter(times, measured, best, turns, false).log_likelihood(scale);
+/// What is found by the likelihood.
+struct Model : MotionPrior {
+  double ratio = 1;  ///< of the factors of the places' and the turns' standard deviations
+};
+
+std::vector<std::optional<Measured>> scaled(std::span<const std::optional<Measured>> measured,
+                                            double shift_factor) {
+  Vector6 factors = Vector6::Ones();
+  factors.tail<3>().setConstant(shift_factor);
+  std::vector<std::optional<Measured>> made(measured.begin(), measured.end());
+  for (auto& frame : made)
+    if (frame) frame->covariance = factors.asDiagonal() * frame->covariance * factors.asDiagonal();
+  return made;
+}
+
+/// The model of the largest likelihood, found on a grid of factors that is refined.
+Model likeliest(std::span<const double> times, std::span<const std::optional<Measured>> measured, bool turns,
+                NoiseScale scale) {
+  constexpr double least_factor = 1.3, largest_ratio = 30;
+  const bool by_data =
+      scale == NoiseScale::by_data && turns &&
+      std::ranges::count_if(measured, [](const auto& each) { return each.has_value(); }) >= enough_updates;
+  const auto likelihood = [&](const Model& tried) {
+    if (tried.ratio == 1) return filter(times, measured, tried, turns, false).log_likelihood(scale);
+    return filter(times, scaled(measured, tried.ratio), tried, turns, false).log_likelihood(scale);
+  };
+  Model best{{turns ? 1e-7 : 1e-12, 1e-2}};
+  double most = likelihood(best);
   for (double factor = 10; factor > least_factor; factor = std::sqrt(factor)) {
     bool is_better = true;
     for (int rounds = 0; is_better && rounds < 8; ++rounds) {
       is_better = false;
-      for (double MotionPrior::*part : {&MotionPrior::turn, &MotionPrior::shift}) {
-        if (part == &MotionPrior::turn && !turns) continue;
+      std::vector<double*> parts;
+      Model tried = best;
+      if (turns) parts.push_back(&tried.turn);
+      parts.push_back(&tried.shift);
+      if (by_data) parts.push_back(&tried.ratio);
+      for (double* part : parts) {
         for (const double by : {factor, 1 / factor}) {
-          MotionPrior tried = best;
-          tried.*part *= by;
-          const double there = filter(times, measured, tried, turns, false).log_likelihood(scale);
+          tried = best;
+          *part *= part == &tried.ratio ? std::sqrt(by) : by;
+          if (std::max(tried.ratio, 1 / tried.ratio) > largest_ratio) continue;
+          const double there = likelihood(tried);
           if (!(there > most + 1e-3)) continue;
           most = there;
           best = tried;
@@ -195,16 +222,20 @@ std::vector<Smoothed> smoothed(const Filtered& filtered) {
   return result;
 }
 
-/// The share of the measured covariances that the scatter of the frames does not show: errors that
+/// The shares of the measured covariances that the scatter of the frames does not show: errors that
 /// neighbouring frames share, which are not smoothed away. A frame without a pose has those of the measured
 /// one before it.
-void add_shared(std::vector<FramePose>& frames, std::span<const std::optional<Measured>> measured,
-                double share) {
-  Matrix6 shared =
-      (*std::ranges::find_if(measured, [](const auto& each) { return each.has_value(); }))->covariance;
+void add_shared(std::vector<FramePose>& frames, std::span<const std::optional<FramePose>> measured,
+                double turn_variance, double shift_variance) {
+  Vector6 roots;
+  roots << Eigen::Vector3d::Constant(std::sqrt(std::max(0.0, 1 - turn_variance))),
+      Eigen::Vector3d::Constant(std::sqrt(std::max(0.0, 1 - shift_variance)));
+  const FramePose* last =
+      &**std::ranges::find_if(measured, [](const auto& each) { return each.has_value(); });
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (measured[i]) shared = measured[i]->covariance;
-    frames[i].covariance += share * shared;
+    if (measured[i]) last = &*measured[i];
+    frames[i].covariance += roots.asDiagonal() * last->covariance * roots.asDiagonal();
+    frames[i].common = last->common;
   }
 }
 
@@ -229,17 +260,20 @@ std::optional<SmoothMotion> smooth_poses(std::span<const double> times,
   }
   if (!is_enough(states)) return std::nullopt;
   SmoothMotion motion;
-  motion.prior = likeliest(times, states, true, scale);
-  const Filtered filtered = filter(times, states, motion.prior, true, true);
+  const Model model = likeliest(times, states, true, scale);
+  motion.prior = model;
+  const Filtered filtered = filter(times, scaled(states, model.ratio), model, true, true);
   const double factor = filtered.variance_factor(scale);
   for (const Smoothed& frame : smoothed(filtered))
     motion.frames.push_back(
         {{frame.state.rotation, frame.state.centre - frame.state.rotation * centre_in_body},
          factor * frame.covariance});
-  if (factor < 1) add_shared(motion.frames, states, 1 - factor);
+  const double shift_factor = factor * model.ratio * model.ratio;
+  add_shared(motion.frames, measured, factor, shift_factor);
   motion.prior.turn *= factor;
   motion.prior.shift *= factor;
-  motion.noise_factor = std::sqrt(factor);
+  motion.turn_noise_factor = std::sqrt(factor);
+  motion.noise_factor = std::sqrt(shift_factor);
   return motion;
 }
 

@@ -17,6 +17,8 @@ namespace helicarm::track {
 struct FramePose {
   geometry::RigidTransform pose;
   registration::RigidCovariance covariance = registration::RigidCovariance::Zero();
+  /// What one error that all frames share, of one standard deviation, moves the pose by; not in `covariance`.
+  registration::RigidStep common = registration::RigidStep::Zero();
 };
 
 /// Power of the white jerk: rad^2 and mm^2 per frame^5.
@@ -28,12 +30,13 @@ struct MotionPrior {
 struct SmoothMotion {
   std::vector<FramePose> frames;
   MotionPrior prior;
-  double noise_factor = 1;  ///< of the measured poses' standard deviations
+  double noise_factor = 1, turn_noise_factor = 1;  ///< of the measured places' and turns' standard deviations
 };
 
-/// Measured covariances as they are stated, or multiplied by one factor, which then has the largest
-/// likelihood with the prior (1 for fewer than ten measured frames). A factor below 1 leaves a rest: errors
-/// that neighbouring frames share, which stay in the result's covariance.
+/// Measured covariances as they are stated, or with standard deviations multiplied by one factor for places
+/// and one for turns, which then have the largest likelihood with the prior (1 for fewer than ten measured
+/// frames). A factor below 1 leaves a rest: errors that neighbouring frames share, which stay in the result's
+/// covariance.
 enum class NoiseScale { stated, by_data };
 
 /// One estimate over all frames: rotation and the centre's place with white jerk, whose size has the largest

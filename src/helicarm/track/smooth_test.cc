@@ -95,6 +95,27 @@ TEST(Smooth, ErrorsThatTheScatterDoesNotShowStayInTheBands) {
   EXPECT_GT(motion->frames[50].covariance(3, 3), 0.8 * data.measured[50]->covariance(3, 3));
 }
 
+TEST(Smooth, PlacesAndTurnsHaveFactorsOfTheirOwn) {
+  int inside = 0, all = 0;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    Data data = measured_at(100, -1, -1, seed);
+    registration::RigidStep factors;
+    factors << Eigen::Vector3d::Constant(1.0 / 3), Eigen::Vector3d::Constant(3);
+    for (auto& pose : data.measured)
+      pose->covariance = factors.asDiagonal() * pose->covariance * factors.asDiagonal();
+    const auto motion = smooth_poses(data.times, data.measured, centre, NoiseScale::by_data);
+    ASSERT_TRUE(motion);
+    EXPECT_NEAR(motion->turn_noise_factor, 3, 0.5);
+    EXPECT_NEAR(motion->noise_factor, 1.0 / 3, 0.06);
+    for (std::size_t i = 0; i < data.times.size(); ++i) {
+      const auto off = error_of(motion->frames[i], data.times[i]);
+      for (int k = 0; k < 3; ++k, ++all)
+        inside += std::abs(off[k]) < 1.96 * std::sqrt(motion->frames[i].covariance(k, k));
+    }
+  }
+  EXPECT_NEAR(double(inside) / all, 0.95, 0.04);
+}
+
 TEST(Smooth, GapIsFilledWithAWidthThatGrows) {
   const Data data = measured_at(80, 40, 51, 9);
   const auto motion = smooth_poses(data.times, data.measured, centre);
