@@ -323,4 +323,10 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
                                               : Decision::warn;
 }
 
+bool may_have_missed(const Registration& result) {
+  return result.failure &&
+         (result.failure->reason == Reason::wrong_model || result.failure->reason == Reason::out_of_capture ||
+          result.failure->reason == Reason::registration_ambiguous);
+}
+
 }  // namespace helicarm::registration

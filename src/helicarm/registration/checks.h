@@ -37,4 +37,7 @@ double edge_variance_ratio(const Observation& observation, const ErrorModel& err
 void decide(const Model& model, const std::vector<geometry::RigidTransform>& starts,
             const RegistrationOptions& options, Registration& result);
 
+/// Whether the search of a refused registration may have missed the solution.
+bool may_have_missed(const Registration& result);
+
 }  // namespace helicarm::registration

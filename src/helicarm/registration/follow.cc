@@ -2,9 +2,13 @@
 #include "helicarm/registration/follow.h"
 
 #include <algorithm>
+#include <bit>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/registration/checks.h"
 
 namespace helicarm::registration {
 
@@ -13,6 +17,17 @@ using geometry::RigidTransform;
 namespace {
 
 constexpr double longest_extrapolation = 2;  // of the last interval, after refused images
+
+Warning jump(const Registration& result, double distance_mm) {
+  return {
+      Reason::out_of_capture,
+      fmt::format(
+          "{}: jumps: the search about the expected pose was refused, and this pose, {:.1f} mm from it, is "
+          "that of a search over every orientation and position",
+          result.name, distance_mm),
+      {},
+      {{"distance_mm", distance_mm}}};
+}
 
 }  // namespace
 
@@ -28,29 +43,49 @@ std::optional<RigidTransform> Follower::predicted(double time) const {
                      std::min(intervals, longest_extrapolation) * step);
 }
 
-Registration Follower::next(const std::vector<RegistrationView>& views, double time) {
+/// About the poses that the motion expects.
+Registration Follower::near(const std::vector<RegistrationView>& views,
+                            const RigidTransform& expected) const {
   Registration result;
-  if (const auto expected = predicted(time)) {
-    RegistrationOptions narrow = options_;
-    narrow.search.candidates = 0;
-    if (before_) result = register_model(*model_, views, {*expected, last_->pose}, narrow);
-    if (!before_ || result.failure || result.agree < 2) {
-      RegistrationOptions wide = options_;
-      wide.search.candidates = SearchOptions{}.candidates;
-      wide.search.anywhere_after_refusal = false;
-      const double spent_s = result.seconds;
-      result = register_model(*model_, views, {*expected}, wide);
-      result.seconds += spent_s;
+  RegistrationOptions narrow = options_;
+  narrow.search.candidates = 0;
+  if (before_) result = register_model(*model_, views, {expected, last_->pose}, narrow);
+  if (before_ && !result.failure && result.agree >= 2) return result;
+  RegistrationOptions wide = options_;
+  wide.search.candidates = SearchOptions{}.candidates;
+  wide.search.anywhere_after_refusal = false;
+  const double spent_s = result.seconds;
+  result = register_model(*model_, views, {expected}, wide);
+  result.seconds += spent_s;
+  return result;
+}
+
+Registration Follower::next(const std::vector<RegistrationView>& views, double time) {
+  const auto expected = predicted(time);
+  Registration result = expected ? near(views, *expected) : register_model(*model_, views, starts_, options_);
+  if (expected && views.size() > 1 && options_.search.anywhere_after_refusal && may_have_missed(result) &&
+      std::has_single_bit(refused_ + 1)) {
+    Registration sought = register_model(*model_, views, {}, options_);
+    result.seconds += sought.seconds;
+    if (!sought.failure) {
+      sought.seconds = result.seconds;
+      sought.decision = std::max(sought.decision, Decision::warn);
+      sought.warnings.push_back(jump(sought, separation(*model_, *expected, sought.world_from_model)));
+      result = std::move(sought);
     }
-  } else {
-    result = register_model(*model_, views, starts_, options_);
   }
   take(result, time);
   return result;
 }
 
 void Follower::take(const Registration& result, double time) {
-  if (!result.failure) before_ = std::exchange(last_, Timed{time, result.world_from_model});
+  if (result.failure) {
+    ++refused_;
+    return;
+  }
+  refused_ = 0;
+  before_ = result.anywhere ? std::nullopt : last_;
+  last_ = Timed{time, result.world_from_model};
 }
 
 RelativePose relative_pose(const Registration& reference, const Registration& model) {

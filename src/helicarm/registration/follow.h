@@ -9,13 +9,17 @@ namespace helicarm::registration {
 
 /// Follows a body through images of views that stay where they are. The first image is registered from the
 /// starts; each further one from the pose at constant velocity and from the last pose, or, where these are
-/// refused or end differently, by a search about the former.
+/// refused or end differently, by a search about the former. Where that is refused too, in two views or more,
+/// every orientation and position is searched: a body that jumps is found again. Of the images in a row that
+/// are refused only the first, second, fourth, eighth, ... are searched so, which a body that left costs
+/// little.
 class Follower {
  public:
   /// `model` must outlive the follower.
   Follower(const Model& model, std::vector<geometry::RigidTransform> starts, RegistrationOptions options);
 
-  /// Registers the next images; `time` (in any unit) increases. A refused result does not change the motion.
+  /// Registers the next images; `time` (in any unit) increases. A refused result does not change the motion,
+  /// and one that was found anywhere begins another.
   Registration next(const std::vector<RegistrationView>& views, double time);
 
   /// Goes on from an earlier result at its time, as if `next` had given it.
@@ -32,7 +36,11 @@ class Follower {
   const Model* model_;
   std::vector<geometry::RigidTransform> starts_;
   RegistrationOptions options_;
-  std::optional<Timed> last_, before_;  ///< the newest two that were not refused
+  Registration near(const std::vector<RegistrationView>& views,
+                    const geometry::RigidTransform& expected) const;
+
+  std::optional<Timed> last_, before_;  ///< the newest two that were not refused, of one motion
+  unsigned refused_ = 0;                ///< in a row
 };
 
 /// A body's pose in the coordinates of another, the reference.

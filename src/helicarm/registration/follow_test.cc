@@ -69,6 +69,36 @@ TEST(Follower, RefusesImagesWithoutTheBodyAndFindsItAgain) {
   EXPECT_LT(separation(model, again.world_from_model, pose_at(3)), 0.4);
 }
 
+TEST(Follower, FindsABodyThatJumps) {
+  const Model model = bone();
+  Follower follower(model, {pose_at(0)}, follow_options());
+  for (const int frame : {0, 1}) follower.next(two_views(lopsided_bone(), pose_at(frame)), frame);
+  RigidStep step;
+  step << 0.5, -0.4, 0.3, 12, -9, 8;
+  const RigidTransform there = moved_about(pose_at(1), pose_at(1) * model.centre, step);
+  const auto found = follower.next(two_views(lopsided_bone(), there), 2);
+  ASSERT_FALSE(found.failure) << found.failure->message;
+  EXPECT_LT(separation(model, found.world_from_model, there), 0.4);
+  EXPECT_EQ(found.decision, Decision::warn);
+  EXPECT_EQ(found.warnings.back().reason, Reason::out_of_capture);
+  // The jump is no velocity.
+  EXPECT_LT(separation(model, *follower.predicted(3), there), 0.4);
+}
+
+TEST(Follower, SearchesAnywhereEverMoreRarelyWhileTheBodyIsGone) {
+  const Model model = bone();
+  Follower follower(model, {pose_at(0)}, follow_options());
+  follower.next(two_views(lopsided_bone(), pose_at(0)), 0);
+  Registration refused;
+  refused.failure = Failure{Reason::wrong_model, "", {}, {}};
+  for (int frame = 1; frame <= 2; ++frame) follower.take(refused, frame);
+  RigidStep step;
+  step << 0.5, -0.4, 0.3, 12, -9, 8;
+  const auto views = two_views(lopsided_bone(), moved_about(pose_at(0), pose_at(0) * model.centre, step));
+  EXPECT_TRUE(follower.next(views, 3).failure);
+  EXPECT_TRUE(follower.next(views, 4).anywhere);
+}
+
 TEST(RelativePose, HasTheErrorsOfBothBodies) {
   Registration reference, model;
   reference.world_from_model = true_pose();

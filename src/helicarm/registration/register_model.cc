@@ -190,13 +190,6 @@ Search searched_about(RegistrationProblem& scene, const std::vector<RigidTransfo
   return made;
 }
 
-/// Whether the search may have missed the solution.
-bool may_have_missed(const Registration& result) {
-  return result.failure &&
-         (result.failure->reason == Reason::wrong_model || result.failure->reason == Reason::out_of_capture ||
-          result.failure->reason == Reason::registration_ambiguous);
-}
-
 Warning found_anywhere(const Registration& before, const Registration& result, double distance_mm) {
   return {Reason::out_of_capture,
           fmt::format("{}: the search about the start was refused ({}); the pose is that of a search over "
