@@ -8,6 +8,8 @@
 #include "command_line.h"
 #include "findings.h"
 #include "helicarm/core/json.h"
+#include "helicarm/core/text.h"
+#include "helicarm/devices/tracker/sequence_file.h"
 #include "helicarm/exchange/import_matrix.h"
 #include "helicarm/exchange/itk_transform.h"
 #include "helicarm/exchange/matrix_transform.h"
@@ -72,6 +74,27 @@ void print_matrix(const geometry::RigidTransform& transform, Console& console) {
               << back.format(rows) << '\n';
 }
 
+/// Whether the file is a sequence of transforms by its name.
+bool is_sequence(const std::filesystem::path& file) {
+  return file.extension() == ".mha" || file.extension() == ".mhd";
+}
+
+void print_sequence(const tracker::TransformSequence& sequence, Console& console) {
+  if (console.json) {
+    Json transforms = Json::object();
+    for (const auto& [name, of] : sequence.transforms) {
+      Json& list = transforms[name] = Json::array();
+      for (const auto& pose : of) list.push_back(pose ? geometry::json_rows(pose->matrix()) : Json(nullptr));
+    }
+    console.out << to_text(Json{{"index", sequence.index}, {"transforms", std::move(transforms)}}) << '\n';
+    return;
+  }
+  console.out << fmt::format("{} items (LPS, mm, to parent)\n", sequence.index.size());
+  for (const auto& [name, of] : sequence.transforms)
+    console.out << fmt::format("{}: {} poses\n", without_control_characters(name),
+                               std::ranges::count_if(of, [](const auto& pose) { return pose.has_value(); }));
+}
+
 /// One camera, or the list of several.
 void print_cameras(const std::vector<exchange::ImportedMatrix>& cameras, Console& console) {
   if (!console.json)
@@ -132,6 +155,15 @@ CommandResult import_command(const ImportArguments& arguments, Console& console)
   if (!arguments.image_size.empty()) options.image_size = {arguments.image_size[0], arguments.image_size[1]};
   if (!arguments.pixel_mm.empty()) options.pixel_mm = {arguments.pixel_mm[0], arguments.pixel_mm[1]};
   if (!arguments.origin_mm.empty()) options.origin_mm = {arguments.origin_mm[0], arguments.origin_mm[1]};
+  if (is_sequence(arguments.file)) {
+    auto sequence = tracker::read_slicer_sequence(arguments.file);
+    if (!sequence) return tl::unexpected<Failure>(sequence.error());
+    for (auto& [name, of] : sequence->transforms)
+      for (auto& pose : of)
+        if (pose) pose->translation *= mm->value_or(1);
+    print_sequence(*sequence, console);
+    return {};
+  }
   for (const auto& [read, print] : {std::pair{&exchange::read_itk_transform, &print_transform},
                                     {&exchange::read_matrix_transform, &print_matrix}}) {
     if (std::filesystem::is_directory(arguments.file)) break;
@@ -157,7 +189,8 @@ void add_import(CLI::App& app, Action& action) {
       "  helicarm import MergedDlts.csv --column 2 --image-size 1760,1700 --json\n"
       "  helicarm import geometry.xml --pixel-mm 0.388,0.388 --image-size 1024,768 --json\n"
       "  helicarm import my-geometry/geometry/astra.txt --image-size 976,976 --json\n"
-      "  helicarm import femur.tfm --json");
+      "  helicarm import femur.tfm --json\n"
+      "  helicarm import my-motion/smoothed.seq.mha --json");
   auto& a = arguments_of(command, action, import_command);
   command
       ->add_option(
@@ -165,7 +198,9 @@ void add_import(CLI::App& app, Action& action) {
           "MayaCam 1 or 2, NRRD header, OpenCV (YAML, XML, JSON), a 3x4 matrix as text or JSON, XMALab's DLT "
           "coefficients, plastimatch's projection matrix; of a whole run RTK (XML), TIGRE, LEAP, DiffDRR, "
           "DeepDRR (JSON), ASTRA's vectors, .ompl, matrices.csv, .npy, or a folder with a file for each "
-          "camera; an ITK transform (.tfm, .h5), or a rigid 4x4 matrix")
+          "camera; an ITK transform (.tfm, .h5), a rigid 4x4 matrix, or a sequence of transforms of 3D "
+          "Slicer "
+          "(.seq.mha, RAS, as track and register write it)")
       ->required();
   command
       ->add_option("--unit", a.unit,

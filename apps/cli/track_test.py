@@ -292,6 +292,18 @@ class Track(unittest.TestCase):
                 sign = -1 if (i // 4 < 2) != (i % 4 < 2) else 1  # of RAS against LPS
                 self.assertAlmostEqual(number, sign * float(row[f"m{i // 4 + 1}{i % 4 + 1}"]), places=9)
 
+    def test_sequence_of_slicer_is_read_back(self):
+        done = subprocess.run([PROGRAM, "import", self.root / "out" / "smoothed.seq.mha", "--json"], capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        read = json.loads(done.stdout)
+        self.assertEqual(read["index"], list(range(1, FRAMES + 1)))
+        rows = table(self.root / "out" / "smoothed.csv")
+        self.assertEqual(set(read["transforms"]), {f"{row['body']}ToWorld" for row in rows})
+        for row in rows:
+            matrix = read["transforms"][f"{row['body']}ToWorld"][int(row["frame"]) - 1]
+            for i in range(16):
+                self.assertAlmostEqual(matrix[i // 4][i % 4], float(row[f"m{i // 4 + 1}{i % 4 + 1}"]), places=8)
+
     def test_distortion_map_beside_a_camera_is_used(self):
         grid = [(u, v) for v in range(-20, SIZE + 21, 9) for u in range(-20, SIZE + 21, 9)]
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "arrays.h"
 #include "checks.h"
+#include "helicarm/devices/tracker/sequence_file.h"
 #include "helicarm/exchange/import_matrix.h"
 #include "helicarm/exchange/itk_transform.h"
 #include "helicarm/exchange/matrix_transform.h"
@@ -82,8 +83,32 @@ Camera camera_of_file(const std::filesystem::path& path, const std::optional<std
       path, {mm_of(unit), column, size_of(shape), pair(pixel_mm), pair(origin_mm), undistorted}));
 }
 
+/// (N, 4, 4) of each name; nan where there is none.
+py::dict sequence_of_file(const std::filesystem::path& path, double mm) {
+  const tracker::TransformSequence read = value_or_raise(tracker::read_slicer_sequence(path));
+  py::dict answer, transforms;
+  for (const auto& [name, of] : read.transforms) {
+    Doubles matrices({py::ssize_t(of.size()), py::ssize_t(4), py::ssize_t(4)});
+    auto at = matrices.mutable_unchecked<3>();
+    for (std::size_t f = 0; f < of.size(); ++f) {
+      Eigen::Matrix4d matrix = Eigen::Matrix4d::Constant(std::numeric_limits<double>::quiet_NaN());
+      if (of[f]) {
+        matrix = of[f]->matrix();
+        matrix.topRightCorner<3, 1>() *= mm;
+      }
+      for (int i = 0; i < 16; ++i) at(py::ssize_t(f), i / 4, i % 4) = matrix(i / 4, i % 4);
+    }
+    transforms[py::str(name)] = matrices;
+  }
+  answer["index"] = py::array_t<double>(py::ssize_t(read.index.size()), read.index.data());
+  answer["transforms"] = transforms;
+  return answer;
+}
+
 py::dict transform_of_file(const std::filesystem::path& path, const std::optional<std::string>& unit) {
   py::dict answer;
+  if (path.extension() == ".mha" || path.extension() == ".mhd")
+    return sequence_of_file(path, mm_of(unit).value_or(1));
   const auto add = [&](geometry::RigidTransform transform, const char* forward, const char* back) {
     transform.translation *= mm_of(unit).value_or(1);
     answer[forward] = matrix_array(transform.matrix());
@@ -211,10 +236,11 @@ undistorted: the images are free of distortion, a lens distortion that the file 
 Raises InputError: missing_file, truncated, bad_json, bad_value, not_finite, bad_size, unsupported, usage.)");
   module.def(
       "import_transform", &transform_of_file, py::arg("path"), py::kw_only(), py::arg("unit") = py::none(),
-      R"(The rigid transform of an ITK file (.tfm, .txt, .h5) or of a 4 x 4 matrix, as `helicarm import` reads it.
+      R"(The rigid transform of an ITK file (.tfm, .txt, .h5) or of a 4 x 4 matrix, or a sequence of them, as `helicarm import` reads it.
 
 unit: the file's unit of length. Returns {"moving_from_fixed", "fixed_from_moving"} of an ITK file (LPS, mm), {"matrix",
-"inverse"} of a matrix: (4, 4). Raises InputError as import_camera.)");
+"inverse"} of a matrix: (4, 4). Of a sequence of transforms of 3D Slicer (.seq.mha; RAS, to parent): {"index": (N,), "transforms":
+{name: (N, 4, 4)}}, LPS, nan where there is none. Raises InputError as import_camera.)");
   module.def("_dlt", &dlt);
 }
 

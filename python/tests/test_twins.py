@@ -127,6 +127,17 @@ def test_import_gives_the_same_transform(tmp_path):
         helicarm.import_transform(tmp_path / "t.tfm")
 
 
+def test_import_gives_the_same_sequence(tmp_path):
+    file = tmp_path / "s.seq.mha"
+    file.write_text("Seq_Frame0000_jawToWorldTransform = 0 -1 0 10 1 0 0 20 0 0 1 30 0 0 0 1\nSeq_Frame0000_Timestamp = 1\n"
+                    "Seq_Frame0001_jawToWorldTransformStatus = INVALID\nSeq_Frame0001_Timestamp = 2\nElementDataFile = LOCAL\n")
+    answer = json.loads(program("import", file, "--json"))
+    found = helicarm.import_transform(file)
+    assert found["index"].tolist() == answer["index"] == [1, 2]
+    assert found["transforms"]["jawToWorld"][0].tolist() == answer["transforms"]["jawToWorld"][0]
+    assert np.isnan(found["transforms"]["jawToWorld"][1]).all() and answer["transforms"]["jawToWorld"][1] is None
+
+
 def test_export_writes_the_same_files(case, result, tmp_path):
     program("export", case[0], "--out", tmp_path / "program", "--as", "csv,opencv,npy", "--quiet")
     written = result.export(tmp_path / "python", ["csv", "opencv", "npy"])

@@ -111,6 +111,25 @@ std::vector<SequenceFrame> parse_sequence(std::string_view text) {
   return frames;
 }
 
+/// A matrix of RAS as a motion of LPS.
+geometry::RigidTransform lps_motion(const Eigen::Matrix4d& ras, const std::filesystem::path& path,
+                                    const std::string& name, int item) {
+  constexpr double rounded = 1e-4;
+  const Eigen::DiagonalMatrix<double, 4> lps_from_ras(-1, -1, 1, 1);
+  const Eigen::Matrix4d matrix = lps_from_ras * ras * lps_from_ras;
+  const geometry::RigidTransform motion{matrix.topLeftCorner<3, 3>(), matrix.topRightCorner<3, 1>()};
+  const bool is_rigid = matrix.allFinite() && matrix.row(3) == Eigen::RowVector4d(0, 0, 0, 1) &&
+                        (motion.rotation * motion.rotation.transpose()).isIdentity(rounded) &&
+                        motion.rotation.determinant() > 0;
+  if (!is_rigid)
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("{}: item {}: \"{}\" is no rigid motion (rows of a rotation, last row "
+                    "0 0 0 1)",
+                    without_control_characters(path.string()), item, without_control_characters(name)));
+  return motion;
+}
+
 bool is_word(std::string_view name) {
   return !name.empty() &&
          std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) || c == '_'; });
@@ -145,6 +164,26 @@ Expected<std::vector<SequenceFrame>> read_sequence(const std::filesystem::path& 
       failure.message = without_control_characters(path.string()) + ": " + failure.message;
       throw BadInput(std::move(failure));
     }
+  });
+}
+
+Expected<TransformSequence> read_slicer_sequence(const std::filesystem::path& path) {
+  return guarded([&] {
+    const std::vector<SequenceFrame> frames = value_or_throw(read_sequence(path));
+    TransformSequence read;
+    for (const SequenceFrame& frame : frames) {
+      for (const auto& [name, pose] : frame.poses) {
+        auto& of = read.transforms[name];
+        of.resize(read.index.size());
+        of.push_back(pose.visible ? std::optional(lps_motion(pose.matrix, path, name, int(read.index.size())))
+                                  : std::nullopt);
+      }
+      read.index.push_back(frame.time_s);
+    }
+    for (auto& [name, of] : read.transforms) of.resize(read.index.size());
+    if (read.transforms.empty())
+      throw BadInput(Reason::no_pose, without_control_characters(path.string()) + ": holds no transforms");
+    return read;
   });
 }
 

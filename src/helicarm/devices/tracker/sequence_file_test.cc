@@ -100,5 +100,29 @@ TEST_F(SequenceFile, InvalidNameIsRefused) {
   EXPECT_EQ(write_sequence(path_, {frame}).error().reason, Reason::bad_value);
 }
 
+TEST_F(SequenceFile, TransformsOfSlicerAreTurnedToLps) {
+  const std::string jaw = "_jawToWorldTransform = 0 -1 0 10 1 0 0 20 0 0 1 30 0 0 0 1\n";
+  ASSERT_TRUE(write_file(
+      path_, "Seq_Frame0000" + jaw + "Seq_Frame0000_Timestamp = 5\n" +
+                 "Seq_Frame0001_jawToWorldTransformStatus = INVALID\nSeq_Frame0001_Timestamp = 6\n" +
+                 "Seq_Frame0002" + jaw + "Seq_Frame0002_Timestamp = 7\n" + end_line));
+  const auto read = read_slicer_sequence(path_);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->index, (std::vector<double>{5, 6, 7}));
+  const auto& of = read->transforms.at("jawToWorld");
+  ASSERT_EQ(of.size(), 3u);
+  EXPECT_FALSE(of[1]);
+  EXPECT_EQ(of[2]->translation, Eigen::Vector3d(-10, -20, 30));
+  EXPECT_EQ(of[2]->rotation * Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY());
+}
+
+TEST_F(SequenceFile, SequencesThatAreNoMotionsAreRefused) {
+  ASSERT_TRUE(write_file(path_, time_line + end_line));
+  EXPECT_EQ(read_slicer_sequence(path_).error().reason, Reason::no_pose);
+  ASSERT_TRUE(write_file(
+      path_, "Seq_Frame0000_aTransform = 2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 1\n" + time_line + end_line));
+  EXPECT_EQ(read_slicer_sequence(path_).error().reason, Reason::bad_value);
+}
+
 }  // namespace sequence_file_test
 }  // namespace helicarm::tracker
