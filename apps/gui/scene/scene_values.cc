@@ -38,17 +38,9 @@ Vector3d on_detector(const ViewShape& shape, const Vector2d& pixel) {
 }
 
 ViewShape shape_of(const pipeline::ViewResult& view, const Vector3d& middle) {
-  const geometry::View& calibrated = view.calibrated->view;
-  ViewShape shape{view.name, calibrated, {1024, 1024}, {}, {}};
-  if (view.xray_image) shape.size_px = {view.xray_image->pixels.width(), view.xray_image->pixels.height()};
-  const Vector3d source = calibrated.source_in_world();
-  const Vector3d beam = calibrated.camera_from_world.rotation.row(2).transpose();
-  shape.central_ray = {source, source + detector_depth(view, middle) * beam};
-  const Vector2d last = shape.size_px.array() - 0.5;
-  const std::array<Vector2d, 4> corners{
-      {{-0.5, -0.5}, {last.x(), -0.5}, {last.x(), last.y()}, {-0.5, last.y()}}};
-  for (std::size_t i = 0; i < 4; ++i) shape.detector[i] = on_detector(shape, corners[i]);
-  return shape;
+  Vector2d size_px(1024, 1024);
+  if (view.xray_image) size_px = {view.xray_image->pixels.width(), view.xray_image->pixels.height()};
+  return view_shape(view.name, view.calibrated->view, size_px, detector_depth(view, middle));
 }
 
 PointShape shape_of(const pipeline::PointResult& point, const pipeline::Result& result,
@@ -66,6 +58,19 @@ PointShape shape_of(const pipeline::PointResult& point, const pipeline::Result& 
 }
 
 }  // namespace
+
+ViewShape view_shape(const std::string& name, const geometry::View& view, const Vector2d& size_px,
+                     double depth_mm) {
+  ViewShape shape{name, view, size_px, {}, {}};
+  const Vector3d source = view.source_in_world();
+  const Vector3d beam = view.camera_from_world.rotation.row(2).transpose();
+  shape.central_ray = {source, source + depth_mm * beam};
+  const Vector2d last = shape.size_px.array() - 0.5;
+  const std::array<Vector2d, 4> corners{
+      {{-0.5, -0.5}, {last.x(), -0.5}, {last.x(), last.y()}, {-0.5, last.y()}}};
+  for (std::size_t i = 0; i < 4; ++i) shape.detector[i] = on_detector(shape, corners[i]);
+  return shape;
+}
 
 Ellipsoid ellipsoid_95(const Vector3d& centre, const Eigen::Matrix3d& covariance) {
   const auto [values, vectors] = geometry::symmetric_eigen(covariance);

@@ -61,6 +61,10 @@ struct TunnelShape {
   bool is_breach = false, is_thin = false;  ///< of a plan, against the bone
 };
 
+/// `depth_mm`: of the drawn image from the source, along the central ray.
+ViewShape view_shape(const std::string& name, const geometry::View& view, const Eigen::Vector2d& size_px,
+                     double depth_mm);
+
 /// The displayed parts of a result; missing ones are absent.
 struct ResultScene {
   std::vector<phantom::CalibratorBall> balls;

@@ -69,8 +69,13 @@ void SceneView::redraw() {
 
 void SceneView::show_result(const std::shared_ptr<const pipeline::Result>& result,
                             const phantom::Calibrator& calibrator, bool keeps_camera) {
-  scene_ = result ? scene_of(*result, calibrator) : ResultScene{};
-  middle_ = phantom::middle_of(calibrator);
+  show_scene(result ? scene_of(*result, calibrator) : ResultScene{}, phantom::middle_of(calibrator),
+             keeps_camera);
+}
+
+void SceneView::show_scene(ResultScene scene, const Eigen::Vector3d& middle, bool keeps_camera) {
+  scene_ = std::move(scene);
+  middle_ = middle;
   result_changed_ = live_changed_ = true;
   if (keeps_camera) return redraw();
   set_preset(preset_);

@@ -40,6 +40,8 @@ class SceneView : public QWidget {
   /// Null clears the scene. The live part stays.
   void show_result(const std::shared_ptr<const pipeline::Result>& result,
                    const phantom::Calibrator& calibrator, bool keeps_camera = false);
+  /// Parts of another world, seen about `middle`.
+  void show_scene(ResultScene scene, const Eigen::Vector3d& middle, bool keeps_camera = false);
   /// In amber in the upper left corner; empty: none.
   void set_notice(const QString& notice);
   void show_parts(SceneParts parts);
@@ -116,7 +118,7 @@ class SceneView : public QWidget {
   std::vector<SceneLabel> labels() const;
 
   ResultScene scene_;
-  Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();  ///< of the calibrator's balls
+  Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();  ///< of the calibrator's balls, or of the shown scene
   std::optional<BoneMeshes> bones_;
   std::vector<ModelShape> models_;
   ModelSurfaces surfaces_;

@@ -9,11 +9,13 @@
 #include <QVBoxLayout>
 
 #include "gui/replay/print_svg.h"
+#include "gui/scene/scene_view.h"
 #include "gui/window/sequence_window.h"
 #include "gui/window/style.h"
 #include "gui/xray/text.h"
 #include "gui/xray/xray_view.h"
 #include "helicarm/localization/error_bound.h"
+#include "helicarm/track/body_pose.h"
 #include "helicarm/track/track.h"
 
 namespace helicarm::gui {
@@ -70,6 +72,7 @@ SequenceWindow::SequenceWindow(QWidget* parent) : QDialog(parent) {
   tabs->setObjectName("sequenceTabs");
   tabs->addTab(build_tables(), tr("&Markers"));
   tabs->addTab(build_curves(), tr("&Curves"));
+  tabs->addTab(build_scene(), tr("&Scene"));
   column->addWidget(tabs, 2);
   connect(&clock_, &QTimer::timeout, this, &SequenceWindow::play_on);
   clock_.setInterval(film_ms);
@@ -171,6 +174,83 @@ QWidget* SequenceWindow::build_curves() {
   return whole;
 }
 
+QWidget* SequenceWindow::build_scene() {
+  scene_ = new SceneView;
+  scene_->setObjectName("sequenceScene");
+  scene_->setAccessibleName(tr("Cameras, markers with their 95 % errors, and bodies in the displayed frame"));
+  return scene_;
+}
+
+/// Of the displayed frame; the camera stays while the case is the same.
+void SequenceWindow::show_scene() {
+  if (!shown_ || !shown_->sequence || displayed_ < 0) return scene_->show_scene({}, Eigen::Vector3d::Zero());
+  std::vector<Eigen::Vector3d> places;
+  for (const track::TrackedMarker& marker : shown_->sequence->markers.front())
+    if (marker.place) places.push_back(marker.place->place);
+  scene_->show_scene(scene_of_frame(*shown_, std::size_t(displayed_)),
+                     places.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(geometry::mean_of(places)),
+                     has_scene_);
+  has_scene_ = true;
+}
+
+ResultScene scene_of_frame(const FollowedSequence& followed, std::size_t number) {
+  constexpr double beyond = 1.5, rod_mm = 0.4;  // of the drawn images' depth
+  const track::Sequence& sequence = *followed.sequence;
+  ResultScene scene;
+  std::vector<Eigen::Vector3d> places;
+  for (std::size_t m = 0; m < followed.given.markers.size(); ++m)
+    if (const auto& place = sequence.markers[number][m].place) {
+      places.push_back(place->place);
+      scene.points.push_back({followed.given.markers[m],
+                              localization::PointSource::pick,
+                              {},
+                              ellipsoid_95(place->place, place->covariance),
+                              {}});
+    }
+  const Eigen::Vector3d middle =
+      places.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(geometry::mean_of(places));
+  for (const track::TrackView& view : followed.given.views) {
+    const Eigen::Vector2d size_px =
+        view.image_size ? view.image_size->cast<double>() : Eigen::Vector2d(1024, 1024);
+    scene.views.push_back(
+        view_shape(view.images.name, view.camera, size_px, beyond * view.camera.depth(middle)));
+  }
+  for (std::size_t b = 0; b < sequence.bodies.size(); ++b) {
+    const track::BodySequence& body = sequence.bodies[b];
+    const auto& pose = body.smoothed[number].pose;
+    if (!pose) continue;
+    for (std::size_t i = 0; i < body.markers.size(); ++i)
+      for (std::size_t k = i + 1; k < body.markers.size(); ++k)
+        scene.tunnels.push_back(
+            {i == 0 && k == 1 ? followed.given.bodies[b].name : std::string(),
+             {},
+             {pose->pose * body.markers[i].in_body.place, pose->pose * body.markers[k].in_body.place},
+             rod_mm});
+  }
+  return scene;
+}
+
+std::vector<report::Chart> marked_at(std::vector<report::Chart> charts, int frame) {
+  for (report::Chart& chart : charts) {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    const auto include = [&](double y) {
+      if (std::isfinite(y)) low = std::min(low, y), high = std::max(high, y);
+    };
+    for (const report::ChartSeries& series : chart.series) {
+      for (const auto& point : series.points) include(point[1]);
+      for (const auto& range : series.ranges)
+        for (const double y : range) include(y);
+    }
+    if (chart.y_range) low = chart.y_range->front(), high = chart.y_range->back();
+    if (low <= high) {
+      report::ChartSeries& line = chart.series.emplace_back();
+      line.points = {{double(frame), low}, {double(frame), high}};
+      line.dashed = true;
+    }
+  }
+  return charts;
+}
+
 /// Those of the report.
 void SequenceWindow::show_curves() {
   const auto sheets = shown_ && shown_->sequence ? track::curve_sheets(*shown_->sequence, shown_->given)
@@ -182,7 +262,9 @@ void SequenceWindow::show_curves() {
   if (sheets.empty()) return curves_->show_svg({});
   const int at = std::min(chosen, int(sheets.size()) - 1);
   sheet_->setCurrentIndex(at);
-  const auto& charts = sheets[std::size_t(at)].charts;
+  auto charts = sheets[std::size_t(at)].charts;
+  if (displayed_ >= 0)
+    charts = marked_at(std::move(charts), shown_->sequence->frames[std::size_t(displayed_)]);
   curves_->show_svg(chart_document(report::chart_svg(charts, charts.size())));
 }
 
@@ -267,6 +349,8 @@ void SequenceWindow::mark_frame() {
     const track::TrackedMarker& now = shown_->sequence->markers[std::size_t(displayed_)][std::size_t(row)];
     markers_->setItem(row, 1, cell_of(words_of_marker(now), now.status != track::MarkerStatus::tracked));
   }
+  show_curves();
+  show_scene();
 }
 
 }  // namespace helicarm::gui

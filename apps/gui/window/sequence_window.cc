@@ -91,6 +91,7 @@ SequenceWindow::~SequenceWindow() { *stopped_ = true; }
 
 void SequenceWindow::open_case(const fs::path& folder, const QString& frames) {
   folder_ = folder;
+  has_scene_ = false;
   frames_->setText(frames);
   setWindowTitle(tr("Sequence: %1").arg(text(folder.string())));
   read();
@@ -144,6 +145,7 @@ void SequenceWindow::take(const Expected<std::shared_ptr<const FollowedSequence>
   show_views();
   fill_tables();
   show_curves();
+  show_scene();
   allow();
   read_frame();
 }

@@ -16,8 +16,10 @@
 #include <optional>
 
 #include "gui/controller/corrections.h"
+#include "gui/scene/scene_values.h"
 #include "helicarm/case_registration/follow_case.h"
 #include "helicarm/core/failure.h"
+#include "helicarm/report/chart.h"
 #include "helicarm/track/sequence.h"
 #include "helicarm/track/sequence_images.h"
 #include "helicarm/track/track_case.h"
@@ -26,6 +28,7 @@ class QHBoxLayout;
 
 namespace helicarm::gui {
 
+class SceneView;
 class XrayView;
 
 /// A case of markers with its images, and what is known of the markers once they are followed.
@@ -66,14 +69,21 @@ struct MarkerSummary {
 std::vector<MarkerSummary> marker_list(const track::Sequence& sequence,
                                        const std::vector<std::string>& markers);
 
+/// The charts with a line at a frame.
+std::vector<report::Chart> marked_at(std::vector<report::Chart> charts, int frame);
+
+/// The cameras, the markers with their 95 % errors, and the bodies at their smoothed poses, their markers
+/// joined by rods, in one of the shown frames, from 0.
+ResultScene scene_of_frame(const FollowedSequence& followed, std::size_t number);
+
 /// Whether case.json of this folder is of a sequence of markers.
 bool is_sequence(const std::filesystem::path& folder);
 /// All frames of its first view, as A-B; empty if they are not known.
 QString all_frames(const std::filesystem::path& folder);
 
 /// A sequence of images with markers: follows them, plays the images with their marks, lists the markers
-/// and their places by frames, and draws the bodies' curves. The marker that is selected in the list is
-/// picked by a click in an image, from whose frame it is then followed again.
+/// and their places by frames, and draws the bodies' curves and the bodies in space. The marker that is
+/// selected in the list is picked by a click in an image, from whose frame it is then followed again.
 class SequenceWindow : public QDialog {
   Q_OBJECT
 
@@ -96,6 +106,8 @@ class SequenceWindow : public QDialog {
   QWidget* build_film();
   QWidget* build_tables();
   QWidget* build_curves();
+  QWidget* build_scene();
+  void show_scene();
   void show_curves();
   std::vector<track::MarkerPick> picks_of(int frame) const;
   void take_picks();
@@ -119,6 +131,7 @@ class SequenceWindow : public QDialog {
   std::shared_ptr<std::atomic<bool>> stopped_ = std::make_shared<std::atomic<bool>>(false);
   std::optional<std::filesystem::path> film_;  ///< folder of the frames that are written as they are shown
   bool busy_ = false, reading_ = false;
+  bool has_scene_ = false;  ///< whose camera stays
   int displayed_ = -1;
   Corrections corrections_;
 
@@ -127,6 +140,7 @@ class SequenceWindow : public QDialog {
               *save_film_ = nullptr, *play_ = nullptr, *undo_ = nullptr;
   QComboBox* sheet_ = nullptr;
   CurvesView* curves_ = nullptr;
+  SceneView* scene_ = nullptr;
   QLabel *says_ = nullptr, *number_ = nullptr;
   QWidget* film_frame_ = nullptr;
   QHBoxLayout* film_row_ = nullptr;

@@ -5,6 +5,7 @@
 #include <QTableWidget>
 #include <cmath>
 
+#include "gui/scene/scene_view.h"
 #include "gui/window/legibility_test.h"
 #include "gui/window/sequence_window.h"
 #include "gui/window/window_test.h"
@@ -180,9 +181,39 @@ TEST_F(WindowSequence, CurvesAreThoseOfTheReport) {
   EXPECT_EQ(sequence()->findChild<QComboBox*>("sequenceSheet")->currentText(), "jaw");
   EXPECT_TRUE(curves->svg().contains("Rotation vector against the first frame"));
   EXPECT_TRUE(QSvgRenderer(curves->svg()).isValid());
+  const QByteArray at_first = curves->svg();
+  sequence()->set_frame(3);
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  EXPECT_NE(curves->svg(), at_first);  // its line is at the displayed frame
   sequence()->findChild<QTabWidget*>("sequenceTabs")->setCurrentIndex(1);
   screenshot("sequence-curves", sequence());
   EXPECT_EQ(illegible_parts(*sequence()).join('\n').toStdString(), "");
+}
+
+TEST_F(WindowSequence, BodiesAreInTheSceneOfTheDisplayedFrame) {
+  ASSERT_NO_FATAL_FAILURE(write_sequence(folder_ / "run"));
+  window_->open_paths({folder_ / "run" / "case.json"});
+  ASSERT_TRUE(wait("the sequence is shown", [&] { return sequence() != nullptr; }));
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  QTest::mouseClick(sequence()->findChild<QPushButton*>("sequenceFollow"), Qt::LeftButton);
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  ASSERT_TRUE(sequence()->shown()->sequence) << says();
+  const ResultScene scene = scene_of_frame(*sequence()->shown(), 4);
+  EXPECT_EQ(scene.views.size(), 2u);
+  ASSERT_EQ(scene.points.size(), 4u);
+  EXPECT_EQ(scene.tunnels.size(), 6u);
+  EXPECT_LT((scene.points[1].error.centre - beads(5)[1].at).norm(), 0.1);
+  EXPECT_LT((scene.tunnels[0].axis.from - beads(5)[0].at).norm(), 0.1);
+  EXPECT_EQ(scene.tunnels[0].name, "jaw");
+  sequence()->findChild<QTabWidget*>("sequenceTabs")->setCurrentIndex(2);
+  auto* view = sequence()->findChild<SceneView*>("sequenceScene");
+  screenshot("sequence-scene", sequence());
+  const QImage first = view->grab().toImage();
+  sequence()->set_frame(4);
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  if (!view->obstacle()) {
+    EXPECT_NE(view->grab().toImage(), first);
+  }
 }
 
 TEST_F(WindowSequence, AnImageThatIsMissingIsNamed) {
