@@ -17,7 +17,15 @@ bool same(const tracker::RecordedPose& a, const tracker::RecordedPose& b) {
 }  // namespace
 
 void run(std::string_view bytes) {
-  const auto frames = tracker::read_sequence(put_file("input.mha", bytes));
+  const auto file = put_file("input.mha", bytes);
+  if (const auto motions = tracker::read_slicer_sequence(file))
+    for (const auto& [name, of] : motions->transforms) {
+      check(of.size() == motions->index.size(), "each transform has one or none in each item");
+      for (const auto& motion : of)
+        check(!motion || std::abs(motion->rotation.determinant() - 1) < 1e-3,
+              "a transform is a rigid motion");
+    }
+  const auto frames = tracker::read_sequence(file);
   if (!frames) return;
   const auto path = folder() / "written.mha";
   if (!tracker::write_sequence(path, *frames)) return;  // a name with invalid characters
