@@ -2,14 +2,14 @@
 // The parts of the window of a sequence: controls, film, and its tables.
 #include <QHBoxLayout>
 #include <QHeaderView>
-#include <QPainter>
 #include <QShortcut>
-#include <QSvgRenderer>
 #include <QTabWidget>
 #include <QVBoxLayout>
 
 #include "gui/replay/print_svg.h"
 #include "gui/scene/scene_view.h"
+#include "gui/window/curves_view.h"
+#include "gui/window/film_bar.h"
 #include "gui/window/sequence_window.h"
 #include "gui/window/style.h"
 #include "gui/xray/text.h"
@@ -20,8 +20,6 @@
 
 namespace helicarm::gui {
 namespace {
-
-constexpr int film_ms = 100;
 
 QTableWidget* add_list(const char* name, const QString& spoken) {
   auto* table = new QTableWidget;
@@ -74,8 +72,6 @@ SequenceWindow::SequenceWindow(QWidget* parent) : QDialog(parent) {
   tabs->addTab(build_curves(), tr("&Curves"));
   tabs->addTab(build_scene(), tr("&Scene"));
   column->addWidget(tabs, 2);
-  connect(&clock_, &QTimer::timeout, this, &SequenceWindow::play_on);
-  clock_.setInterval(film_ms);
   resize(1100, 740);
   allow();
 }
@@ -117,24 +113,9 @@ QWidget* SequenceWindow::build_film() {
   film_row_ = new QHBoxLayout(film_frame_);
   film_row_->setContentsMargins(0, 0, 0, 0);
   column->addWidget(film_frame_, 1);
-  auto* row = new QHBoxLayout;
-  play_ = new QPushButton(tr("&Play"));
-  play_->setObjectName("sequencePlay");
-  play_->setAutoDefault(false);
-  connect(play_, &QPushButton::clicked, this, [this] {
-    if (clock_.isActive()) return clock_.stop();
-    if (slider_->value() == slider_->maximum()) slider_->setValue(0);
-    clock_.start();
-  });
-  slider_ = new QSlider(Qt::Horizontal);
-  slider_->setObjectName("sequenceSlider");
-  slider_->setAccessibleName(tr("Frame"));
-  connect(slider_, &QSlider::valueChanged, this, &SequenceWindow::read_frame);
-  number_ = new QLabel;
-  row->addWidget(play_);
-  row->addWidget(slider_, 1);
-  row->addWidget(number_);
-  column->addLayout(row);
+  bar_ = new FilmBar("sequence");
+  connect(bar_, &FilmBar::frame_wanted, this, &SequenceWindow::read_frame);
+  column->addWidget(bar_);
   return whole;
 }
 
@@ -268,20 +249,6 @@ void SequenceWindow::show_curves() {
   curves_->show_svg(chart_document(report::chart_svg(charts, charts.size())));
 }
 
-void CurvesView::show_svg(QByteArray svg) {
-  svg_ = std::move(svg);
-  update();
-}
-
-void CurvesView::paintEvent(QPaintEvent*) {
-  if (svg_.isEmpty()) return;
-  QSvgRenderer drawn(svg_);
-  drawn.setAspectRatioMode(Qt::KeepAspectRatio);
-  QPainter painter(this);
-  painter.fillRect(rect(), Qt::white);
-  drawn.render(&painter, rect());
-}
-
 void SequenceWindow::allow() {
   const bool is_followed = shown_ && shown_->sequence;
   read_->setEnabled(!busy_);
@@ -291,8 +258,7 @@ void SequenceWindow::allow() {
   undo_->setEnabled(!busy_ && corrections_.can_undo());
   for (XrayView* view : views_) view->set_picking(!busy_ && shown_ && markers_->currentRow() >= 0);
   save_film_->setEnabled(!busy_ && shown_ && !film_);
-  for (QWidget* control : std::initializer_list<QWidget*>{play_, slider_})
-    control->setEnabled(shown_ != nullptr);
+  bar_->setEnabled(shown_ != nullptr);
 }
 
 void SequenceWindow::show_views() {
@@ -305,6 +271,9 @@ void SequenceWindow::show_views() {
     views_.back()->set_layer(Layer::raw);
     connect(views_.back(), &XrayView::picked, this, [this, view = views_.size() - 1](const QPointF& raw) {
       pick(view, {raw.x(), raw.y()});
+    });
+    connect(views_.back(), &XrayView::shown, this, [this] {
+      if (awaited_ > 0 && --awaited_ == 0) end_frame();
     });
     film_row_->addWidget(views_.back());
   }

@@ -12,6 +12,7 @@
 
 #include "gui/controller/steps.h"
 #include "gui/window/ask_files.h"
+#include "gui/window/film_bar.h"
 #include "gui/xray/text.h"
 #include "gui/xray/xray_view.h"
 #include "helicarm/core/json.h"
@@ -89,6 +90,10 @@ QString all_frames(const fs::path& folder) {
 
 SequenceWindow::~SequenceWindow() { *stopped_ = true; }
 
+int SequenceWindow::frame() const { return bar_->frame(); }
+
+void SequenceWindow::set_frame(int number) { bar_->set_frame(number); }
+
 void SequenceWindow::open_case(const fs::path& folder, const QString& frames) {
   folder_ = folder;
   has_scene_ = false;
@@ -140,7 +145,7 @@ void SequenceWindow::take(const Expected<std::shared_ptr<const FollowedSequence>
     if (warnings)
       for (const Warning& warning : *warnings) words << sentence_of(warning);
   says_->setText(words.join('\n'));
-  slider_->setRange(0, shown_->range.count() - 1);
+  bar_->set_count(shown_->range.count());
   displayed_ = -1;
   show_views();
   fill_tables();
@@ -236,9 +241,10 @@ void SequenceWindow::follow() {
 }
 
 void SequenceWindow::read_frame() {
-  if (!shown_ || reading_ || displayed_ == slider_->value()) return;
+  if (!shown_ || reading_ || displayed_ == frame()) return;
   reading_ = true;
-  const int number = slider_->value();
+  bar_->set_waiting(true);
+  const int number = frame();
   QThreadPool::globalInstance()->start([self = QPointer<SequenceWindow>(this), of = shown_, number] {
     auto images = std::make_shared<Expected<std::vector<xray::XrayImage>>>(
         of->images.at(of->range.first + number * of->range.step));
@@ -246,9 +252,9 @@ void SequenceWindow::read_frame() {
         qApp,
         [self, of, number, images] {
           if (!self) return;
-          self->reading_ = false;
+          self->awaited_ = 0;
           if (self->shown_ == of) self->show_frame(number, *images);
-          self->read_frame();  // another one is wanted meanwhile
+          if (self->awaited_ == 0) self->end_frame();
         },
         Qt::QueuedConnection);
   });
@@ -257,9 +263,11 @@ void SequenceWindow::read_frame() {
 void SequenceWindow::show_frame(int number, const Expected<std::vector<xray::XrayImage>>& images) {
   displayed_ = number;
   const int frame = shown_->range.first + number * shown_->range.step;
-  number_->setText(tr("frame %1").arg(frame));
+  bar_->set_name(tr("frame %1").arg(frame));
   if (!images) {
-    clock_.stop();
+    bar_->stop();
+    film_.reset();
+    for (XrayView* view : views_) view->clear(sentence_of(images.error()));
     return says_->setText(sentence_of(images.error()));
   }
   auto result = std::make_shared<pipeline::Result>();
@@ -268,41 +276,51 @@ void SequenceWindow::show_frame(int number, const Expected<std::vector<xray::Xra
     view.name = shown_->given.views[i].images.name;
     view.xray_image = std::make_shared<const xray::XrayImage>((*images)[i]);
   }
-  for (std::size_t i = 0; i < views_.size(); ++i) {
-    views_[i]->show_view(result, i, true);
-    std::vector<FreshPick> marks;
-    std::set<std::size_t> picked;
-    for (const track::MarkerPick& pick : picks_of(frame))
-      if (pick.view == i && picked.insert(pick.marker).second)
-        marks.push_back({text(shown_->given.markers[pick.marker]), pick.uv_raw});
-    if (const auto& sequence = shown_->sequence)
-      for (std::size_t m = 0; m < shown_->given.markers.size(); ++m)
-        if (const auto& seen = sequence->images[std::size_t(number)][m * views_.size() + i];
-            seen && !picked.contains(m))
-          marks.push_back({text(shown_->given.markers[m]), seen->uv_raw});
-    views_[i]->set_picks(std::move(marks));
+  awaited_ = views_.size();
+  for (std::size_t i = 0; i < views_.size(); ++i) views_[i]->show_view(result, i, true);
+}
+
+std::vector<FreshPick> SequenceWindow::marks_in(std::size_t view) const {
+  std::vector<FreshPick> marks;
+  std::set<std::size_t> picked;
+  for (const track::MarkerPick& pick : picks_of(shown_->range.first + displayed_ * shown_->range.step))
+    if (pick.view == view && picked.insert(pick.marker).second)
+      marks.push_back({text(shown_->given.markers[pick.marker]), pick.uv_raw});
+  if (const auto& sequence = shown_->sequence)
+    for (std::size_t m = 0; m < shown_->given.markers.size(); ++m)
+      if (const auto& seen = sequence->images[std::size_t(displayed_)][m * views_.size() + view];
+          seen && !picked.contains(m))
+        marks.push_back({text(shown_->given.markers[m]), seen->uv_raw});
+  return marks;
+}
+
+/// The images of a frame are displayed: now its marks are true of them.
+void SequenceWindow::end_frame() {
+  reading_ = false;
+  bar_->set_waiting(false);
+  if (displayed_ >= 0) {
+    for (std::size_t i = 0; i < views_.size(); ++i) views_[i]->set_picks(marks_in(i));
+    mark_frame();
+    if (film_) film_frame();
   }
-  mark_frame();
-  if (!film_) return;
+  read_frame();  // another one is wanted meanwhile
+}
+
+void SequenceWindow::film_frame() {
+  const int frame = shown_->range.first + displayed_ * shown_->range.step;
   const QString name = QString("frame-%1.png").arg(frame, 5, 10, QChar('0'));
   QImage film(film_frame_->size(), QImage::Format_RGB32);
   film_frame_->render(&film);
   if (!film.save(QString::fromStdString((*film_ / name.toStdString()).string()))) {
     says_->setText(tr("%1 cannot be written.").arg(name));
     film_.reset();
-  } else if (number == slider_->maximum()) {
+  } else if (bar_->is_last()) {
     says_->setText(tr("The film's frames are in %1.").arg(text(film_->string())));
     film_.reset();
   } else {
-    slider_->setValue(number + 1);
+    set_frame(displayed_ + 1);
   }
   allow();
-}
-
-void SequenceWindow::play_on() {
-  if (reading_) return;
-  if (slider_->value() == slider_->maximum()) return clock_.stop();
-  slider_->setValue(slider_->value() + 1);
 }
 
 void SequenceWindow::ask_and_write() {
@@ -317,13 +335,15 @@ void SequenceWindow::ask_and_write() {
 
 void SequenceWindow::ask_and_film() {
   ask_files(this, tr("Folder for the frames of the film"), QFileDialog::Directory, {},
-            [this](const std::vector<fs::path>& chosen) {
-              film_ = chosen.front();
-              displayed_ = -1;
-              slider_->setValue(0);
-              allow();
-              read_frame();
-            });
+            [this](const std::vector<fs::path>& chosen) { save_film(chosen.front()); });
+}
+
+void SequenceWindow::save_film(const fs::path& folder) {
+  film_ = folder;
+  displayed_ = -1;
+  set_frame(0);
+  allow();
+  read_frame();
 }
 
 }  // namespace helicarm::gui

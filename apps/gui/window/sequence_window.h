@@ -7,9 +7,7 @@
 #include <QLabel>
 #include <QLineEdit>
 #include <QPushButton>
-#include <QSlider>
 #include <QTableWidget>
-#include <QTimer>
 #include <atomic>
 #include <filesystem>
 #include <memory>
@@ -17,6 +15,7 @@
 
 #include "gui/controller/corrections.h"
 #include "gui/scene/scene_values.h"
+#include "gui/xray/live_marks.h"
 #include "helicarm/case_registration/follow_case.h"
 #include "helicarm/core/failure.h"
 #include "helicarm/report/chart.h"
@@ -28,6 +27,8 @@ class QHBoxLayout;
 
 namespace helicarm::gui {
 
+class CurvesView;
+class FilmBar;
 class SceneView;
 class XrayView;
 
@@ -41,23 +42,6 @@ struct FollowedSequence {
 
   /// Whether picks were made since.
   bool is_corrected() const { return sequence && (picks != given.picks || corrections != given.corrections); }
-};
-
-/// The curves of a sheet of the report, on white.
-class CurvesView : public QWidget {
-  Q_OBJECT
-
- public:
-  using QWidget::QWidget;
-  /// An SVG document.
-  void show_svg(QByteArray svg);
-  const QByteArray& svg() const { return svg_; }
-
- protected:
-  void paintEvent(QPaintEvent* event) override;
-
- private:
-  QByteArray svg_;
 };
 
 /// A marker through a sequence: in how many frames it is tracked, and its worst 95 % error there, mm.
@@ -96,8 +80,10 @@ class SequenceWindow : public QDialog {
   bool is_busy() const { return busy_ || reading_; }
   const std::shared_ptr<const FollowedSequence>& shown() const { return shown_; }
   /// Of the shown frames, from 0.
-  int frame() const { return slider_->value(); }
-  void set_frame(int number) { slider_->setValue(number); }
+  int frame() const;
+  void set_frame(int number);
+  /// Plays the sequence once and writes each frame as displayed into the folder, frame-00001.png and so on.
+  void save_film(const std::filesystem::path& folder);
   /// The selected marker is at this raw pixel of the view in the displayed frame; kept in case.json at once.
   void pick(std::size_t view, const Eigen::Vector2d& raw);
 
@@ -124,7 +110,9 @@ class SequenceWindow : public QDialog {
   void mark_frame();
   void ask_and_write();
   void ask_and_film();
-  void play_on();
+  std::vector<FreshPick> marks_in(std::size_t view) const;
+  void end_frame();
+  void film_frame();
 
   std::filesystem::path folder_;
   std::shared_ptr<const FollowedSequence> shown_;
@@ -137,17 +125,17 @@ class SequenceWindow : public QDialog {
 
   QLineEdit* frames_ = nullptr;
   QPushButton *read_ = nullptr, *follow_ = nullptr, *cancel_ = nullptr, *write_ = nullptr,
-              *save_film_ = nullptr, *play_ = nullptr, *undo_ = nullptr;
+              *save_film_ = nullptr, *undo_ = nullptr;
   QComboBox* sheet_ = nullptr;
   CurvesView* curves_ = nullptr;
   SceneView* scene_ = nullptr;
-  QLabel *says_ = nullptr, *number_ = nullptr;
+  QLabel* says_ = nullptr;
   QWidget* film_frame_ = nullptr;
   QHBoxLayout* film_row_ = nullptr;
   std::vector<XrayView*> views_;
-  QSlider* slider_ = nullptr;
+  FilmBar* bar_ = nullptr;
+  std::size_t awaited_ = 0;  ///< views that do not display the frame's image yet
   QTableWidget *markers_ = nullptr, *by_frames_ = nullptr;
-  QTimer clock_;
 };
 
 }  // namespace helicarm::gui

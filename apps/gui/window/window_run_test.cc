@@ -3,9 +3,9 @@
 #include <QTabWidget>
 #include <QTableWidget>
 
+#include "gui/window/curves_view.h"
 #include "gui/window/legibility_test.h"
 #include "gui/window/run_window.h"
-#include "gui/window/sequence_window.h"
 #include "gui/window/window_test.h"
 #include "gui/xray/xray_view.h"
 #include "helicarm/sweep/drawn_run_test.h"

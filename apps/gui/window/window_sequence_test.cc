@@ -6,9 +6,11 @@
 #include <cmath>
 
 #include "gui/scene/scene_view.h"
+#include "gui/window/curves_view.h"
 #include "gui/window/legibility_test.h"
 #include "gui/window/sequence_window.h"
 #include "gui/window/window_test.h"
+#include "gui/xray/xray_view.h"
 #include "helicarm/core/json.h"
 #include "helicarm/image/png.h"
 
@@ -130,6 +132,24 @@ TEST_F(WindowSequence, IsFollowedPlayedAndListedByFrames) {
   sequence()->set_frame(0);
   QTest::mouseClick(sequence()->findChild<QPushButton*>("sequencePlay"), Qt::LeftButton);
   ASSERT_TRUE(wait("it plays to its end", [&] { return sequence()->frame() == frames_drawn - 1; }));
+}
+
+TEST_F(WindowSequence, SavedFilmHasEachFrameWithItsOwnMarks) {
+  ASSERT_NO_FATAL_FAILURE(write_sequence(folder_ / "run"));
+  window_->open_paths({folder_ / "run" / "case.json"});
+  ASSERT_TRUE(wait("the sequence is shown", [&] { return sequence() != nullptr; }));
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  QTest::mouseClick(sequence()->findChild<QPushButton*>("sequenceFollow"), Qt::LeftButton);
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  sequence()->save_film(folder_);
+  ASSERT_TRUE(wait("it is saved", [&] { return says().find("film's frames") != std::string::npos; }));
+  sequence()->set_frame(1);
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  QWidget* film = sequence()->findChild<XrayView*>()->parentWidget();
+  QImage displayed(film->size(), QImage::Format_RGB32);
+  film->render(&displayed);
+  const QImage saved((folder_ / "frame-00002.png").c_str());
+  EXPECT_EQ(saved.convertToFormat(QImage::Format_RGB32), displayed);
 }
 
 TEST_F(WindowSequence, APickInALaterFrameIsKeptFollowedAndUndone) {
