@@ -11,10 +11,10 @@
 namespace helicarm::volume {
 
 /// Reads MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI-1 and NIfTI-2 (.nii, .nii.gz, or either file of a
-/// pair of .hdr and .img, each plain or .gz), or a DICOM segmentation (BINARY; a label map of the slices that
-/// hold a segment), detected by content, or a folder with the slices of a DICOM CT series. Every length in a
-/// file is checked before use. Failures name file and field; codes: missing_file, not_an_image, truncated,
-/// bad_size, bad_value, unsupported, not_finite, unknown_key, path_outside, name_clash.
+/// pair of .hdr and .img, each plain or .gz), or a DICOM segmentation (BINARY, LABELMAP; a label map of the
+/// slices that hold a segment), detected by content, or a folder with the slices of a DICOM CT series. Every
+/// length in a file is checked before use. Failures name file and field; codes: missing_file, not_an_image,
+/// truncated, bad_size, bad_value, unsupported, not_finite, unknown_key, path_outside, name_clash.
 Expected<Volume> read_volume(const std::filesystem::path& path);
 
 /// The other file of a NIfTI pair, by the name of one (.hdr, .img, each plain or .gz); nothing for a file of
@@ -32,9 +32,10 @@ struct SegmentChoice {
 };
 
 /// The mask of one segment (1 inside, 0 elsewhere; slices without a segment may be missing), also where it
-/// overlaps others; nothing for another file or a folder. BINARY or FRACTIONAL, uncompressed, deflated, or
-/// FRACTIONAL in RLE. Refuses (bad_value) a choice that fits no or several segments, none of several, and a
-/// threshold that is missing or not needed; the segments are listed. Fails as `read_volume`.
+/// overlaps others; nothing for another file or a folder. BINARY, FRACTIONAL or LABELMAP, uncompressed or
+/// deflated; bytes and words also compressed without loss. Refuses (bad_value) a choice that fits no or
+/// several segments, none of several, and a threshold that is missing or not needed; the segments are listed.
+/// Fails as `read_volume`.
 Expected<std::optional<Volume>> read_segment(const std::filesystem::path& path, const SegmentChoice& choice);
 
 /// Whether a file is named as the voxels of a NIfTI pair (.img, .img.gz).
