@@ -108,6 +108,19 @@ def test_points_of_the_world_are_carried_into_the_model_and_views_judged(pair, t
     assert view["is_lateral"] and view["off_deg"] < 0.01
     # Perspective: the landmarks' depths differ by up to 13 mm of 800.
     assert view["positions"][0]["percent"] == pytest.approx({"depth": 25, "height": 28}, abs=3)
+    # A tracked bone had turned by 10 degrees at LAT's acquisition.
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos(np.pi / 18), -np.sin(np.pi / 18)], [np.sin(np.pi / 18), np.cos(np.pi / 18)]]
+    at = {"AP": pose, "LAT": pose @ turn}
+    tracked = {**model, "acquisitions": [{"view": name, "world_from_model": at[name].tolist()} for name in at]}
+    later = helicarm.measure_landmarks("femoral_quadrants", landmarks, registration={"models": [tracked]}, calibration=calibration)
+    (view,) = [each for each in later["laterals"] if each["view"] == "LAT"]
+    assert not view["is_lateral"] and view["off_deg"] == pytest.approx(10, abs=0.01)
+    camera = np.eye(4)
+    camera[:3, 3] = 0, 0, 900
+    with pytest.raises(helicarm.InputError, match="they are of other images"):
+        helicarm.measure_landmarks("femoral_quadrants", landmarks, calibration=calibration, registration={
+            "models": [model], "views": [{"name": "LAT", "camera_from_world": camera.tolist()}]})
     with pytest.raises(helicarm.InputError, match="no registered model"):
         helicarm.measure_landmarks("femoral_quadrants", {**landmarks, "Q": None})
     with pytest.raises(helicarm.InputError, match="kind"):
