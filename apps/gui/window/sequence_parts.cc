@@ -171,6 +171,7 @@ void SequenceWindow::show_scene() {
   scene_->show_scene(scene_of_frame(*shown_, std::size_t(displayed_)),
                      places.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(geometry::mean_of(places)),
                      has_scene_);
+  if (!has_scene_) scene_->look_near();
   has_scene_ = true;
 }
 
