@@ -94,6 +94,34 @@ class Sweep(SimulatedCase):
             self.assertTrue(all(abs(e) <= 5 * s for e, s in zip(errors, frame["source_sigma_mm"])), (frame["frame"], errors))
         self.assertGreaterEqual(within, len(accepted) - 4)
 
+    def test_a_run_without_plate_takes_its_distortion_from_the_record(self):
+        case, out, record = self.root / "plated", self.root / "plated-out", self.root / "arm.json"
+        done = run("simulate", case, "--preset", "ii-9in", "--no-knee", "--run", 8, "--arc", 60, "--size", 512, "--seed", 3,
+                   "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(run("sweep", case, "--out", out, "--quiet").returncode, 0)
+        done = run("c-arm", "add", record, out / "sweep.json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertGreaterEqual(len([shot for shot in json.loads(record.read_text())["shots"] if "map" in shot]), 6)
+        done = run("c-arm", "report", record, "--out", self.root / "arm")
+        self.assertIn("off one map for all", done.stdout)
+        rows = (self.root / "arm/c_arm_maps.csv").read_text().splitlines()
+        self.assertEqual(rows[0], "view,date,primary_deg,secondary_deg,error_px,one_map_px,expected_px")
+        bare = json.loads((case / "case.json").read_text())
+        bare["plate"] = None
+        (case / "case.json").write_text(json.dumps(bare))
+        without = run("sweep", case, "--out", self.root / "without", "--quiet")
+        self.assertEqual(without.returncode, 3, "the plate in the images shows that they are distorted")
+        done = run("sweep", case, "--out", self.root / "by-record", "--quiet", "--machine", record)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        by_plate, by_record = (json.loads((self.root / name / "sweep.json").read_text())["frames"]
+                               for name in ("plated-out", "by-record"))
+        for a, b in zip(by_plate, by_record):
+            if a["projection"] and b["projection"]:
+                self.assertLess(sum((p - q) ** 2 for p, q in zip(a["source_mm"], b["source_mm"])), 2 ** 2)
+        self.assertGreaterEqual(len([frame for frame in by_record if frame["projection"]]), 7)
+        self.assertEqual(run("sweep", case, "--out", out, "--machine", self.root / "none.json").returncode, 2)
+
     def test_wrong_input_is_named(self):
         out = self.root / "wrong"
         for name, frames, word in (("missing", "1-5", "2 of 5 images do not exist, the first: run_04.png; the frames 4-5."),
