@@ -84,13 +84,17 @@ function(helicarm_public target scope)
   target_compile_features(${target} ${scope} cxx_std_20)
 endfunction()
 
-# helicarm_module(NAME [APART] [PRIVATE] SOURCES a.cc ... USES module ... LIBRARIES target ... TESTS a_test.cc ...
+# Of modules in which little of a run's time is spent: Clang takes a third less for them. GCC's precompiled header is of one
+# level of optimisation.
+set(helicarm_cold_options $<$<AND:$<CONFIG:Release>,$<CXX_COMPILER_ID:Clang>>:-O1>)
+
+# helicarm_module(NAME [APART] [COLD] [PRIVATE] SOURCES a.cc ... USES module ... LIBRARIES target ... TESTS a_test.cc ...
 #                 TESTS_TOGETHER Suite ...)
 # A module's files are compiled as one unit, and its tests in groups; APART: file by file, as they use one
-# name for several things. PRIVATE: no part of the installed library. TESTS_TOGETHER: suites that share what is dear to
+# name for several things. COLD: with `helicarm_cold_options`. PRIVATE: no part of the installed library. TESTS_TOGETHER: suites that share what is dear to
 # make, each one test of ctest.
 function(helicarm_module name)
-  cmake_parse_arguments(ARG "APART;PRIVATE" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES;TESTS_TOGETHER" ${ARGN})
+  cmake_parse_arguments(ARG "APART;COLD;PRIVATE" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES;TESTS_TOGETHER" ${ARGN})
   list(TRANSFORM ARG_USES PREPEND helicarm_)
   list(TRANSFORM ARG_TEST_USES PREPEND helicarm_)
   if(ARG_SOURCES)
@@ -99,6 +103,9 @@ function(helicarm_module name)
     target_link_libraries(helicarm_${name} PUBLIC ${ARG_USES} ${ARG_LIBRARIES})
     helicarm_public(helicarm_${name} PUBLIC)
     target_precompile_headers(helicarm_${name} REUSE_FROM helicarm_precompiled)
+    if(ARG_COLD)
+      target_compile_options(helicarm_${name} PRIVATE ${helicarm_cold_options})
+    endif()
     if(HELICARM_UNITY AND NOT ARG_APART)
       set_target_properties(helicarm_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
     endif()

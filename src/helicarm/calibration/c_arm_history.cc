@@ -75,7 +75,7 @@ void describe_acquisition(Codec& codec, Entry& entry) {
       },
       [&] { return entry.map ? std::optional(to_json(*entry.map)) : std::nullopt; });
   codec.custom(
-      "field_radius_px", false, {{"type", "number"}, {"minimum", 0}},
+      "field_radius_px", false, {{"type", "number"}, {"minimum", 0}, {"maximum", 1e5}},
       "of a map: farthest distance of its dots from their middle",
       [&](JsonReader& reader) {
         if constexpr (!std::is_const_v<Entry>)
