@@ -126,7 +126,7 @@ void add_sweep(py::module_& module) {
   module.def(
       "sweep", &swept, py::arg("folder"), py::kw_only(), py::arg("path") = py::none(),
       py::arg("check") = py::none(), py::arg("wire") = py::none(), py::arg("against") = py::none(),
-      py::arg("threads") = usual.threads, py::arg("progress") = py::none(),
+      py::arg("history") = py::none(), py::arg("threads") = usual.threads, py::arg("progress") = py::none(),
       R"(Calibrates every image of a rotation or tomosynthesis and all of them on one path, as `helicarm sweep` does.
 
 folder: holds case.json, whose view has "frames". path: "smooth", "free" or None (smooth for 16 or more images of one

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 import re
+import shutil
 
 import cv2
 import numpy as np
@@ -251,6 +252,21 @@ def test_c_arm_that_has_changed_is_refused(case, tmp_path):
         helicarm.add_to_c_arm(moved, case[0])
     assert helicarm.add_to_c_arm(record, case[0]) == 2
     assert helicarm.add_to_c_arm(record, case[0]) == 0
+
+
+def test_images_without_plate_take_their_distortion_from_the_record(case, result, tmp_path):
+    record, bare = tmp_path / "arm.json", tmp_path / "bare"
+    assert helicarm.add_to_c_arm(record, case[0]) == 2
+    assert helicarm.c_arm_report(record)["distortion"]["maps"] == 2
+    shutil.copytree(case[0], bare)
+    given = json.loads((bare / "case.json").read_text())
+    given["plate"] = None
+    (bare / "case.json").write_text(json.dumps(given))
+    found = helicarm.run_case(bare, history=record)
+    by_plate = {p.name: p.xyz_mm for p in result.points if p.xyz_mm is not None}
+    for point in found.points:
+        if point.name in by_plate:
+            assert np.linalg.norm(point.xyz_mm - by_plate[point.name]) < 0.3
 
 
 def test_motion_enlarges_the_covariance(tmp_path):

@@ -123,6 +123,13 @@ double expected_square(const rectification::MapVariation& variation) {
   return sum;
 }
 
+/// Of one image size and one field of the intensifier.
+bool are_alike(const rectification::DistortionMap& a, const rectification::DistortionMap& b) {
+  constexpr double tolerance = 0.02;
+  const double pixel_a = a.rectified_pixel_mm.value_or(0), pixel_b = b.rectified_pixel_mm.value_or(0);
+  return a.width == b.width && a.height == b.height && std::abs(pixel_a - pixel_b) <= tolerance * pixel_b;
+}
+
 std::vector<rectification::DistortionMap> maps_of(const CArmMaps& model) {
   std::vector<rectification::DistortionMap> maps;
   for (const HistoryEntry& entry : model.entries) maps.push_back(*entry.map);
@@ -153,9 +160,7 @@ std::optional<CArmMaps> c_arm_maps(std::span<const HistoryEntry> entries) {
     if (entry.map) model.entries.push_back(entry);
   if (model.entries.empty()) return {};
   const rectification::DistortionMap latest = *model.entries.back().map;
-  std::erase_if(model.entries, [&](const HistoryEntry& entry) {
-    return entry.map->width != latest.width || entry.map->height != latest.height;
-  });
+  std::erase_if(model.entries, [&](const HistoryEntry& entry) { return !are_alike(*entry.map, latest); });
   if (model.entries.size() > most_maps)
     model.entries.erase(model.entries.begin(), model.entries.end() - std::ptrdiff_t(most_maps));
   double radius_px = 0;
@@ -185,9 +190,7 @@ std::optional<CArmMaps> c_arm_maps(std::span<const HistoryEntry> entries) {
 }
 
 std::optional<MapCheck> check_map(const CArmMaps& model, const HistoryEntry& acquired) {
-  if (!acquired.map || acquired.map->width != model.entries.back().map->width ||
-      acquired.map->height != model.entries.back().map->height)
-    return {};
+  if (!acquired.map || !are_alike(*acquired.map, *model.entries.back().map)) return {};
   const MatrixX2d own = rectification::displacements(*acquired.map, model.field);
   const Prediction there = predicted(directions_of(model.entries), model.repeat_share,
                                      c_arm_direction(acquired.primary_deg, acquired.secondary_deg), no_entry);

@@ -23,7 +23,7 @@ struct MapCheck {
 /// are a Gaussian process over the position (Rasmussen and Williams 2006, 2.2), the same for all places of
 /// the field, with a constant mean.
 struct CArmMaps {
-  std::vector<HistoryEntry> entries;  ///< that have a map, of one image size: the latest one's
+  std::vector<HistoryEntry> entries;  ///< that have a map, of the latest one's image size and pixel size
   rectification::MapField field;
   std::vector<Eigen::MatrixX2d> displacements;  ///< of each entry's map, at the field's places, px
   double repeat_share = 0;  ///< of the variance, from one acquisition to the next in one position

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "helicarm/calibration/c_arm_model.h"
 #include "helicarm/calibration/c_arm_position.h"
 #include "helicarm/core/random.h"
 #include "helicarm/rectification/fit_map.h"
@@ -43,6 +44,8 @@ struct Intensifier {
     HistoryEntry recorded;
     recorded.map = value_or_throw(rectification::fit_map(dots, size, size, {})).map;
     recorded.field_radius_px = 330;
+    recorded.estimate_mm = {1000, 0, 0};
+    recorded.information.setIdentity();
     recorded.primary_deg = primary_deg;
     recorded.secondary_deg = secondary_deg;
     return recorded;
@@ -122,6 +125,20 @@ TEST(CArmMaps, EachMapIsCheckedByTheOthers) {
 }
 
 TEST(CArmMaps, WithoutMapsThereIsNoModel) { EXPECT_FALSE(c_arm_maps(std::vector<HistoryEntry>(3))); }
+
+CArmCheck checked(const Intensifier& recorded, const Intensifier& acquired) {
+  const CArmPrior unknown{IntrinsicsVariation{10, 1}, IntrinsicsVariation{10, 3}};
+  const CArmModel model = c_arm_model(recorded.around(steps_deg), {1000, 0, 0}, unknown);
+  return check_c_arm(model, acquired.around({15, 45}), {});
+}
+
+TEST(CArmMaps, AnotherDistortionIsAChangeOfTheCArm) {
+  const CArmCheck same = checked(Intensifier(1), Intensifier(1)),
+                  other = checked(Intensifier(1), Intensifier(3));
+  ASSERT_EQ(same.maps.size(), 2u);
+  EXPECT_FALSE(same.maps[0].is_changed || same.maps[1].is_changed);
+  EXPECT_TRUE(other.maps[0].is_changed || other.maps[1].is_changed);
+}
 
 TEST(CArmMaps, MapsOfAnotherImageSizeAreLeftOut) {
   const Intensifier intensifier(1);

@@ -178,9 +178,10 @@ namespace {
 
 std::vector<MapDifference> check_maps(const CArmModel& model, std::span<const HistoryEntry> acquired) {
   constexpr double significant = 3, noticeable_px = 0.2;
+  constexpr std::size_t least_maps = 4;  // fewer do not tell what is usual of this C-arm
   std::vector<MapDifference> differences;
   const auto maps = c_arm_maps(model.entries);
-  if (!maps) return differences;
+  if (!maps || maps->entries.size() < least_maps) return differences;
   for (const HistoryEntry& entry : acquired)
     if (const auto check = check_map(*maps, entry))
       differences.push_back({entry.view, check->error_px, check->predicted_px,
