@@ -42,8 +42,13 @@ CommandResult c_arm_add_command(const CArmAddArguments& arguments, Console& cons
         throw BadInput(Reason::missing_file, fmt::format("{}: no such file or folder", folder.string()));
     Json added = Json::array();
     for (const std::filesystem::path& folder : arguments.cases) {
-      const auto growth =
-          value_or_throw(pipeline::add_to_record(arguments.record, acquisitions_of(folder, console)));
+      const auto growth = value_or_throw(guarded([&] {
+                                           return value_or_throw(pipeline::add_to_record(
+                                               arguments.record, acquisitions_of(folder, console)));
+                                         }).map_error([&](Failure failure) {
+        failure.message = fmt::format("{}: {}", folder.string(), failure.message);
+        return failure;
+      }));
       added.push_back({{"case", folder.string()}, {"earlier", growth.earlier}, {"added", growth.added}});
       if (!console.json)
         console.out << fmt::format("{}: {} acquisitions added to {}\n", folder.string(), growth.added,

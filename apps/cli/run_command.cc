@@ -82,7 +82,9 @@ void add_run(CLI::App& app, Action& action) {
       ->capture_default_str();
   a.extends_history = true;
   add_run_options(command, a,
-                  "The C-arm's history (JSON): used as prior; this case's acquisitions are added");
+                  "The C-arm's record (JSON): used as prior, and images without plate and map take their "
+                  "distortion from its maps; "
+                  "this case's acquisitions are added");
   add_fields(command, a.options.search, case_registration::search_fields);
   add_dicom_option(command, a.dicom);
   command->add_flag("--no-report", a.no_report, "Write result.json only");

@@ -3,7 +3,6 @@
 
 #include <QApplication>
 #include <QHBoxLayout>
-#include <QHeaderView>
 #include <QPointer>
 #include <QTabWidget>
 #include <QThreadPool>
@@ -16,7 +15,7 @@
 #include "gui/window/ask_files.h"
 #include "gui/window/curves_view.h"
 #include "gui/window/film_bar.h"
-#include "gui/window/style.h"
+#include "gui/window/list_table.h"
 #include "gui/xray/text.h"
 #include "gui/xray/xray_view.h"
 #include "helicarm/core/json.h"
@@ -119,14 +118,8 @@ QWidget* RunWindow::build_top() {
 }
 
 QWidget* RunWindow::build_images() {
-  images_ = new QTableWidget;
-  images_->setObjectName("runImages");
-  images_->setAccessibleName(tr("Images of the run"));
-  images_->setEditTriggers(QAbstractItemView::NoEditTriggers);
-  images_->setTabKeyNavigation(false);
+  images_ = list_table("runImages", tr("Images of the run"));
   images_->setSelectionBehavior(QAbstractItemView::SelectRows);
-  images_->verticalHeader()->hide();
-  images_->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
   images_->horizontalHeader()->setStretchLastSection(true);
   images_->setColumnCount(6);
   images_->setHorizontalHeaderLabels({tr("Image"), tr("Decision"), tr("Fiducials"), tr("Residual, px"),
@@ -283,11 +276,8 @@ void RunWindow::fill_images() {
     QStringList words = found ? row_of(*found) : QStringList{text(frames[std::size_t(row)].view.name)};
     words.resize(images_->columnCount());
     for (int column = 0; column < images_->columnCount(); ++column) {
-      auto* cell = new QTableWidgetItem(words[column]);
-      if (found && found->failure) {
-        cell->setForeground(style::colours().red);
-        cell->setToolTip(sentence_of(*found->failure));
-      }
+      auto* cell = list_cell(words[column], found && found->failure);
+      if (found && found->failure) cell->setToolTip(sentence_of(*found->failure));
       images_->setItem(row, column, cell);
     }
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The parts of the window of a sequence: controls, film, and its tables.
 #include <QHBoxLayout>
-#include <QHeaderView>
 #include <QShortcut>
 #include <QTabWidget>
 #include <QVBoxLayout>
@@ -10,8 +9,8 @@
 #include "gui/scene/scene_view.h"
 #include "gui/window/curves_view.h"
 #include "gui/window/film_bar.h"
+#include "gui/window/list_table.h"
 #include "gui/window/sequence_window.h"
-#include "gui/window/style.h"
 #include "gui/xray/text.h"
 #include "gui/xray/xray_view.h"
 #include "helicarm/localization/error_bound.h"
@@ -20,23 +19,6 @@
 
 namespace helicarm::gui {
 namespace {
-
-QTableWidget* add_list(const char* name, const QString& spoken) {
-  auto* table = new QTableWidget;
-  table->setObjectName(name);
-  table->setAccessibleName(spoken);
-  table->setEditTriggers(QAbstractItemView::NoEditTriggers);
-  table->setTabKeyNavigation(false);
-  table->verticalHeader()->hide();
-  table->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
-  return table;
-}
-
-QTableWidgetItem* cell_of(const QString& words, bool is_bad = false) {
-  auto* cell = new QTableWidgetItem(words);
-  if (is_bad) cell->setForeground(style::colours().red);
-  return cell;
-}
 
 QString words_of_marker(const track::TrackedMarker& marker) {
   switch (marker.status) {
@@ -123,11 +105,11 @@ QWidget* SequenceWindow::build_tables() {
   auto* whole = new QWidget;
   auto* row = new QHBoxLayout(whole);
   row->setContentsMargins(0, 0, 0, 0);
-  markers_ = add_list("markerList", tr("Markers"));
+  markers_ = list_table("markerList", tr("Markers"));
   markers_->setColumnCount(6);
   markers_->setHorizontalHeaderLabels(
       {tr("Marker"), tr("Now"), tr("Tracked"), tr("One view"), tr("Predicted, lost"), tr("Worst ±95 %, mm")});
-  by_frames_ = add_list("markersByFrames", tr("Markers by frames"));
+  by_frames_ = list_table("markersByFrames", tr("Markers by frames"));
   connect(by_frames_, &QTableWidget::cellClicked, this, [this](int frame, int) { set_frame(frame); });
   connect(by_frames_, &QTableWidget::cellActivated, this, [this](int frame, int) { set_frame(frame); });
   markers_->setSelectionBehavior(QAbstractItemView::SelectRows);
@@ -287,7 +269,7 @@ void SequenceWindow::fill_tables() {
   const auto list = sequence ? marker_list(*sequence, markers) : std::vector<MarkerSummary>();
   for (int row = 0; row < markers_->rowCount(); ++row) {
     for (int column = 0; column < markers_->columnCount(); ++column)
-      markers_->setItem(row, column, cell_of("–"));
+      markers_->setItem(row, column, list_cell("–"));
     markers_->item(row, 0)->setText(text(markers[std::size_t(row)]));
     if (list.empty()) continue;
     const MarkerSummary& marker = list[std::size_t(row)];
@@ -302,11 +284,11 @@ void SequenceWindow::fill_tables() {
   by_frames_->setHorizontalHeaderLabels(titles);
   by_frames_->setRowCount(sequence ? int(sequence->frames.size()) : 0);
   for (int row = 0; row < by_frames_->rowCount(); ++row) {
-    by_frames_->setItem(row, 0, cell_of(QString::number(sequence->frames[std::size_t(row)])));
+    by_frames_->setItem(row, 0, list_cell(QString::number(sequence->frames[std::size_t(row)])));
     for (std::size_t m = 0; m < markers.size(); ++m) {
       const track::TrackedMarker& marker = sequence->markers[std::size_t(row)][m];
       by_frames_->setItem(row, int(m) + 1,
-                          cell_of(words_of_marker(marker), marker.status != track::MarkerStatus::tracked));
+                          list_cell(words_of_marker(marker), marker.status != track::MarkerStatus::tracked));
     }
   }
 }
@@ -317,7 +299,7 @@ void SequenceWindow::mark_frame() {
   by_frames_->setCurrentCell(displayed_, 0);
   for (int row = 0; row < markers_->rowCount(); ++row) {
     const track::TrackedMarker& now = shown_->sequence->markers[std::size_t(displayed_)][std::size_t(row)];
-    markers_->setItem(row, 1, cell_of(words_of_marker(now), now.status != track::MarkerStatus::tracked));
+    markers_->setItem(row, 1, list_cell(words_of_marker(now), now.status != track::MarkerStatus::tracked));
   }
   show_curves();
   show_scene();

@@ -73,14 +73,14 @@ TEST_F(WindowRun, SavedFilmHasEachImageWithItsOwnLabels) {
   ASSERT_NO_FATAL_FAILURE(open());
   click("runCalibrate");
   ASSERT_NO_FATAL_FAILURE(wait_free());
-  run()->save_film(folder_);
-  ASSERT_TRUE(wait("it is saved", [&] { return says().find("film's images") != std::string::npos; }));
   run()->set_frame(5);
   ASSERT_NO_FATAL_FAILURE(wait_free());
   auto* view = run()->findChild<XrayView*>();
   QImage displayed(view->size(), QImage::Format_RGB32);
   view->render(&displayed);
-  QImage saved((folder_ / "image-00006.png").c_str());
+  run()->save_film(folder_);
+  ASSERT_TRUE(wait("it is saved", [&] { return says().find("film's images") != std::string::npos; }));
+  const QImage saved((folder_ / "image-00006.png").c_str());
   EXPECT_EQ(saved.convertToFormat(QImage::Format_RGB32), displayed);
 }
 

@@ -141,13 +141,13 @@ TEST_F(WindowSequence, SavedFilmHasEachFrameWithItsOwnMarks) {
   ASSERT_NO_FATAL_FAILURE(wait_free());
   QTest::mouseClick(sequence()->findChild<QPushButton*>("sequenceFollow"), Qt::LeftButton);
   ASSERT_NO_FATAL_FAILURE(wait_free());
-  sequence()->save_film(folder_);
-  ASSERT_TRUE(wait("it is saved", [&] { return says().find("film's frames") != std::string::npos; }));
   sequence()->set_frame(1);
   ASSERT_NO_FATAL_FAILURE(wait_free());
   QWidget* film = sequence()->findChild<XrayView*>()->parentWidget();
   QImage displayed(film->size(), QImage::Format_RGB32);
   film->render(&displayed);
+  sequence()->save_film(folder_);
+  ASSERT_TRUE(wait("it is saved", [&] { return says().find("film's frames") != std::string::npos; }));
   const QImage saved((folder_ / "frame-00002.png").c_str());
   EXPECT_EQ(saved.convertToFormat(QImage::Format_RGB32), displayed);
 }

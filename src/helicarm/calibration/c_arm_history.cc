@@ -178,8 +178,12 @@ std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const st
                                .asDiagonal();
   const auto [values, vectors] = geometry::symmetric_eigen(information - assumed);
   const Matrix3d own = vectors * values.cwiseMax(least_information).asDiagonal() * vectors.transpose();
+  // Along a direction that the image does not determine, the posterior is as good as any estimate.
+  constexpr double least_determined = 1e-4;  // of 100 mm
+  const Vector3d variances = (values.array() < least_determined).select(0, values.array().inverse());
   // The posterior is the mean of estimate and nominal values, weighted by `own` and `assumed`.
-  const Vector3d estimate = posterior + own.inverse() * (assumed * (posterior - nominal));
+  const Vector3d estimate = posterior + vectors * (variances.asDiagonal() *
+                                                   (vectors.transpose() * (assumed * (posterior - nominal))));
   return HistoryEntry{image, view.name, estimate, own};
 }
 

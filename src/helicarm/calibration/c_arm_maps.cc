@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/LU>
+#include <Eigen/Cholesky>
 
 #include "helicarm/calibration/c_arm_position.h"
 
@@ -19,6 +19,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t most_maps = 60;
+constexpr std::size_t least_for_share = 4;  // fewer maps do not tell the share of what is new in each
 // What is known before any map: an intensifier of 1024 pixels deforms by some tenths of a pixel over the
 // positions, mostly in low degrees. It counts as this many maps.
 constexpr double usual_weight = 2;
@@ -32,7 +33,9 @@ std::vector<std::optional<Eigen::Vector3d>> directions_of(std::span<const Histor
   return directions;
 }
 
-/// Ordinary kriging (Cressie 1993, 3.2): weights of sum 1, and the prediction's variance over the process's.
+/// Kriging about the mean of the maps (Cressie 1993, 3.4.5): weights of sum 1, and the prediction's variance
+/// over the process's. The best estimate of the mean would extrapolate from positions that are close
+/// together.
 struct Prediction {
   VectorXd weights;
   double variance = 0;
@@ -41,24 +44,28 @@ struct Prediction {
 /// `left_out`: of the maps, does not count.
 Prediction predicted(const std::vector<std::optional<Eigen::Vector3d>>& at, double repeat_share,
                      const std::optional<Eigen::Vector3d>& wanted, std::size_t left_out) {
-  const Index n = Index(at.size());
-  MatrixXd system = MatrixXd::Zero(n + 1, n + 1);
-  VectorXd right = VectorXd::Zero(n + 1);
+  std::vector<Index> used;
+  for (std::size_t i = 0; i < at.size(); ++i)
+    if (i != left_out) used.push_back(Index(i));
+  const Index n = std::ssize(used);
+  MatrixXd among(n, n);
+  VectorXd with_wanted(n);
+  const auto alike = [&](const auto& a, const auto& b) {
+    return (1 - repeat_share) * position_correlation(a, b);
+  };
   for (Index i = 0; i < n; ++i) {
-    if (std::size_t(i) == left_out) {
-      system(i, i) = 1;  // its weight is 0
-      continue;
-    }
+    const auto& place = at[std::size_t(used[std::size_t(i)])];
     for (Index j = 0; j < n; ++j)
-      if (std::size_t(j) != left_out)
-        system(i, j) =
-            i == j ? 1 : (1 - repeat_share) * position_correlation(at[std::size_t(i)], at[std::size_t(j)]);
-    system(i, n) = system(n, i) = 1;
-    right[i] = (1 - repeat_share) * position_correlation(at[std::size_t(i)], wanted);
+      among(i, j) = i == j ? 1 : alike(place, at[std::size_t(used[std::size_t(j)])]);
+    with_wanted[i] = alike(place, wanted);
   }
-  right[n] = 1;
-  const VectorXd solved = system.fullPivLu().solve(right);
-  return {solved.head(n), std::max(repeat_share, 1 - solved.dot(right))};
+  VectorXd weights = among.ldlt().solve(with_wanted);
+  weights.array() += (1 - weights.sum()) / double(n);
+  Prediction prediction{
+      VectorXd::Zero(Index(at.size())),
+      std::max(repeat_share, 1 - 2 * weights.dot(with_wanted) + weights.dot(among * weights))};
+  for (Index i = 0; i < n; ++i) prediction.weights[used[std::size_t(i)]] = weights[i];
+  return prediction;
 }
 
 constexpr std::size_t no_entry = std::numeric_limits<std::size_t>::max();
@@ -172,7 +179,8 @@ std::optional<CArmMaps> c_arm_maps(std::span<const HistoryEntry> entries) {
   const auto at = directions_of(model.entries);
   model.repeat_share = usual_repeat_share;
   Residuals best;
-  if (maps.size() > 1) {
+  if (maps.size() > 1) best = held_out(values, at, model.repeat_share);
+  if (maps.size() >= least_for_share) {
     double least = std::numeric_limits<double>::infinity();
     for (const double share : {0.01, 0.03, 0.1, 0.3, 1.0}) {
       Residuals residuals = held_out(values, at, share);
@@ -200,6 +208,14 @@ std::optional<MapCheck> check_map(const CArmMaps& model, const HistoryEntry& acq
                   std::sqrt(there.variance * expected_square(model.variation))};
 }
 
+bool is_far_from_maps(const CArmMaps& model, std::optional<double> primary_deg,
+                      std::optional<double> secondary_deg) {
+  constexpr double little = 0.75;  // of the variance
+  return predicted(directions_of(model.entries), model.repeat_share,
+                   c_arm_direction(primary_deg, secondary_deg), no_entry)
+             .variance > little;
+}
+
 rectification::DistortionMap map_at(const CArmMaps& model, std::optional<double> primary_deg,
                                     std::optional<double> secondary_deg) {
   const Prediction there = predicted(directions_of(model.entries), model.repeat_share,
@@ -214,6 +230,8 @@ rectification::DistortionMap map_at(const CArmMaps& model, std::optional<double>
         there.weights[Index(i)] * map.rectified_pixel_mm.value_or(like.rectified_pixel_mm.value_or(0));
   }
   if (like.rectified_pixel_mm) like.rectified_pixel_mm = pixel_mm;
+  like.residual_rms_px = like.residual_max_px = 0;
+  like.held_out_rms_px = std::sqrt(2 * there.variance * expected_square(model.variation));
   return rectification::map_through(model.field, weighted(model.displacements, there.weights),
                                     model.variation, there.variance, like);
 }

@@ -43,7 +43,11 @@ std::optional<CArmMaps> c_arm_maps(std::span<const HistoryEntry> entries);
 /// size.
 std::optional<MapCheck> check_map(const CArmMaps& model, const HistoryEntry& acquired);
 
-/// The map of an image at these angles, with its covariance; without angles all positions are as likely.
+/// Whether the maps say little more of these angles than their mean: none are stated, or no map is near.
+bool is_far_from_maps(const CArmMaps& model, std::optional<double> primary_deg,
+                      std::optional<double> secondary_deg);
+
+/// The map of an image at these angles, with its covariance; without angles it is the mean.
 rectification::DistortionMap map_at(const CArmMaps& model, std::optional<double> primary_deg,
                                     std::optional<double> secondary_deg);
 

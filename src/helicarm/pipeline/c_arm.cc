@@ -24,7 +24,8 @@ Expected<CArmAcquisitions> measured_acquisitions(const Case& the_case, unsigned 
       return fail(
           Reason::residual_too_large,
           "the residuals contradict the noise model, or no view alone determines its camera: the case "
-          "says nothing of the C-arm");
+          "says nothing of the C-arm (exchanged plate images, wrong pixel size or calibrator's file: "
+          "`helicarm run` of it names causes)");
     return CArmAcquisitions{result.calibration->entries, result.warnings};
   });
 }
@@ -122,7 +123,8 @@ std::optional<Failure> c_arm_change(const calibration::CArmCheck& check) {
     return Failure{
         Reason::c_arm_changed,
         fmt::format("the distortion is {:.2f} px rms from what the record predicts (sigma {:.2f}): the "
-                    "intensifier or its settings have changed, the record is another C-arm's, or "
+                    "intensifier or its settings have changed, the record is another C-arm's, or the stated "
+                    "angles or "
                     "the plate's file is wrong",
                     map->error_px, map->sigma_px),
         map->view,

@@ -58,7 +58,11 @@ std::vector<calibration::HistoryEntry> entries_of(const LabelledViews& views,
 /// model.
 std::vector<calibration::HistoryEntry> new_entries(const CaseCalibration& calibration,
                                                    const calibration::CommonPrior& common) {
-  if (calibration.variance_scale != 1) return {};
+  if (calibration.variance_scale != 1 ||
+      std::ranges::any_of(calibration.images, [](const LabelledView& view) {
+        return view.rectification.source == rectification::MapSource::record;  // it told this itself
+      }))
+    return {};
   std::vector<calibration::ViewFiducials> fiducials;
   for (std::size_t i = 0; i < calibration.images.size(); ++i) {
     fiducials.push_back(fiducials_of(calibration.images[i]));

@@ -2,6 +2,7 @@
 #include "helicarm/pipeline/stages.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -47,6 +48,17 @@ OrRefusal<std::vector<Next>> joined(Stage stage, std::vector<View> views,
   return next;
 }
 
+void check_size(const xray::XrayImage& xray_image, const rectification::DistortionMap& recorded) {
+  const image::Image<float>& pixels = xray_image.pixels;
+  if (pixels.width() != recorded.width || pixels.height() != recorded.height)
+    throw BadInput(
+        Reason::plate_mismatch,
+        fmt::format(
+            "the image has {} x {} pixels, and the C-arm's record (--machine) holds distortion maps of "
+            "{} x {}: record a case with a plate in this mode, or name plate_image or map",
+            pixels.width(), pixels.height(), recorded.width, recorded.height));
+}
+
 struct KnownMap {
   rectification::DistortionMap map;
   rectification::MapSource source;
@@ -64,6 +76,7 @@ Expected<KnownMap> map_of(const xray::XrayImage& xray_image, const CaseView& fro
       return {value_or_throw(plate_image_map(from, *plate, options.method, options.cache)),
               MapSource::plate_image};
     const xray::Acquisition& acquisition = xray_image.acquisition;
+    if (options.maps) check_size(xray_image, *options.maps->entries.back().map);
     if (options.maps)
       return {map_at(*options.maps, acquisition.primary_angle_deg, acquisition.secondary_angle_deg),
               MapSource::record};
@@ -74,6 +87,20 @@ Expected<KnownMap> map_of(const xray::XrayImage& xray_image, const CaseView& fro
 /// Whether the map comes from the plate in the image itself.
 bool shows_plate(const CaseView& view, const std::optional<phantom::Plate>& plate) {
   return plate && !view.map && !view.plate_image;
+}
+
+Warning far_from_record(const rectification::DistortionMap& map, bool states_angles) {
+  const double expected_px = map.held_out_rms_px / std::sqrt(2.0);
+  return {Reason::residual_distortion,
+          fmt::format(
+              "{}, so the map by the C-arm's record is little more than the mean of its maps: {:.2f} px per "
+              "axis off, as its covariance says; {}",
+              states_angles ? "no recorded position is near that of the image"
+                            : "the image does not state the positioner's angles",
+              expected_px,
+              states_angles ? "record a case with the plate near it" : "state them beside the image"),
+          {},
+          {{"expected_px", expected_px}}};
 }
 
 bool has_no_map(const CaseView& view, const std::optional<phantom::Plate>& plate) {
@@ -98,6 +125,12 @@ Expected<rectification::Rectification> rectify_view(DetectedView& view, const Ca
                            return rectification::with_map(xray_image, view.dots, known.map, plate);
                          });
   if (rectified) rectified->source = source;
+  if (rectified && source == rectification::MapSource::record) {
+    const xray::Acquisition& acquisition = xray_image.acquisition;
+    if (is_far_from_maps(*options.maps, acquisition.primary_angle_deg, acquisition.secondary_angle_deg))
+      rectified->warnings.push_back(
+          far_from_record(rectified->map, acquisition.primary_angle_deg.has_value()));
+  }
   if (rectified) detection::dots_of(view.dots, xray_image, rectified->metal);
   return rectified;
 }

@@ -205,6 +205,12 @@ Failure with_cause(const Refusal& refusal, const Case& the_case, const RunOption
   }
   if (const auto factor = excess_width(trial))
     return unequal_pixels(failure, at->xray_image->pixels, *factor);
+  if (of_labels && at->rectification && at->rectification->map.is_identity() &&
+      rectification::round_field(*at->xray_image))
+    failure.message +=
+        ". The field is round as an image intensifier's, and neither plate nor map rectifies it: name the "
+        "plate, "
+        "plate_image or map, or a C-arm's record that holds maps (--machine)";
   if (!of_labels || !tags.pixel_mm || !tags.source_detector_mm) return failure;
   const auto focal = fitted_focal(trial, options.threads);
   if (!focal) return failure;
