@@ -84,7 +84,7 @@ function(helicarm_public target scope)
   target_compile_features(${target} ${scope} cxx_std_20)
 endfunction()
 
-# Of modules in which little of a run's time is spent: Clang takes a third less for them. GCC's precompiled header is of one
+# Of modules in which little of a run's time is spent: Clang takes a fifth less for them. GCC's precompiled header is of one
 # level of optimisation.
 set(helicarm_cold_options $<$<AND:$<CONFIG:Release>,$<CXX_COMPILER_ID:Clang>>:-O1>)
 
