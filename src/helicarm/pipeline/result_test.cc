@@ -50,7 +50,7 @@ TEST(ResultJson, HasEveryKeyOfTheContract) {
                "dlt", "intrinsics", "camera_from_calibrator", "reprojection_rms_px", "chi2", "dof"});
   EXPECT_EQ(json["views"][0]["image_size"], Json({8, 6}));
   expect_keys(json["views"][0]["rectification"],
-              {"model", "dots_found", "dots_expected", "residual_rms_px", "residual_max_px",
+              {"model", "source", "dots_found", "dots_expected", "residual_rms_px", "residual_max_px",
                "held_out_rms_px", "raw_mean_px", "raw_max_px", "rectified_pixel_mm", "rectified_plane"});
   expect_keys(json["views"][0]["fiducials"][0],
               {"label", "status", "uv_raw", "uv", "sigma_px", "residual_px"});

@@ -17,6 +17,8 @@ namespace helicarm::pipeline {
 /// Descriptions (core/output.h) of a view of result.json.
 
 inline constexpr std::array<std::string_view, 2> plane_words{"plate", "detector"};
+inline constexpr std::array<std::string_view, 5> map_sources{"none", "plate", "plate_image", "file",
+                                                             "record"};
 template <class Output>
 void describe_rectification(Output& output,
                             const std::optional<rectification::Rectification>& rectification) {
@@ -30,6 +32,11 @@ void describe_rectification(Output& output,
   };
   output.value(
       "model", [&] { return std::string(map->model->name()); }, "of the distortion");
+  output.word(
+      "source",
+      helicarm::output::if_set(rectification ? &*rectification : nullptr,
+                               [](const Rectification& of) { return map_sources[std::size_t(of.source)]; }),
+      map_sources, "of the map: `record` is that of a C-arm, `none` a flat panel");
   output.value(
       "dots_found", [&] { return rectification->dots_found; }, "of the plate");
   number("dots_expected", rectification, &Rectification::dots_expected,
