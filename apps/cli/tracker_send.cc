@@ -43,9 +43,9 @@ void send_repeatedly(tracker::IgtlServer& server, std::vector<tracker::IgtlMessa
 
 CommandResult tracker_send_command(const TrackerSendArguments& arguments, Console& console) {
   return guarded([&] {
+    StopSignal interrupt;  // before the measurement's threads
     const case_registration::Measurement measured = value_or_throw(measured_case(arguments.run, console));
     const auto messages = value_or_throw(operation::messages_of_views(measured.result));
-    StopSignal interrupt;
     const auto server = value_or_throw(tracker::IgtlServer::start(arguments.options));
     if (!console.quiet)
       console.progress << fmt::format("{} images and cameras at {} port {}\n", messages.size() / 2,
