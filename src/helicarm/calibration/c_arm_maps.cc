@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <ranges>
 
 #include <Eigen/Cholesky>
 
@@ -137,6 +138,21 @@ bool are_alike(const rectification::DistortionMap& a, const rectification::Disto
   return a.width == b.width && a.height == b.height && std::abs(pixel_a - pixel_b) <= tolerance * pixel_b;
 }
 
+/// The latest few of each position, so that daily images of two positions do not push out the others.
+void keep_latest(std::vector<HistoryEntry>& entries) {
+  constexpr double alike = 0.99;  // correlation: within 6 degrees
+  constexpr int most_alike = 4;
+  const auto at = directions_of(entries);
+  std::vector<HistoryEntry> kept;
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = entries.size(); i-- > 0 && chosen.size() < most_maps;)
+    if (std::ranges::count_if(
+            chosen, [&](std::size_t k) { return position_correlation(at[i], at[k]) > alike; }) < most_alike)
+      chosen.push_back(i);
+  for (const std::size_t i : chosen | std::views::reverse) kept.push_back(std::move(entries[i]));
+  entries = std::move(kept);
+}
+
 std::vector<rectification::DistortionMap> maps_of(const CArmMaps& model) {
   std::vector<rectification::DistortionMap> maps;
   for (const HistoryEntry& entry : model.entries) maps.push_back(*entry.map);
@@ -168,8 +184,7 @@ std::optional<CArmMaps> c_arm_maps(std::span<const HistoryEntry> entries) {
   if (model.entries.empty()) return {};
   const rectification::DistortionMap latest = *model.entries.back().map;
   std::erase_if(model.entries, [&](const HistoryEntry& entry) { return !are_alike(*entry.map, latest); });
-  if (model.entries.size() > most_maps)
-    model.entries.erase(model.entries.begin(), model.entries.end() - std::ptrdiff_t(most_maps));
+  keep_latest(model.entries);
   double radius_px = 0;
   for (const HistoryEntry& entry : model.entries) radius_px = std::max(radius_px, entry.field_radius_px);
   const auto maps = maps_of(model);

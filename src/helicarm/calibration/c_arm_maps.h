@@ -13,7 +13,7 @@ namespace helicarm::calibration {
 
 /// A map beside what others predict of it.
 struct MapCheck {
-  std::size_t entry = 0;     ///< among the model's     ///< index in the model
+  std::size_t entry = 0;     ///< index in the model
   double error_px = 0;       ///< per axis, root mean square over the field
   double of_one_map_px = 0;  ///< of the mean of the others
   double predicted_px = 0;   ///< what the model expects of `error_px`
@@ -23,7 +23,8 @@ struct MapCheck {
 /// are a Gaussian process over the position (Rasmussen and Williams 2006, 2.2), the same for all places of
 /// the field, with a constant mean.
 struct CArmMaps {
-  std::vector<HistoryEntry> entries;  ///< that have a map, of the latest one's image size and pixel size
+  /// That have a map, of the latest one's image size and pixel size; of one position the latest few.
+  std::vector<HistoryEntry> entries;
   rectification::MapField field;
   std::vector<Eigen::MatrixX2d> displacements;  ///< of each entry's map, at the field's places, px
   double repeat_share = 0;  ///< of the variance, from one acquisition to the next in one position

@@ -140,6 +140,16 @@ TEST(CArmMaps, AnotherDistortionIsAChangeOfTheCArm) {
   EXPECT_TRUE(other.maps[0].is_changed || other.maps[1].is_changed);
 }
 
+TEST(CArmMaps, ManyMapsOfOnePositionDoNotPushOutTheOthers) {
+  const Intensifier intensifier(1);
+  std::vector<HistoryEntry> entries = intensifier.around({0, 45, 90});
+  for (int day = 0; day < 80; ++day) entries.push_back(entries[0]);
+  const auto kept = c_arm_maps(entries)->entries;
+  ASSERT_EQ(kept.size(), 6u);  // the latest four at 0 degrees, and two others
+  EXPECT_EQ(kept[0].primary_deg, 45);
+  EXPECT_EQ(kept[1].primary_deg, 90);
+}
+
 TEST(CArmMaps, MapsOfAnotherImageSizeAreLeftOut) {
   const Intensifier intensifier(1);
   std::vector<HistoryEntry> maps = intensifier.around({0, 30});
