@@ -6,6 +6,8 @@
 #include <iterator>
 #include <limits>
 
+#include "helicarm/geometry/near_points.h"
+
 namespace helicarm::detection {
 namespace {
 
@@ -18,24 +20,44 @@ image::Image<float> even_noise(const xray::XrayImage& xray_image) {
   return even;
 }
 
+std::vector<Eigen::Vector2d> centres_of(const std::vector<Dot>& dots) {
+  std::vector<Eigen::Vector2d> centres;
+  for (const Dot& dot : dots) centres.push_back(dot.centre_px);
+  return centres;
+}
+
+double largest_radius(const std::vector<Dot>& dots) {
+  double largest = 0;
+  for (const Dot& dot : dots) largest = std::max(largest, dot.radius_px);
+  return largest;
+}
+
 /// Of overlapping duplicates only the best is kept.
 std::vector<Dot> without_doubles(std::vector<Dot> dots) {
-  std::stable_sort(dots.begin(), dots.end(), [](const Dot& a, const Dot& b) { return a.misfit < b.misfit; });
+  std::ranges::stable_sort(dots, {}, &Dot::misfit);
+  const double reach = 0.6 * largest_radius(dots);
+  const geometry::NearPoints near(centres_of(dots), reach);
+  std::vector<bool> is_kept(dots.size(), false);
   std::vector<Dot> kept;
-  for (const Dot& dot : dots) {
-    const bool taken = std::any_of(kept.begin(), kept.end(), [&](const Dot& other) {
-      return (dot.centre_px - other.centre_px).norm() < 0.6 * std::max(dot.radius_px, other.radius_px);
+  for (std::size_t i = 0; i < dots.size(); ++i) {
+    is_kept[i] = true;
+    near.visit(dots[i].centre_px, reach, [&](std::size_t j, double squared) {
+      if (j < i && is_kept[j] && std::sqrt(squared) < 0.6 * std::max(dots[i].radius_px, dots[j].radius_px))
+        is_kept[i] = false;
     });
-    if (!taken) kept.push_back(dot);
+    if (is_kept[i]) kept.push_back(dots[i]);
   }
   return kept;
 }
+
+constexpr double beside_radii = 2.5, beside_px = 12;  // from a dot's centre to the rim of one beside it
 
 std::vector<Disc> discs_beside(const Dot& dot, const std::vector<Dot>& dots) {
   std::vector<Disc> discs;
   for (const Dot& other : dots) {
     const double distance = (other.centre_px - dot.centre_px).norm();
-    if (distance > 0.5 * dot.radius_px && distance < 2.5 * dot.radius_px + 12 + other.radius_px)
+    if (distance > 0.5 * dot.radius_px &&
+        distance < beside_radii * dot.radius_px + beside_px + other.radius_px)
       discs.push_back({other.centre_px, other.radius_px + 1.5});
   }
   return discs;
@@ -180,11 +202,27 @@ std::vector<Dot> find_clear_dots(const xray::XrayImage& xray_image, const DotOpt
   return clear;
 }
 
+std::vector<std::optional<Dot>> refit_each(const xray::XrayImage& xray_image, const std::vector<Dot>& dots,
+                                           const DotAppearance& appearance,
+                                           const std::vector<Dot>& neighbours) {
+  // Of a group that is fitted together, those beside each member count.
+  const double reach =
+      2 * ((beside_radii + 1) * std::max(largest_radius(dots), largest_radius(neighbours)) + beside_px);
+  const geometry::NearPoints near(centres_of(neighbours), reach);
+  std::vector<std::optional<Dot>> refitted;
+  for (const Dot& dot : dots) {
+    std::vector<Dot> beside;
+    for (const std::size_t i : near.within(dot.centre_px, reach)) beside.push_back(neighbours[i]);
+    refitted.push_back(refit(xray_image, dot, appearance, beside));
+  }
+  return refitted;
+}
+
 std::vector<Dot> refit_dots(const xray::XrayImage& xray_image, const std::vector<Dot>& dots,
                             const DotAppearance& appearance, const std::vector<Dot>& neighbours) {
   std::vector<Dot> refitted;
-  for (const Dot& dot : dots)
-    if (const auto better = refit(xray_image, dot, appearance, neighbours)) refitted.push_back(*better);
+  for (const auto& dot : refit_each(xray_image, dots, appearance, neighbours))
+    if (dot) refitted.push_back(*dot);
   return refitted;
 }
 

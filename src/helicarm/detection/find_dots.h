@@ -46,8 +46,12 @@ std::vector<Dot> dots_except(const std::vector<Dot>& dots, const std::vector<Dot
 std::vector<Dot> find_clear_dots(const xray::XrayImage& xray_image, const DotOptions& options,
                                  double clear_sigma_px = 0.15);
 
-/// Refits every dot with the appearance of its kind and its neighbours masked; dots whose fit fails are
-/// dropped.
+/// Refits every dot with the appearance of its kind and its neighbours masked; nothing where the fit fails.
+std::vector<std::optional<Dot>> refit_each(const xray::XrayImage& xray_image, const std::vector<Dot>& dots,
+                                           const DotAppearance& appearance,
+                                           const std::vector<Dot>& neighbours);
+
+/// `refit_each` without the dots whose fit fails.
 std::vector<Dot> refit_dots(const xray::XrayImage& xray_image, const std::vector<Dot>& dots,
                             const DotAppearance& appearance, const std::vector<Dot>& neighbours);
 

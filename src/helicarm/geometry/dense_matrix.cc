@@ -15,6 +15,7 @@ SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix) {
 
 Eigen::MatrixXd gram(const Eigen::MatrixXd& matrix) {
   Eigen::MatrixXd product = Eigen::MatrixXd::Zero(matrix.cols(), matrix.cols());
+  if (matrix.rows() == 0) return product;  // by which Eigen would divide
   product.selfadjointView<Eigen::Lower>().rankUpdate(matrix.transpose());
   product.triangularView<Eigen::StrictlyUpper>() = product.transpose();
   return product;

@@ -26,6 +26,8 @@ TEST(Gram, IsTheProductOfTheTransposeAndTheMatrix) {
   EXPECT_TRUE(gram(matrix).isApprox(matrix.transpose() * matrix, 1e-14));
 }
 
+TEST(Gram, OfNoRowsIsZero) { EXPECT_EQ(gram(Eigen::MatrixXd(0, 3)), Eigen::MatrixXd::Zero(3, 3)); }
+
 TEST(RightSingular, DescendingValuesAndOrthonormalVectorsRebuildTheNormalMatrix) {
   const Eigen::MatrixXd matrix = tall_matrix();
   const auto [values, vectors] = right_singular(matrix);

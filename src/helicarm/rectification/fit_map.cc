@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
+#include "helicarm/geometry/near_points.h"
 #include "helicarm/rectification/models/monomials.h"
 #include "helicarm/rectification/models/polynomial.h"
 #include "helicarm/rectification/pixel_map.h"
@@ -57,18 +58,12 @@ PlateDots gather(const std::vector<Correspondence>& dots, const std::vector<Vect
 }
 
 /// For each dot its nearest neighbours, nearest first.
-std::vector<std::vector<std::size_t>> neighbours_of(const std::vector<Vector2d>& places) {
-  const std::size_t count = std::min<std::size_t>(8, places.size() - 1);
-  std::vector<std::vector<std::size_t>> neighbours(places.size());
-  std::vector<std::pair<double, std::size_t>> by_distance(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    for (std::size_t j = 0; j < places.size(); ++j)
-      by_distance[j] = {(places[j] - places[i]).squaredNorm(), j};
-    by_distance[i].first = std::numeric_limits<double>::infinity();
-    std::partial_sort(by_distance.begin(), by_distance.begin() + static_cast<std::ptrdiff_t>(count),
-                      by_distance.end());
-    for (std::size_t k = 0; k < count; ++k) neighbours[i].push_back(by_distance[k].second);
-  }
+std::vector<std::vector<std::size_t>> neighbours_of(const std::vector<Vector2d>& places,
+                                                    const Normalisation& normalised) {
+  constexpr std::size_t count = 8;
+  const geometry::NearPoints near(places, 2 * normalised.scale / std::sqrt(double(places.size())));
+  std::vector<std::vector<std::size_t>> neighbours;
+  for (std::size_t i = 0; i < places.size(); ++i) neighbours.push_back(near.nearest_to(i, count));
   return neighbours;
 }
 
@@ -76,7 +71,7 @@ std::vector<std::vector<std::size_t>> neighbours_of(const std::vector<Vector2d>&
 /// A deviation shared by neighbours is local distortion of the screen, not an outlier.
 void reject_outliers(const std::vector<Correspondence>& dots, const std::vector<Vector2d>& places,
                      const Normalisation& normalised, std::vector<bool>& used) {
-  const auto neighbours = neighbours_of(places);
+  const auto neighbours = neighbours_of(places, normalised);
   for (std::size_t round = 0; round < 10; ++round) {
     const PlateDots data = gather(dots, places, normalised, used);
     int order = 1;

@@ -8,52 +8,36 @@
 #include <map>
 #include <numbers>
 
+#include "helicarm/geometry/near_points.h"
+
 namespace helicarm::rectification {
 namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector2i;
 
-/// Dots in square cells, for constant-time neighbour search.
-class Cells {
- public:
-  Cells(const std::vector<detection::Dot>& dots, double size) : dots_(dots), size_(size) {
-    for (std::size_t i = 0; i < dots.size(); ++i) cells_[key(dots[i].centre_px)].push_back(i);
-  }
-  /// Nearest dot to a position within `reach` (at most the cell size), or -1.
-  int nearest(const Vector2d& position, double reach) const {
-    int best = -1;
-    double least = reach;
-    visit(position, [&](std::size_t i) {
-      if (const double d = (dots_[i].centre_px - position).norm(); d < least) {
-        least = d;
-        best = static_cast<int>(i);
-      }
-    });
-    return best;
-  }
-  template <class Visit>
-  void visit(const Vector2d& position, Visit&& see) const {
-    const auto [x, y] = key(position);
-    for (int dy = -1; dy <= 1; ++dy)
-      for (int dx = -1; dx <= 1; ++dx)
-        if (const auto cell = cells_.find({x + dx, y + dy}); cell != cells_.end())
-          for (const std::size_t i : cell->second) see(i);
-  }
+std::vector<Vector2d> centres_of(const std::vector<detection::Dot>& dots) {
+  std::vector<Vector2d> centres;
+  for (const detection::Dot& dot : dots) centres.push_back(dot.centre_px);
+  return centres;
+}
 
- private:
-  std::pair<int, int> key(const Vector2d& p) const {
-    return {static_cast<int>(std::floor(p.x() / size_)), static_cast<int>(std::floor(p.y() / size_))};
-  }
-  const std::vector<detection::Dot>& dots_;
-  double size_;
-  std::map<std::pair<int, int>, std::vector<std::size_t>> cells_;
-};
+/// Nearest dot to a position within `reach`, or -1.
+int nearest_dot(const geometry::NearPoints& near, const Vector2d& position, double reach) {
+  int best = -1;
+  double least = reach * reach;
+  near.visit(position, reach, [&](std::size_t i, double squared) {
+    if (squared < least) {
+      least = squared;
+      best = static_cast<int>(i);
+    }
+  });
+  return best;
+}
 
 /// Of each dot to another, in order of their columns, which end each search.
 std::vector<double> nearest_distances(const std::vector<detection::Dot>& dots) {
-  std::vector<Vector2d> by_column;
-  for (const detection::Dot& dot : dots) by_column.push_back(dot.centre_px);
+  std::vector<Vector2d> by_column = centres_of(dots);
   std::ranges::sort(by_column, {}, [](const Vector2d& centre) { return centre.x(); });
   std::vector<double> nearest(dots.size(), 1e9);
   for (std::size_t i = 0; i < by_column.size(); ++i) {
@@ -95,25 +79,25 @@ struct Seed {
 };
 
 /// Dots whose neighbours match the lattice, best first.
-std::vector<Seed> seeds(const std::vector<detection::Dot>& dots, const Cells& cells, phantom::Lattice kind,
-                        double pitch, double tolerance) {
+std::vector<Seed> seeds(const std::vector<detection::Dot>& dots, const geometry::NearPoints& near,
+                        phantom::Lattice kind, double pitch, double tolerance) {
   const double turn = kind == phantom::Lattice::square ? std::numbers::pi / 2 : std::numbers::pi / 3;
   std::vector<Seed> found;
   for (std::size_t i = 0; i < dots.size(); ++i) {
     const Vector2d here = dots[i].centre_px;
-    cells.visit(here, [&](std::size_t j) {
+    near.visit(here, 1.3 * pitch, [&](std::size_t j, double) {
       const Vector2d a = dots[j].centre_px - here;
       if (i == j || std::abs(a.norm() / pitch - 1) > tolerance) return;
       if (std::abs(std::atan2(a.y(), a.x())) > turn / 2 + 1e-9) return;  // the axis nearest to +u
       const Eigen::Rotation2Dd rotate(turn);
-      const int k = cells.nearest(here + rotate * a, 0.2 * pitch);
+      const int k = nearest_dot(near, here + rotate * a, 0.2 * pitch);
       if (k < 0) return;
       const Vector2d b = dots[static_cast<std::size_t>(k)].centre_px - here;
       double misfit = (b - rotate * a).norm();
       int there = 0;
       for (const Vector2i& step : steps_of(kind)) {
         const Vector2d position = here + step.x() * a + step.y() * b;
-        if (const int n = cells.nearest(position, 0.2 * pitch); n >= 0) {
+        if (const int n = nearest_dot(near, position, 0.2 * pitch); n >= 0) {
           ++there;
           misfit += (dots[static_cast<std::size_t>(n)].centre_px - position).norm();
         } else {
@@ -140,8 +124,8 @@ struct Frame {
   Vector2d a, b;
 };
 
-Places grow(const std::vector<detection::Dot>& dots, const Cells& cells, phantom::Lattice kind, double pitch,
-            const Seed& seed, const LatticeOptions& options) {
+Places grow(const std::vector<detection::Dot>& dots, const geometry::NearPoints& near, phantom::Lattice kind,
+            double pitch, const Seed& seed, const LatticeOptions& options) {
   Places places;
   std::map<Vector2i, Frame, IndexLess> frames;
   std::vector<bool> taken(dots.size(), false);
@@ -179,7 +163,7 @@ Places grow(const std::vector<detection::Dot>& dots, const Cells& cells, phantom
         const Vector2i next = at + gap * step;
         if (places.contains(next)) break;
         const Vector2d position = here + gap * (step.x() * frame.a + step.y() * frame.b);
-        const int n = cells.nearest(position, options.match_tolerance * pitch);
+        const int n = nearest_dot(near, position, options.match_tolerance * pitch);
         if (n < 0 || taken[static_cast<std::size_t>(n)]) continue;
         places[next] = static_cast<std::size_t>(n);
         frames[next] = frame;
@@ -204,14 +188,14 @@ IndexedLattice index_lattice(const std::vector<detection::Dot>& dots, phantom::L
   if (dots.size() < 5) return lattice;
   const double pitch = options.pitch_px.value_or(commonest_spacing(dots));
   if (!(pitch > 2)) return lattice;
-  const Cells cells(dots, 1.3 * pitch);
+  const geometry::NearPoints near(centres_of(dots), 1.3 * pitch);
   const double tolerance = options.pitch_px ? options.pitch_tolerance + 0.05 : 0.2;
-  const std::vector<Seed> starts = seeds(dots, cells, kind, pitch, tolerance);
+  const std::vector<Seed> starts = seeds(dots, near, kind, pitch, tolerance);
   Places best;
   Vector2d best_a = Vector2d::Zero();
   const std::size_t tries = std::min<std::size_t>(starts.size(), dots.size() > 500 ? 3 : 12);
   for (std::size_t k = 0; k < tries; ++k) {
-    Places places = grow(dots, cells, kind, pitch, starts[k], options);
+    Places places = grow(dots, near, kind, pitch, starts[k], options);
     if (places.size() > best.size()) {
       best = std::move(places);
       best_a = starts[k].a;

@@ -28,13 +28,11 @@ detection::DotAppearance refit_lattice_dots(const xray::XrayImage& xray_image,
   std::vector<detection::Dot> members;
   for (const IndexedDot& d : seen.lattice.dots) members.push_back(seen.dots[d.dot]);
   const detection::DotAppearance appearance = detection::estimate_appearance(xray_image, noise, members);
-  for (const IndexedDot& d : seen.lattice.dots) {
-    const auto refitted =
-        detection::refit_dots(xray_image, {seen.dots[d.dot]}, appearance, all.size() > 500 ? members : all);
-    if (!refitted.empty() &&
-        (refitted[0].centre_px - seen.dots[d.dot].centre_px).norm() < seen.dots[d.dot].radius_px)
-      seen.dots[d.dot] = refitted[0];
-  }
+  const auto refitted =
+      detection::refit_each(xray_image, members, appearance, all.size() > 500 ? members : all);
+  for (std::size_t i = 0; i < members.size(); ++i)
+    if (refitted[i] && (refitted[i]->centre_px - members[i].centre_px).norm() < members[i].radius_px)
+      seen.dots[seen.lattice.dots[i].dot] = *refitted[i];
   return appearance;
 }
 

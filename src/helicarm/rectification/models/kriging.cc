@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <optional>
 
 #include "helicarm/geometry/dense_matrix.h"
@@ -21,15 +20,22 @@ using Eigen::VectorXd;
 
 constexpr std::size_t max_knots = 240;
 
+/// The first points that are further than `gap` apart; nothing where they are more than `max_knots`.
+std::vector<Vector2d> spread_by(double gap, const std::vector<Vector2d>& points) {
+  std::vector<Vector2d> kept;
+  for (const Vector2d& p : points) {
+    if (!std::ranges::all_of(kept, [&](const Vector2d& q) { return (p - q).norm() > gap; })) continue;
+    if (kept.size() == max_knots) return {};
+    kept.push_back(p);
+  }
+  return kept;
+}
+
 /// A thinned, evenly spread subset of at most `max_knots` points.
 MatrixX2d thinned(const std::vector<Vector2d>& points) {
-  std::vector<Vector2d> kept = points;
-  for (double gap = 0.05; kept.size() > max_knots; gap *= 1.05) {
-    kept.clear();
-    for (const Vector2d& p : points)
-      if (std::all_of(kept.begin(), kept.end(), [&](const Vector2d& q) { return (p - q).norm() > gap; }))
-        kept.push_back(p);
-  }
+  std::vector<Vector2d> kept;
+  if (points.size() <= max_knots) kept = points;
+  for (double gap = 0.05; kept.empty(); gap *= 1.05) kept = spread_by(gap, points);
   MatrixX2d knots(static_cast<Index>(kept.size()), 2);
   for (Index k = 0; k < knots.rows(); ++k) knots.row(k) = kept[static_cast<std::size_t>(k)].transpose();
   return knots;
@@ -46,18 +52,30 @@ VectorXd basis_row(const Vector2d& t, int order, const MatrixX2d& knots, double 
   return row;
 }
 
-/// `basis_row` of every dot, column by column.
-MatrixXd rows_of_dots(const PlateDots& dots, int order, const MatrixX2d& knots, double length) {
-  const Index terms = term_count(order);
-  MatrixXd rows(dots.raw.rows(), terms + knots.rows());
-  rows.leftCols(terms) = rows_for(dots, [&](const Vector2d& t) { return monomials(t, order); });
-  const auto places = Eigen::Map<const Eigen::Matrix2Xd>(dots.points.front().data(), 2, rows.rows());
+/// Monomials of every dot, row by row.
+MatrixXd trend_of_dots(const PlateDots& dots, int order) {
+  return rows_for(dots, [&](const Vector2d& t) { return monomials(t, order); });
+}
+
+/// Kernels at the knots of every dot, column by column.
+MatrixXd kernels_of_dots(const PlateDots& dots, const MatrixX2d& knots, double length) {
+  MatrixXd kernels(dots.raw.rows(), knots.rows());
+  const auto places = Eigen::Map<const Eigen::Matrix2Xd>(dots.points.front().data(), 2, kernels.rows());
   const Eigen::ArrayXd x = places.row(0).transpose(), y = places.row(1).transpose();
   for (Index k = 0; k < knots.rows(); ++k) {
     const Eigen::ArrayXd s =
         ((x - knots(k, 0)).square() + (y - knots(k, 1)).square()).sqrt() * (std::sqrt(3.0) / length);
-    rows.col(terms + k) = (1 + s) * (-s).exp();
+    kernels.col(k) = (1 + s) * (-s).exp();
   }
+  return kernels;
+}
+
+/// `basis_row` of every dot.
+MatrixXd rows_of_dots(const PlateDots& dots, int order, const MatrixX2d& knots, double length) {
+  const Index terms = term_count(order);
+  MatrixXd rows(dots.raw.rows(), terms + knots.rows());
+  rows.leftCols(terms) = trend_of_dots(dots, order);
+  rows.rightCols(knots.rows()) = kernels_of_dots(dots, knots, length);
   return rows;
 }
 
@@ -78,61 +96,104 @@ struct Roughness {
   double misfit = std::numeric_limits<double>::infinity();  ///< -2 log of the restricted likelihood
 };
 
-/// Restricted likelihood (Patterson and Thompson 1971) of a remainder of one length, with the trend projected
-/// out, maximised over gains; the dots' own sigmas are accepted within a factor of 1.5.
-Roughness roughness_of(const PlateDots& data, const MatrixXd& rows, const MatrixXd& gram, double length) {
-  constexpr double log_variance_sigma = 0.8;
-  const Index knots = gram.rows();
-  const VectorXd root = data.weights.cwiseSqrt();
-  const MatrixXd weighted = root.asDiagonal() * rows;
-  const Index terms = rows.cols() - knots;
-  const MatrixXd trend = geometry::orthonormal_columns(weighted.leftCols(terms));
-  const auto whitens = geometry::whitening(gram);
-  if (!whitens) return {};
-  MatrixXd kernels = weighted.rightCols(knots);
-  kernels -= trend * (trend.transpose() * kernels);
-  MatrixX2d raw = root.asDiagonal() * data.raw;
-  raw -= trend * (trend.transpose() * raw);
-  const geometry::SymmetricEigen modes =
-      geometry::symmetric_eigen(*whitens * geometry::gram(kernels) * whitens->transpose());
-  const MatrixX2d along = modes.vectors.transpose() * (*whitens * (kernels.transpose() * raw));
-  const double freedom = 2.0 * double(rows.rows() - terms);
-  Roughness best;
-  for (double gain = 1e-2; gain < 1e6; gain *= 1.5) {
-    // y' (I + gain K K')^-1 y and log det (I + gain K K') for both axes, in the eigenbasis of K'K.
-    double energy = raw.squaredNorm();
-    double log_determinant = 0;
-    for (Index k = 0; k < knots; ++k) {
-      const double raised = 1 + gain * std::max(0.0, modes.values[k]);
-      energy -= gain / raised * along.row(k).squaredNorm();
-      log_determinant += 2 * std::log(raised);
-    }
-    energy = std::max(energy, 1e-12 * data.variance);
-    const auto misfit = [&](double log_variance) {
-      const double surprise = (log_variance - std::log(data.variance)) / log_variance_sigma;
-      return freedom * log_variance + energy * std::exp(-log_variance) + log_determinant +
-             surprise * surprise;
-    };
-    double x = std::log(energy / freedom);
-    for (int i = 0; i < 20; ++i) {
-      const double normal_prior = 2 / (log_variance_sigma * log_variance_sigma);
-      const double pull = energy * std::exp(-x);
-      x -= std::clamp((freedom - pull + normal_prior * (x - std::log(data.variance))) / (pull + normal_prior),
-                      -1.0, 1.0);
-    }
-    if (misfit(x) < best.misfit) best = {length, gain, std::exp(x), misfit(x)};
-  }
-  return best;
-}
-
 constexpr std::array lengths = {0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.1, 1.6, 2.2};
+
+/// Restricted likelihood (Patterson and Thompson 1971) of remainders, with the trend projected out. What the
+/// dots say of a length is kept: of trends up to the highest order, what is beyond a lower one is what is
+/// beyond the highest and what lies along its other columns.
+class Likelihood {
+ public:
+  Likelihood(const PlateDots& data, const MatrixX2d& knots, int highest)
+      : data_(data),
+        knots_(knots),
+        root_(data.weights.cwiseSqrt()),
+        trend_(geometry::orthonormal_columns(root_.asDiagonal() * trend_of_dots(data, highest))),
+        beyond_(root_.asDiagonal() * data.raw),
+        along_(trend_.transpose() * beyond_) {
+    beyond_ -= trend_ * along_;
+  }
+
+  /// Maximised over gains; the dots' own sigmas are accepted within a factor of 1.5.
+  Roughness at(int order, std::size_t length) {
+    if (!known_[length]) known_[length] = kernels_of(lengths[length]);
+    const Kernels& kernels = *known_[length];
+    if (kernels.beyond.size() == 0) return {};
+    const Index other = trend_.cols() - term_count(order);
+    const auto across = kernels.along.bottomRows(other);
+    const geometry::SymmetricEigen modes = geometry::symmetric_eigen(kernels.beyond + geometry::gram(across));
+    const MatrixX2d pulls =
+        modes.vectors.transpose() * (kernels.pulls + across.transpose() * along_.bottomRows(other));
+    return likeliest_gain(lengths[length], beyond_.squaredNorm() + along_.bottomRows(other).squaredNorm(),
+                          2.0 * double(trend_.rows() - term_count(order)), modes.values, pulls);
+  }
+
+ private:
+  /// Kernels of one length at the dots, whitened: knots are the columns.
+  struct Kernels {
+    MatrixXd beyond;  ///< of those beyond the trend, their products; empty where they look alike
+    MatrixXd along;   ///< along the trend's columns
+    MatrixX2d pulls;  ///< products of those beyond the trend and the dots' places
+  };
+
+  Kernels kernels_of(double length) const {
+    const auto whitens = geometry::whitening(gram_of(knots_, length));
+    if (!whitens) return {};
+    MatrixXd kernels = root_.asDiagonal() * kernels_of_dots(data_, knots_, length);
+    const MatrixXd along = trend_.transpose() * kernels;
+    kernels -= trend_ * along;
+    return {*whitens * geometry::gram(kernels) * whitens->transpose(), along * whitens->transpose(),
+            *whitens * (kernels.transpose() * beyond_)};
+  }
+
+  /// `energy`: of the places beyond the trend; `values`, `pulls`: eigenvalues of the kernels' products, and
+  /// the products with the places along their eigenvectors.
+  Roughness likeliest_gain(double length, double energy, double freedom, const VectorXd& values,
+                           const MatrixX2d& pulls) const {
+    constexpr double log_variance_sigma = 0.8;
+    Roughness best;
+    for (double gain = 1e-2; gain < 1e6; gain *= 1.5) {
+      // y' (I + gain K K')^-1 y and log det (I + gain K K') for both axes, in the eigenbasis of K'K.
+      double left = energy;
+      double log_determinant = 0;
+      for (Index k = 0; k < values.size(); ++k) {
+        const double raised = 1 + gain * std::max(0.0, values[k]);
+        left -= gain / raised * pulls.row(k).squaredNorm();
+        log_determinant += 2 * std::log(raised);
+      }
+      left = std::max(left, 1e-12 * data_.variance);
+      const auto misfit = [&](double log_variance) {
+        const double surprise = (log_variance - std::log(data_.variance)) / log_variance_sigma;
+        return freedom * log_variance + left * std::exp(-log_variance) + log_determinant +
+               surprise * surprise;
+      };
+      double x = std::log(left / freedom);
+      for (int i = 0; i < 20; ++i) {
+        const double normal_prior = 2 / (log_variance_sigma * log_variance_sigma);
+        const double pull = left * std::exp(-x);
+        x -= std::clamp(
+            (freedom - pull + normal_prior * (x - std::log(data_.variance))) / (pull + normal_prior), -1.0,
+            1.0);
+      }
+      if (misfit(x) < best.misfit) best = {length, gain, std::exp(x), misfit(x)};
+    }
+    return best;
+  }
+
+  const PlateDots& data_;
+  const MatrixX2d& knots_;
+  VectorXd root_;     ///< of the dots' weights
+  MatrixXd trend_;    ///< orthonormal columns that span the weighted monomials, of each order the first
+  MatrixX2d beyond_;  ///< weighted places beyond the trend
+  MatrixX2d along_;   ///< weighted places along the trend's columns
+  std::array<std::optional<Kernels>, lengths.size()> known_;
+};
 
 /// Likelier than both neighbours in `lengths`, by descent of the misfit from `start`, which becomes its
 /// index.
-Roughness likeliest_near(std::size_t& start, const std::function<Roughness(double)>& roughness_at) {
+Roughness likeliest_near(std::size_t& start, Likelihood& likelihood, int order) {
   std::array<std::optional<Roughness>, lengths.size()> known;
   const auto at = [&](std::size_t i) -> const Roughness& {
-    if (!known[i]) known[i] = roughness_at(lengths[i]);
+    if (!known[i]) known[i] = likelihood.at(order, i);
     return *known[i];
   };
   // Where the kernels of a length look alike, shorter ones can.
@@ -148,10 +209,9 @@ Roughness likeliest_near(std::size_t& start, const std::function<Roughness(doubl
 
 /// Universal kriging. Length, strength and dot noise maximise the restricted likelihood, whose search begins
 /// at the length of index `nearest`, and leaves there the index that it found.
-ModelFit fit_order(const PlateDots& dots, int order, const MatrixX2d& knots, std::size_t& nearest) {
-  const Roughness best = likeliest_near(nearest, [&](double length) {
-    return roughness_of(dots, rows_of_dots(dots, order, knots, length), gram_of(knots, length), length);
-  });
+ModelFit fit_order(const PlateDots& dots, int order, const MatrixX2d& knots, Likelihood& likelihood,
+                   std::size_t& nearest) {
+  const Roughness best = likeliest_near(nearest, likelihood, order);
   if (!(best.length > 0)) return {};
   const MatrixXd gram = gram_of(knots, best.length);
   const LinearFit fit = fit_linear(dots, rows_of_dots(dots, order, knots, best.length), gram / best.gain);
@@ -175,9 +235,10 @@ ModelFit kriging_fit(const PlateDots& dots, std::optional<int> order) {
   const int highest = n > 200 ? std::min(highest_order(n), 5) : cubic;
   if (highest_order(n) < order.value_or(cubic)) return {};
   const MatrixX2d knots = thinned(dots.points);
+  Likelihood likelihood(dots, knots, order.value_or(highest));
   std::size_t nearest = lengths.size() / 2;
   return simplest_good(order.value_or(cubic), order.value_or(highest),
-                       [&](int o) { return fit_order(dots, o, knots, nearest); });
+                       [&](int o) { return fit_order(dots, o, knots, likelihood, nearest); });
 }
 
 }  // namespace
