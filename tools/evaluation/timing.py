@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whole-process times and peak memory of measurements of simulated images: a table.
 
-  tools/evaluation/timing.py                       all tasks (about ten minutes on two cores, most of it simulation)
+  tools/evaluation/timing.py                       all tasks (about a quarter of an hour on two cores, most of it simulation)
   tools/evaluation/timing.py --images 50           runs of 50 images alone
   tools/evaluation/timing.py --readme README.md    renews the table between the tasks marks of that document
 
@@ -45,6 +45,20 @@ def row(task, commands, repeat):
     return line
 
 
+def enlarge(case, factor):
+    """The case's images with as many times the pixels along each side, of the same object."""
+    import cv2
+    import numpy
+    import pydicom
+    for file in case.glob("*.dcm"):
+        image = pydicom.dcmread(file)
+        pixels = cv2.resize(image.pixel_array, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC)
+        image.Rows, image.Columns = pixels.shape
+        image.PixelData = numpy.ascontiguousarray(pixels).tobytes()
+        image.ImagerPixelSpacing = [float(step) / factor for step in image.ImagerPixelSpacing]
+        image.save_as(file)
+
+
 def pairs(helicarm, folder, a):
     (folder / "dense.json").write_text(json.dumps(DENSE))
     for name, options in (("pair", []), ("dense", ["--plate", folder / "dense.json"])):
@@ -55,26 +69,29 @@ def pairs(helicarm, folder, a):
     cost(run("dense", "--no-cache")[0])
     holes = min(view["rectification"]["dots_found"] for view in json.loads((folder / "out" / "result.json").read_text())["views"])
     yield row(f"two images, perforated plate, {holes} holes and more found: `run`", run("dense", "--no-cache"), a.repeat)
+    enlarge(folder / "pair", 10)
+    yield row("two images of 10,240 x 10,240 pixels, plate of 48 dots: `run --no-report`", run("pair", "--no-cache", "--no-report"), 1)
 
 
 def runs(helicarm, folder, a):
     for images in a.images:
         case = folder / f"run-{images}"
-        cost([helicarm, "simulate", case, "--kind", "flat", "--run", images, "--seed", a.seed, "--quiet"])
-        yield row(f"run of {images} images, flat panel, knee: `sweep`", [[helicarm, "sweep", case, "--out", folder / "out", "--quiet"]], 1)
+        size = 1024 if images < 1000 else 512
+        cost([helicarm, "simulate", case, "--kind", "flat", "--run", images, "--size", size, "--seed", a.seed, "--quiet"])
+        yield row(f"run of {images} images of {size} x {size}, flat panel, knee: `sweep`", [[helicarm, "sweep", case, "--out", folder / "out", "--quiet"]], 1)
         for file in case.glob("*.dcm"):
             file.unlink()
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--images", type=int, nargs="+", help="sizes of the runs (default: 50 100 400), and runs alone")
+    parser.add_argument("--images", type=int, nargs="+", help="sizes of the runs (default: 50 100 400 1000), and runs alone")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--readme", type=Path)
     parser.add_argument("--helicarm", default=str(ROOT / "build/bin/helicarm"))
     options = parser.parse_args()
-    alone, options.images = options.images is not None, options.images or [50, 100, 400]
+    alone, options.images = options.images is not None, options.images or [50, 100, 400, 1000]
     print(*HEAD, sep="\n")
     with tempfile.TemporaryDirectory() as made:
         lines = [] if alone else list(pairs(options.helicarm, Path(made), options))

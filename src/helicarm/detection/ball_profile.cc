@@ -33,8 +33,10 @@ double sharp(double r, double absorbance) {
 }  // namespace
 
 BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorbance_(absorbance) {
-  constexpr int rings = 48;
-  constexpr double step = 1.0 / 96;
+  // Rings no further apart than the blur is wide, and places within it, also in a large ball.
+  const double detail = std::max(blur, 0.002);
+  const int rings = std::max(48, static_cast<int>(std::ceil(1.6 / detail)));
+  const double step = std::min(1.0 / 96, 0.25 * detail);
   const double reach = 1 + 4 * blur;
   const int count = static_cast<int>(std::ceil(reach / step)) + 2;
   per_unit_ = static_cast<float>(1 / step);
@@ -42,9 +44,8 @@ BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorban
   values_.resize(static_cast<std::size_t>(count));
   // Rings are denser towards the rim, where the chord length varies like a square root, and towards the
   // centre.
-  double radius[rings];
-  double weight[rings];
-  for (int k = 0; k < rings; ++k) {
+  std::vector<double> radius(static_cast<std::size_t>(rings)), weight(radius.size());
+  for (std::size_t k = 0; k < radius.size(); ++k) {
     const double a = double(k) / rings;
     const double b = double(k + 1) / rings;
     const auto place = [](double x) { return 0.5 * (1 - std::cos(std::numbers::pi * x)); };
@@ -54,7 +55,7 @@ BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorban
   for (int i = 0; i < count; ++i) {
     const double d = i * step;
     double sum = 0;
-    for (int k = 0; k < rings; ++k) {
+    for (std::size_t k = 0; k < radius.size(); ++k) {
       const double gap = radius[k] - d;
       const double exponent = gap * gap / (2 * blur * blur);
       if (exponent < 30)

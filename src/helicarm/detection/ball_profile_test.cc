@@ -49,6 +49,14 @@ TEST(BallProfile, SlopeAgreesWithDifferences) {
   EXPECT_NEAR(profile.at(0).slope, 0, 0.03);
 }
 
+TEST(BallProfile, OfALargeBallIsSmooth) {
+  for (const double blur : {0.03, 0.01, 0.003}) {
+    const BallProfile profile(blur, 1e-3);
+    for (double s = 0; s < 0.9; s += 0.0037)
+      EXPECT_NEAR(profile.at(float(s)).value, std::sqrt(1 - s * s), 10 * blur * blur + 2e-4) << blur;
+  }
+}
+
 TEST(BallProfile, IsZeroBeyondItsReach) {
   const BallProfile profile(0.2, 2);
   EXPECT_EQ(profile.at(profile.reach() + 0.01f).value, 0);

@@ -10,7 +10,7 @@ namespace helicarm::image {
 
 /// Limits for every image file.
 inline constexpr std::uint32_t max_image_side = 16384;
-inline constexpr std::size_t max_image_bytes = std::size_t{64} << 20;
+inline constexpr std::size_t max_image_bytes = std::size_t{256} << 20;
 
 /// A decoded grey image: values as stored, 0 .. 2^bits - 1.
 struct GreyImage {

@@ -7,13 +7,13 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/image/grey_image.h"
 #include "helicarm/xray/dicom_tags.h"
 
 namespace helicarm::xray {
 namespace {
 
-constexpr int max_side = 16384;
-constexpr std::size_t max_frame_bytes = std::size_t{64} << 20;
+constexpr int max_side = image::max_image_side;
 
 /// XA, RF, enhanced XA and XRF, CR, DX (for presentation and processing), secondary capture (single,
 /// multi-frame byte and word).
@@ -114,9 +114,9 @@ void check_size(DicomOutline& outline) {
   const auto frame_bytes = static_cast<std::size_t>(outline.rows) *
                            static_cast<std::size_t>(outline.columns) *
                            static_cast<std::size_t>(outline.bits_allocated / 8);
-  if (frame_bytes > max_frame_bytes)
+  if (frame_bytes > image::max_image_bytes)
     throw BadInput(Reason::bad_size, fmt::format("{}: {} bytes a frame, limit {}", elements.origin,
-                                                 frame_bytes, max_frame_bytes));
+                                                 frame_bytes, image::max_image_bytes));
   if (outline.encapsulated()) return check_fragments(outline);
   outline.pixel_data = elements.find(tags::pixel_data)->value;
   const std::size_t needed = frame_bytes * static_cast<std::size_t>(outline.frames);

@@ -31,7 +31,7 @@ struct ReceiverOptions {
   unsigned most_associations = 32;  ///< concurrent; more are rejected as transient
   unsigned most_of_address = 16;    ///< of these, from one address
   double spared_s = 2;              ///< an association can be replaced after this time without an image
-  std::size_t most_object_bytes = std::size_t{128} << 20;  ///< per image
+  std::size_t most_object_bytes = std::size_t{256} << 20;  ///< per image
   std::size_t most_bytes = std::size_t{512} << 20;         ///< total of images being received
   double request_limit_s = 10;                             ///< from connection to association
   double idle_limit_s = 30;                                ///< per PDU
