@@ -7,9 +7,8 @@
 #include <limits>
 #include <ranges>
 
-#include <Eigen/Cholesky>
-
 #include "helicarm/calibration/c_arm_position.h"
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -49,6 +48,7 @@ Prediction predicted(const std::vector<std::optional<Eigen::Vector3d>>& at, doub
   for (std::size_t i = 0; i < at.size(); ++i)
     if (i != left_out) used.push_back(Index(i));
   const Index n = std::ssize(used);
+  if (n == 0) return {VectorXd::Zero(Index(at.size())), 1};
   MatrixXd among(n, n);
   VectorXd with_wanted(n);
   const auto alike = [&](const auto& a, const auto& b) {
@@ -60,7 +60,7 @@ Prediction predicted(const std::vector<std::optional<Eigen::Vector3d>>& at, doub
       among(i, j) = i == j ? 1 : alike(place, at[std::size_t(used[std::size_t(j)])]);
     with_wanted[i] = alike(place, wanted);
   }
-  VectorXd weights = among.ldlt().solve(with_wanted);
+  VectorXd weights = geometry::solve_spd(among, with_wanted).solution;
   weights.array() += (1 - weights.sum()) / double(n);
   Prediction prediction{
       VectorXd::Zero(Index(at.size())),
