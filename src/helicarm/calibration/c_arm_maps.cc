@@ -102,7 +102,7 @@ rectification::MapVariation variation_of(const Residuals& residuals, const recti
   const std::vector<int> degrees = rectification::polynomial_degrees();
   const double scale = std::pow(width / usual_width_px, 2);
   rectification::MapVariation sums;
-  std::array<double, rectification::blended_order + 1> counts{};
+  std::array<double, rectification::field_order + 1> counts{};
   for (std::size_t d = 0; d < counts.size(); ++d) {
     counts[d] = usual_weight * 2 * double(d + 1);
     sums.variance_px2[d] = counts[d] * usual_px[d] * usual_px[d] * scale;

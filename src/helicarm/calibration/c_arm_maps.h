@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "helicarm/calibration/c_arm_history.h"
-#include "helicarm/rectification/blended_map.h"
+#include "helicarm/rectification/map_field.h"
 #include "helicarm/rectification/rectify.h"
 
 namespace helicarm::calibration {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/rectification/blended_map.h"
+#include "helicarm/rectification/map_field.h"
 
 #include <algorithm>
 #include <cmath>
@@ -18,9 +18,9 @@ using Eigen::Vector2d;
 namespace {
 
 MatrixXd monomial_rows(const MapField& field) {
-  MatrixXd rows(Index(field.places.size()), term_count(blended_order));
+  MatrixXd rows(Index(field.places.size()), term_count(field_order));
   for (Index i = 0; i < rows.rows(); ++i)
-    rows.row(i) = monomials(field.normalised(field.places[std::size_t(i)]), blended_order);
+    rows.row(i) = monomials(field.normalised(field.places[std::size_t(i)]), field_order);
   return rows;
 }
 
@@ -30,7 +30,7 @@ MatrixXd MapField::polynomials() const { return monomial_rows(*this) * from_mono
 
 std::vector<int> polynomial_degrees() {
   std::vector<int> degrees;
-  for (int degree = 0; degree <= blended_order; ++degree)
+  for (int degree = 0; degree <= field_order; ++degree)
     for (int k = 0; k <= degree; ++k) degrees.push_back(degree);
   return degrees;
 }
@@ -76,7 +76,7 @@ DistortionMap map_through(const MapField& field, const MatrixX2d& displacements,
     dots.raw.row(i) += place.transpose();
   }
   dots.weights = Eigen::VectorXd::Ones(dots.raw.rows());
-  Trend trend = trend_through(dots, blended_order);
+  Trend trend = trend_through(dots, field_order);
   const std::vector<int> degrees = polynomial_degrees();
   Eigen::VectorXd variances(Index(degrees.size()));
   for (Index k = 0; k < variances.size(); ++k)

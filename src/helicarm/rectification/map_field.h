@@ -11,8 +11,8 @@
 
 namespace helicarm::rectification {
 
-/// Order of the polynomials that errors of a blended map are made of.
-inline constexpr int blended_order = 5;
+/// Order of the polynomials that the errors of a map through a field are made of.
+inline constexpr int field_order = 5;
 
 /// Where maps of one intensifier are compared: places over their common field, and polynomials of mean square
 /// 1 over it, by degree.
@@ -35,10 +35,10 @@ std::vector<int> polynomial_degrees();
 /// Raw less rectified positions at the field's places, places x 2, px.
 Eigen::MatrixX2d displacements(const DistortionMap& map, const MapField& field);
 
-/// Errors of a map that is blended of others.
+/// Errors of a map that is made of others.
 struct MapVariation {
-  std::array<double, blended_order + 1> variance_px2{};  ///< of a polynomial of this degree, per axis
-  double rest_px2 = 0;                                   ///< of what no polynomial holds, per axis
+  std::array<double, field_order + 1> variance_px2{};  ///< of a polynomial of this degree, per axis
+  double rest_px2 = 0;                                 ///< of what no polynomial holds, per axis
 };
 
 /// The map of these displacements at the field's places, with errors of the variation times `factor`: a

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/rectification/blended_map.h"
+#include "helicarm/rectification/map_field.h"
 
 #include <cmath>
 
@@ -32,38 +32,38 @@ double farthest(const DistortionMap& a, const DistortionMap& b, const MapField& 
   return (displacements(a, field) - displacements(b, field)).rowwise().norm().maxCoeff();
 }
 
-TEST(BlendedMap, PassesThroughTheDisplacements) {
+TEST(MapField, PassesThroughTheDisplacements) {
   const std::vector maps{map_of(6, 2)};
   const MapField field = field_of(maps, 300);
-  const DistortionMap blended = map_through(field, displacements(maps[0], field), {}, 1, maps[0]);
-  EXPECT_LT(farthest(blended, maps[0], field), 5e-3);
-  EXPECT_EQ(blended.sigma_px(field.normalised.centre), 0);
+  const DistortionMap through = map_through(field, displacements(maps[0], field), {}, 1, maps[0]);
+  EXPECT_LT(farthest(through, maps[0], field), 5e-3);
+  EXPECT_EQ(through.sigma_px(field.normalised.centre), 0);
 }
 
-TEST(BlendedMap, ErrorsHaveTheVariationsMeanSquareOverTheField) {
+TEST(MapField, ErrorsHaveTheVariationsMeanSquareOverTheField) {
   const std::vector maps{map_of(6, 2)};
   const MapField field = field_of(maps, 200);
   MapVariation variation;
   variation.variance_px2[3] = 0.04;
   variation.rest_px2 = 0.01;
-  const DistortionMap blended = map_through(field, displacements(maps[0], field), variation, 2, maps[0]);
-  const Eigen::MatrixXd covariance = blended.covariance_px2(field.places);
+  const DistortionMap through = map_through(field, displacements(maps[0], field), variation, 2, maps[0]);
+  const Eigen::MatrixXd covariance = through.covariance_px2(field.places);
   EXPECT_NEAR(covariance.diagonal().mean(), 2 * (4 * 0.04 + 0.01), 1e-6);
 }
 
-TEST(BlendedMap, IsReadFromItsMapFile) {
+TEST(MapField, IsReadFromItsMapFile) {
   const std::vector maps{map_of(6, 2)};
   const MapField field = field_of(maps, 300);
   MapVariation variation;
   variation.variance_px2.fill(0.01);
-  const DistortionMap blended = map_through(field, displacements(maps[0], field), variation, 1, maps[0]);
-  const DistortionMap read = value_or_throw(distortion_map_from_json(to_json(blended), "map.json"));
+  const DistortionMap through = map_through(field, displacements(maps[0], field), variation, 1, maps[0]);
+  const DistortionMap read = value_or_throw(distortion_map_from_json(to_json(through), "map.json"));
   const Vector2d at(400, 120);
-  EXPECT_EQ(read.raw_from_rectified(at), blended.raw_from_rectified(at));
-  EXPECT_EQ(read.sigma_px(at), blended.sigma_px(at));
+  EXPECT_EQ(read.raw_from_rectified(at), through.raw_from_rectified(at));
+  EXPECT_EQ(read.sigma_px(at), through.sigma_px(at));
 }
 
-TEST(BlendedMap, WithoutCovarianceAMapIsTakenAsExact) {
+TEST(MapField, WithoutCovarianceAMapIsTakenAsExact) {
   const DistortionMap map = map_of(6, 2), exact = without_covariance(map);
   const Vector2d at(400, 120);
   EXPECT_GT(map.sigma_px(at), 0);
