@@ -5,7 +5,7 @@
   tools/evaluation/motion.py                       three noise levels, faults that are planted (about ten minutes on two cores)
   tools/evaluation/motion.py --frames 100 --seed 7 others
   tools/evaluation/motion.py --doc docs/motion.md  renews the tables between the marks of that document
-  tools/evaluation/motion.py --published 3dpts.csv rbt.csv --unit-mm 10
+  tools/evaluation/motion.py --published 3dpts.csv rbt.csv --unit-mm 10 [--cameras cam1.txt cam2.txt]
                                                    bodies of places that XMALab measured against its transforms of them: the places
                                                    (markers of equal numbers of each body in the order of the bodies) are projected exactly
 
@@ -457,6 +457,59 @@ def kept_run(program, folder, out, frames, places, names):
         sys.exit(done.stderr)
 
 
+def rigid_fit(body, places):
+    """world_from_body of least squares of the places (Kabsch)."""
+    left, _, right = np.linalg.svd((body - body.mean(0)).T @ (places - places.mean(0)))
+    rotation = (left @ np.diag([1, 1, np.sign(np.linalg.det(left @ right))]) @ right).T
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, places.mean(0) - rotation @ body.mean(0)
+    return pose
+
+
+def image_fit(body, places, cameras):
+    """world_from_body whose images lie nearest to those of the places."""
+    pose = rigid_fit(body, places)
+    for _ in range(4):
+        information, gradient = np.zeros((6, 6)), np.zeros(6)
+        for at, seen in zip((np.c_[body, np.ones(len(body))] @ pose.T)[:, :3], places):
+            by_step = np.hstack([np.cross(np.eye(3), at - pose[:3, 3]).T, np.eye(3)])
+            for focal, rotation, shift in cameras:
+                x, y, z = rotation @ at + shift
+                by_place = np.array([[focal[0] / z, 0, -focal[0] * x / z**2], [0, focal[1] / z, -focal[1] * y / z**2]]) @ rotation
+                information += (by_place @ by_step).T @ by_place @ by_step
+                gradient += (by_place @ by_step).T @ by_place @ (seen - at)
+        step = np.linalg.solve(information, gradient)
+        pose[:3, :3] = turn(step[:3]) @ pose[:3, :3]
+        pose[:3, 3] += step[3:]
+    return pose
+
+
+def mean_shape(places):
+    """Of a body's places in all frames, each fitted to it."""
+    shape = places[0]
+    for _ in range(20):
+        poses = [rigid_fit(shape, at) for at in places]
+        shape = np.mean([(at - pose[:3, 3]) @ pose[:3, :3] for at, pose in zip(places, poses)], 0)
+    return shape
+
+
+def differences(theirs, ours, body):
+    """Of a body's markers by two series of transforms (frames, markers, 3), up to the body's place in its own frame."""
+    moved = ours @ np.c_[body, np.ones(len(body))].T
+    return (theirs @ np.mean(np.linalg.inv(theirs) @ moved, 0) - moved)[:, :3].transpose(0, 2, 1)
+
+
+def imported_cameras(a, middle):
+    cameras = []
+    for path in a.cameras or []:
+        done = subprocess.run([a.helicarm, "import", path, "--unit", "cm" if a.unit_mm == 10 else "mm", "--json"], check=True,
+                              capture_output=True, text=True)
+        camera = json.loads(done.stdout)
+        rotation = np.array(camera["R"])
+        cameras.append((np.diag(camera["K"])[:2], rotation, np.array(camera["t"]) + rotation @ middle))
+    return cameras
+
+
 def published_table(a, root):
     """Bodies of published places against the transforms that XMALab computed of them, up to the place of each body in its own frame."""
     heading, numbers = published_rows(a.published[0], a.unit_mm)
@@ -489,7 +542,9 @@ def published_table(a, root):
         "format": "helicarm-case/2", "views": views, "markers": {"diameter_mm": DIAMETER}, "picks": picks,
         "bodies": [{"name": body, "markers": [names[m] for m in of]} for body, of in of_body.items()]}))
     kept_run(a.helicarm, folder, out, len(places), places, names)
-    lines = ["| body | frames | centre, mm rms | largest | markers, mm rms |", "| --- | --- | --- | --- | --- |"]
+    cameras = imported_cameras(a, middle)
+    lines = ["| body | frames | centre, mm rms | largest | markers, mm rms | places by least squares: markers | images by least squares: markers |",
+             "| --- | --- | --- | --- | --- | --- | --- |"]
     for b, body in enumerate(bodies):
         theirs = poses[:, 16 * b:16 * b + 16].reshape(-1, 4, 4).transpose(0, 2, 1).copy()
         theirs[:, :3, 3] = a.unit_mm * theirs[:, :3, 3] - middle
@@ -497,12 +552,14 @@ def published_table(a, root):
         for row in table(out / "bodies.csv"):
             if row["body"] == body:
                 ours[int(row["frame"]) - 1] = [[float(row[f"m{i}{k}"]) for k in range(1, 5)] for i in range(1, 5)]
-        points = np.c_[places[0][of_body[body]], np.ones(len(of_body[body]))].T
-        moved = ours @ points
-        in_theirs = np.mean(np.linalg.inv(theirs) @ moved, 0)
-        off = (theirs @ in_theirs - moved)[:, :3].transpose(0, 2, 1)
+        of = places[:, of_body[body]]
+        off = differences(theirs, ours, of[0])
         centres = np.linalg.norm(off.mean(1), axis=1)
-        lines.append(f"| {body} | {len(places)} | {np.sqrt(np.mean(centres ** 2)):.4f} | {centres.max():.4f} | {rms(off):.4f} |")
+        shape = mean_shape(of)
+        by_places = differences(theirs, np.array([rigid_fit(shape, at) for at in of]), shape)
+        by_images = differences(theirs, np.array([image_fit(shape, at, cameras) for at in of]), shape) if cameras else None
+        lines.append(f"| {body} | {len(places)} | {np.sqrt(np.mean(centres ** 2)):.4f} | {centres.max():.4f} | {rms(off):.4f} | "
+                     f"{rms(by_places):.4f} | {'' if by_images is None else f'{rms(by_images):.4f}'} |")
     return lines
 
 
@@ -514,6 +571,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--doc", type=Path)
     parser.add_argument("--published", nargs=2, type=Path, metavar=("POINTS", "BODIES"))
+    parser.add_argument("--cameras", nargs=2, type=Path, metavar="CAMERA", help="of the published places")
     parser.add_argument("--unit-mm", type=float, default=10)
     a = parser.parse_args()
     a.helicarm = shutil.which(a.helicarm) or a.helicarm
