@@ -10,9 +10,9 @@
 #include <fmt/format.h>
 
 #include "helicarm/geometry/triangulation.h"
-#include "helicarm/localization/locate.h"
 #include "helicarm/track/body_motion.h"
 #include "helicarm/track/body_series.h"
+#include "helicarm/track/camera_errors.h"
 #include "helicarm/track/delays.h"
 #include "helicarm/track/exchanges.h"
 #include "helicarm/track/image_errors.h"
@@ -28,25 +28,11 @@ double largest_sigma(const Eigen::Matrix3d& covariance) {
   return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()[2]);
 }
 
-/// By the cameras' own covariance, common to all frames.
+/// Covariance by the cameras' own, common to all frames.
 Eigen::Matrix3d by_cameras(const SequenceData& work, const Eigen::Vector3d& place) {
-  if (work.the_case.camera_covariance.size() == 0) return Eigen::Matrix3d::Zero();
-  calibration::Calibration calibration;
-  std::vector<localization::PointObservation> seen;
-  for (std::size_t k = 0; k < work.views; ++k) {
-    calibration::CalibratedView view;
-    view.name = work.the_case.views[k].images.name;
-    view.view = work.cameras[k];
-    view.covariance =
-        work.the_case.camera_covariance.block<11, 11>(11 * Eigen::Index(k), 11 * Eigen::Index(k));
-    calibration.views.push_back(view);
-    if (work.cameras[k].depth(place) > 1)
-      seen.push_back({k, work.cameras[k].project(place), 0.01 * Eigen::Matrix2d::Identity()});
-  }
-  calibration.joint_covariance = work.the_case.camera_covariance;
-  const auto located = localization::locate("", localization::PointSource::pick, seen, calibration);
-  if (!located || located->by_calibration.size() == 0) return Eigen::Matrix3d::Zero();
-  return located->by_calibration * work.the_case.camera_covariance * located->by_calibration.transpose();
+  const Eigen::Matrix3Xd by = place_by_cameras(work, place);
+  if (by.cols() == 0) return Eigen::Matrix3d::Zero();
+  return by * work.the_case.camera_covariance * by.transpose();
 }
 
 std::vector<MarkerDistance> distances_of(const SequenceData& work) {
@@ -344,6 +330,7 @@ Sequence estimate_sequence(const TrackCase& the_case, const std::vector<FrameSig
   warn_of_bodies_that_are_not_rigid(work, sequence);
   sequence.relative = relative_motions(sequence.bodies);
   sequence.joints = joints_of(the_case, sequence.bodies);
+  add_camera_errors(work, sequence);
   sequence.failure = nothing_followed(work, sequence);
   return sequence;
 }
