@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/core/files.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cctype>
 #include <cerrno>
 #include <fstream>
+#include <string>
+#include <vector>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -146,6 +149,22 @@ bool has_drive(const std::string& name) {
 
 }  // namespace
 
+namespace {
+
+/// The first JSON files of a folder that stands where a file is wanted: one of them is probably meant.
+std::string json_files_in(const fs::path& folder) {
+  constexpr std::size_t most = 3;
+  std::vector<std::string> names;
+  std::error_code ec;
+  for (fs::directory_iterator at(folder, ec), end; !ec && at != end; at.increment(ec))
+    if (at->path().extension() == ".json") names.push_back(at->path().filename().string());
+  std::ranges::sort(names);
+  if (names.size() > most) names.resize(most);
+  return names.empty() ? "" : fmt::format("; it holds {}", fmt::join(names, ", "));
+}
+
+}  // namespace
+
 Expected<std::string> read_file(const fs::path& path, std::uintmax_t max_bytes) {
   std::error_code ec;
   const auto status = fs::status(path, ec);
@@ -154,6 +173,9 @@ Expected<std::string> read_file(const fs::path& path, std::uintmax_t max_bytes) 
         Reason::missing_file,
         fmt::format("{}: {}", path.string(),
                     ec && ec != std::errc::no_such_file_or_directory ? ec.message() : "no such file"));
+  if (fs::is_directory(status))
+    return fail(Reason::missing_file,
+                fmt::format("{}: is a folder, not a file{}", path.string(), json_files_in(path)));
   if (!fs::is_regular_file(status))
     return fail(Reason::missing_file, fmt::format("{}: not a regular file", path.string()));
   const auto size = fs::file_size(path, ec);

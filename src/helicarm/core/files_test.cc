@@ -111,6 +111,11 @@ TEST_F(Files, MissingFileAndFolderAreNamed) {
   EXPECT_EQ(read_file(folder_, 4).error().reason, Reason::missing_file);
 }
 
+TEST_F(Files, OfAFolderInPlaceOfAFileItsJsonFilesAreNamed) {
+  ASSERT_TRUE(write_file(folder_ / "run/sweep.json", "{}"));
+  EXPECT_NE(read_file(folder_ / "run", 4).error().message.find("it holds sweep.json"), std::string::npos);
+}
+
 TEST_F(Files, PathsThatLeaveTheFolderAreRefused) {
   fs::create_directory_symlink("/", folder_ / "link");
   for (const char* name : {"../x", "/etc/passwd", "a/../../x", "link/etc/passwd"})
