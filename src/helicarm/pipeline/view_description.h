@@ -45,7 +45,8 @@ void describe_rectification(Output& output,
   number("residual_max_px", fitted, &DistortionMap::residual_max_px, "likewise, the largest");
   number("held_out_rms_px", fitted, &DistortionMap::held_out_rms_px, "at dots that the fit had not");
   number("raw_mean_px", of_fitted, &Rectification::raw_mean_px,
-         "the distortion: mean distance from raw to rectified over the dots");
+         "the distortion: mean distance from raw to rectified over the dots; of a map that is not by dots of "
+         "this image over their field");
   number("raw_max_px", of_fitted, &Rectification::raw_max_px, "likewise, the largest");
   number("rectified_pixel_mm", map, &DistortionMap::rectified_pixel_mm,
          "of the rectified image, in its plane");

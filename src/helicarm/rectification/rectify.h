@@ -31,7 +31,8 @@ struct Rectification {
   std::vector<double> residual_px;         ///< of each
   int dots_found = 0;
   std::optional<int> dots_expected;  ///< nothing for an unbounded lattice
-  double raw_mean_px = 0;  ///< mean distance from raw to rectified over the dots used: the distortion
+  /// Mean distance from raw to rectified over the dots used, of a known map over their field: the distortion.
+  double raw_mean_px = 0;
   double raw_max_px = 0;
   detection::Polarity metal = detection::Polarity::dark;  ///< polarity of metal in this image
   bool map_confirmed = false;                   ///< of a given map: a plate in the image is straight in it

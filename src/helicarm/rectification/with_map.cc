@@ -84,6 +84,25 @@ double bend_limit_px(const SeenPlate& plate, const DistortionMap& map) {
   return std::max(0.1, left * std::max(1.3, 1 + 5 / std::sqrt(2 * double(dots.size()))));
 }
 
+/// The distortion by a map that was not made of this image's dots, over the ellipse in their box.
+void state_distortion(Rectification& of_image) {
+  const DistortionMap& map = of_image.map;
+  if (map.is_identity()) return;
+  constexpr int steps = 12;  // from the middle to the edge
+  const Eigen::Vector2d middle = 0.5 * (map.hull_low + map.hull_high), half = map.hull_high - middle;
+  int count = 0;
+  for (int i = -steps; i <= steps; ++i)
+    for (int j = -steps; j <= steps; ++j) {
+      const Eigen::Vector2d along = Eigen::Vector2d(i, j) / steps, at = middle + half.cwiseProduct(along);
+      if (along.norm() > 1) continue;
+      const double shift_px = (map.raw_from_rectified(at) - at).norm();
+      of_image.raw_mean_px += shift_px;
+      of_image.raw_max_px = std::max(of_image.raw_max_px, shift_px);
+      ++count;
+    }
+  of_image.raw_mean_px /= count;
+}
+
 }  // namespace
 
 double least_checked_radius_px(const xray::XrayImage& xray_image,
@@ -110,6 +129,7 @@ Expected<Rectification> with_map(const xray::XrayImage& xray_image, detection::I
   if (auto usable = check_usable(xray_image); !usable) return tl::unexpected<Failure>(usable.error());
   Rectification result;
   result.map = map;
+  state_distortion(result);
   const auto possible_dots = [&](detection::Polarity polarity) {
     return detection::from_radius(detection::dots_of(dots, xray_image, polarity),
                                   least_checked_radius_px(xray_image, plate));

@@ -38,6 +38,13 @@ TEST(WithMapOfHoles, OwnMapIsConfirmedWithAndWithoutTheDescriptionOfThePlate) {
     }
 }
 
+TEST(WithMapOfHoles, DistortionIsStatedAsByItsOwnDots) {
+  const Rectification by_dots = rectify(image_of_view(0), perforated, {}).value(),
+                      known = with_map(image_of_view(0), by_dots.map, {}).value();
+  EXPECT_NEAR(known.raw_mean_px, by_dots.raw_mean_px, 0.4 * by_dots.raw_mean_px);
+  EXPECT_NEAR(known.raw_max_px, by_dots.raw_max_px, 0.4 * by_dots.raw_max_px);
+}
+
 TEST(WithMapOfHoles, MapOfTheOtherViewIsAMismatch) {
   const auto result = with_map(image_of_view(1), map_of_view(0), perforated);
   ASSERT_FALSE(result);

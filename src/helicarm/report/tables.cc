@@ -392,7 +392,10 @@ Table rectification_table(const std::vector<pipeline::ViewResult>& views) {
        {number("Held out rms, px",
                "The same for dots left out of the fit: the error to expect between the dots, px"),
         [](View v) { return of_map(v, v->rectification->map.held_out_rms_px, 3); }},
-       {number("Distortion mean, px", "Mean distance of the dots from an undistorted lattice, raw px"),
+       {number(
+            "Distortion mean, px",
+            "Mean distance of the dots from an undistorted lattice, raw px; where the map is not by dots of "
+            "this image over their field"),
         [](View v) { return of_map(v, v->rectification->raw_mean_px, 2); }},
        {number("Distortion max, px", "The largest of these distances, raw px"),
         [](View v) { return of_map(v, v->rectification->raw_max_px, 2); }}},
