@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <charconv>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -21,6 +24,7 @@ struct NewArguments {
   std::optional<std::string> plate;                    ///< a built-in, a file or none; nothing: by the images
   std::vector<std::string> plate_images;               ///< VIEW=FILE
   std::vector<std::string> maps;                       ///< VIEW=FILE
+  std::vector<std::string> angles;                     ///< VIEW=PRIMARY,SECONDARY
   std::optional<double> pixel_mm, source_detector_mm;  ///< of every view, where the images do not state it
   std::filesystem::path out;
 };
@@ -49,6 +53,29 @@ std::vector<std::pair<std::string, std::filesystem::path>> files_by_view(
     files.emplace_back(word.substr(0, equals), word.substr(equals + 1));
   }
   return files;
+}
+
+std::optional<double> angle_in(const std::string& text) {
+  double deg = 0;
+  const char* const end = text.data() + text.size();
+  const auto [next, error] = std::from_chars(text.data(), end, deg);
+  return error == std::errc() && next == end ? std::optional(deg) : std::nullopt;
+}
+
+std::vector<std::pair<std::string, std::array<double, 2>>> angles_by_view(
+    const std::vector<std::string>& words) {
+  std::vector<std::pair<std::string, std::array<double, 2>>> angles;
+  for (const std::string& word : words) {
+    const std::size_t equals = word.find('='), comma = word.find(',', std::min(equals, word.size()));
+    const bool is_pair = equals != word.npos && equals > 0 && comma != word.npos;
+    const auto primary = is_pair ? angle_in(word.substr(equals + 1, comma - equals - 1)) : std::nullopt;
+    const auto secondary = is_pair ? angle_in(word.substr(comma + 1)) : std::nullopt;
+    if (!primary || !secondary)
+      throw BadInput(Reason::usage,
+                     fmt::format("--angles: \"{}\" is not VIEW=PRIMARY,SECONDARY in degrees", word));
+    angles.push_back({word.substr(0, equals), {*primary, *secondary}});
+  }
+  return angles;
 }
 
 pipeline::InspectedImage inspected(pipeline::NewImage image, Console& console) {
@@ -108,7 +135,8 @@ CommandResult new_command(const NewArguments& arguments, Console& console) {
                                      arguments.plate,
                                      files_by_view(arguments.maps, "--map"),
                                      files_by_view(arguments.plate_images, "--plate-image"),
-                                     {arguments.pixel_mm, arguments.source_detector_mm}};
+                                     {arguments.pixel_mm, arguments.source_detector_mm},
+                                     angles_by_view(arguments.angles)};
     std::vector<pipeline::InspectedImage> images;
     for (const std::string& word : arguments.images)
       images.push_back(inspected(pipeline::new_image_from(word), console));
@@ -154,6 +182,12 @@ void add_new(CLI::App& app, Action& action) {
       ->add_option("--source-detector-mm", a.source_detector_mm,
                    "Distance of source and receiver, mm, of images whose files do not state it")
       ->check(CLI::Range(xray::min_source_detector_mm, xray::max_source_detector_mm));
+  command
+      ->add_option(
+          "--angles", a.angles,
+          "VIEW=PRIMARY,SECONDARY: positioner angles, degrees, of an image whose file does not state "
+          "them; repeatable")
+      ->allow_extra_args(false);
   command->add_option("--out", a.out, "Folder for the case")->required();
 }
 

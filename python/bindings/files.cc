@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/core/files.h"
 
+#include <array>
+#include <map>
+
 #include "arrays.h"
 #include "helicarm/case_registration/measured_object.h"
 #include "helicarm/core/private_files.h"
@@ -35,7 +38,8 @@ std::vector<std::string> exported(const case_registration::Measurement& measured
 py::dict new_case(const std::vector<std::string>& images, const std::filesystem::path& out,
                   const std::string& calibrator, const std::optional<std::string>& plate,
                   const NamedPaths& plate_images, const NamedPaths& maps, std::optional<double> pixel_mm,
-                  std::optional<double> source_detector_mm) {
+                  std::optional<double> source_detector_mm,
+                  const std::map<std::string, std::array<double, 2>>& angles) {
   const auto written = value_or_raise(without_gil([&] {
     return guarded([&] {
       std::vector<pipeline::InspectedImage> inspected;
@@ -46,7 +50,8 @@ py::dict new_case(const std::vector<std::string>& images, const std::filesystem:
                                              plate,
                                              {maps.begin(), maps.end()},
                                              {plate_images.begin(), plate_images.end()},
-                                             {pixel_mm, source_detector_mm}};
+                                             {pixel_mm, source_detector_mm},
+                                             {angles.begin(), angles.end()}};
       auto fresh = value_or_throw(pipeline::new_case(std::move(inspected), options, out));
       value_or_throw(pipeline::write_new_case(fresh, out));
       return fresh;
@@ -99,11 +104,12 @@ void add_files(py::module_& module) {
              py::arg("plate") = py::none(), py::arg("plate_images") = NamedPaths{},
              py::arg("maps") = NamedPaths{}, py::arg("pixel_mm") = py::none(),
              py::arg("source_detector_mm") = py::none(),
+             py::arg("angles") = std::map<std::string, std::array<double, 2>>{},
              R"(Makes a case of image files, as `helicarm new` does.
 
 images: [VIEW=]FILE[:FRAME] each. out: folder for the case. calibrator: calibrator.json or "udcsc". plate: plate.json,
 "plate48" or "none"; None: by the images. plate_images, maps: {view: file}. pixel_mm, source_detector_mm: of images whose
-files do not state them. Returns {"case", "findings", "warnings"}. Raises InputError: usage where the images do not decide
+files do not state them. angles: {view: (primary, secondary)}, the positioner's, degrees, likewise. Returns {"case", "findings", "warnings"}. Raises InputError: usage where the images do not decide
 the plate, name_clash, bad_value, cannot_write, and as read_image.)");
   module.def("bundle", &bundle, py::arg("folder"), py::kw_only(), py::arg("out"),
              py::arg("result") = py::none(), py::arg("run") = true, py::arg("threads") = 0u,

@@ -166,6 +166,8 @@ def test_a_new_case_is_the_same(case, tmp_path):
     assert (tmp_path / "program/case.json").read_text() == (tmp_path / "python/case.json").read_text()
     with pytest.raises(helicarm.InputError, match="calibrator"):
         helicarm.new_case(images, tmp_path / "other", calibrator="")
+    with pytest.raises(helicarm.InputError, match="primary_deg"):
+        helicarm.new_case(images, tmp_path / "other", calibrator="udcsc", angles={"AP": (170, 0)})
 
 
 def test_a_bundle_is_the_same(case, tmp_path):

@@ -28,8 +28,9 @@ struct CaseView {
   std::optional<bool> mirrored;                      ///< handedness, if known
   std::optional<double> pixel_mm = {};               ///< in the receiver's plane, where the file lacks it
   std::optional<double> source_detector_mm = {};     ///< likewise
-  guidance::Poses poses;                             ///< at the acquisition
-  std::optional<std::filesystem::path> camera = {};  ///< of another program: the view is not calibrated
+  std::optional<double> primary_deg = {}, secondary_deg = {};  ///< positioner angles, likewise
+  guidance::Poses poses;                                       ///< at the acquisition
+  std::optional<std::filesystem::path> camera = {};       ///< of another program: the view is not calibrated
   std::optional<std::filesystem::path> calibration = {};  ///< likewise: a result that holds this view
   std::optional<std::string> frames = {};                 ///< of a run of images: "all" or "A-B[:STEP]"
   std::optional<int> frame_offset = {};  ///< the image's number is the sequence's frame plus this

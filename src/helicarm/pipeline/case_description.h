@@ -111,6 +111,18 @@ void describe_view(Codec& codec, View& view, const std::filesystem::path& folder
   codec.number("source_detector_mm", view.source_detector_mm,
                {xray::min_source_detector_mm, xray::max_source_detector_mm},
                "distance of source and receiver, likewise");
+  codec.number("primary_deg", view.primary_deg, {-360, 360},
+               "positioner angle, as DICOM counts it, of an image whose file does not state it, with "
+               "`secondary_deg`; what the file states must agree within 1 degree");
+  codec.number("secondary_deg", view.secondary_deg, {-360, 360}, "likewise, 0 where it is not tilted");
+  codec.check([&](JsonReader& reader) {
+    if (view.primary_deg.has_value() != view.secondary_deg.has_value())
+      reader.refuse(Reason::bad_value, view.primary_deg ? "secondary_deg" : "primary_deg",
+                    "is missing: the positioner's angles are stated together, 0 where it is not tilted");
+    if (view.primary_deg && view.frames)
+      reader.refuse(Reason::bad_value, "primary_deg",
+                    "cannot be combined with \"frames\": the images of a run have angles of their own");
+  });
   describe_poses(
       codec, "poses", view.poses, bones, OtherMarker::calibrator,
       "at the acquisition: `tracker_from_calibrator`, `tracker_from_bone` (`{\"L4\": pose, ...}`). A "

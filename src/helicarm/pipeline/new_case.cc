@@ -2,6 +2,7 @@
 #include "helicarm/pipeline/new_case.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <set>
 
@@ -166,6 +167,8 @@ void set_views(NewCase& draft, const std::vector<InspectedImage>& images, const 
     view.frame = image.frame;
     view.pixel_mm = options.stated.pixel_mm;
     view.source_detector_mm = options.stated.source_detector_mm;
+    for (const auto& [name, angles] : options.angles_deg)
+      if (name == image.view) view.primary_deg = angles[0], view.secondary_deg = angles[1];
     for (const auto& [name, file] : options.plate_images)
       if (name == image.view)
         view.plate_image = folder / brought_image(draft, file, folder, image.view + "_plate");
@@ -272,8 +275,19 @@ Expected<NewCase> new_case(std::vector<InspectedImage> images, const NewCaseOpti
                            const fs::path& folder) {
   return guarded([&] {
     name_views(images);
-    for (InspectedImage& image : images)
-      value_or_throw(xray::state_geometry(image.xray_image, options.stated, image.view));
+    for (InspectedImage& image : images) {
+      xray::StatedGeometry stated = options.stated;
+      for (const auto& [name, angles] : options.angles_deg)
+        if (name == image.view) stated.primary_deg = angles[0], stated.secondary_deg = angles[1];
+      value_or_throw(xray::state_geometry(image.xray_image, stated, image.view));
+    }
+    for (const auto& [name, angles] : options.angles_deg) {
+      image_named(images, name, "--angles");
+      for (const double deg : angles)
+        if (!(std::abs(deg) <= 360))
+          throw BadInput(Reason::bad_value,
+                         fmt::format("--angles: {} is {:g} degrees, limits -360 and 360", name, deg));
+    }
     check_images(images);
     NewCase draft;
     for (const InspectedImage& image : images) draft.findings.push_back(description_of(image));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -52,6 +53,8 @@ struct NewCaseOptions {
   std::vector<std::pair<std::string, std::filesystem::path>> maps = {};  ///< view, map.json
   std::vector<std::pair<std::string, std::filesystem::path>> plate_images = {};  ///< view, image of the plate
   xray::StatedGeometry stated = {};  ///< of every view, where the images do not state it
+  /// View, primary and secondary positioner angle, likewise.
+  std::vector<std::pair<std::string, std::array<double, 2>>> angles_deg = {};
 };
 
 /// case.json, the files to be copied beside it, and what the user should know.

@@ -90,6 +90,24 @@ TEST_F(NewCaseOf, StatedPixelSizeStandsInItsViewsUnlessAnImageContradictsIt) {
   EXPECT_THAT(refused.message, testing::HasSubstr("source_detector_mm"));
 }
 
+TEST_F(NewCaseOf, StatedAnglesStandInTheirView) {
+  simulate(simulation::CaseKind::flat);
+  std::vector<InspectedImage> bare = images();
+  for (InspectedImage& image : bare) {
+    image.xray_image.acquisition.primary_angle_deg.reset();
+    image.xray_image.acquisition.secondary_angle_deg.reset();
+  }
+  bare[0].view = "front";
+  const NewCaseOptions options{.calibrator = "udcsc", .angles_deg = {{"front", {12, -3}}}};
+  const auto made_case = new_case(bare, options, made());
+  ASSERT_TRUE(made_case) << made_case.error().message;
+  EXPECT_EQ(made_case->the_case.views[0].primary_deg, 12);
+  EXPECT_EQ(made_case->the_case.views[0].secondary_deg, -3);
+  EXPECT_FALSE(made_case->the_case.views[1].primary_deg);
+  bare[0].view = "side";
+  EXPECT_EQ(new_case(bare, options, made()).error().reason, Reason::usage);
+}
+
 TEST_F(NewCaseOf, SidecarOfADicomFileIsCopiedWithIt) {
   simulate(simulation::CaseKind::flat);
   ASSERT_TRUE(write_file(files() / "im1.dcm.json", R"({"pixel_mm": null})"));

@@ -12,9 +12,12 @@ Expected<xray::XrayImage> read_as_stated(const std::filesystem::path& file, std:
                                          const CaseView& view) {
   return guarded([&] {
     xray::XrayImage image = value_or_throw(xray::read_xray_image(file, view.name, frame));
-    auto agreed = xray::state_geometry(
-        image, {.pixel_mm = view.pixel_mm, .source_detector_mm = view.source_detector_mm},
-        fmt::format("case.json: view {}", view.name));
+    auto agreed = xray::state_geometry(image,
+                                       {.pixel_mm = view.pixel_mm,
+                                        .source_detector_mm = view.source_detector_mm,
+                                        .primary_deg = view.primary_deg,
+                                        .secondary_deg = view.secondary_deg},
+                                       fmt::format("case.json: view {}", view.name));
     if (!agreed) {
       agreed.error().view = view.name;
       throw BadInput(agreed.error());
