@@ -28,10 +28,10 @@ struct CArmCheckArguments {
   std::filesystem::path folder;
 };
 
-std::vector<calibration::HistoryEntry> acquisitions_of(const std::filesystem::path& from, Console& console) {
+pipeline::CArmAcquisitions acquisitions_of(const std::filesystem::path& from, Console& console) {
   auto measured = value_or_throw(pipeline::c_arm_acquisitions(from, console.threads));
   print_warnings(measured.warnings, console);
-  return std::move(measured.entries);
+  return measured;
 }
 
 CommandResult c_arm_add_command(const CArmAddArguments& arguments, Console& console) {
@@ -74,14 +74,11 @@ CommandResult c_arm_check_command(const CArmCheckArguments& arguments, Console& 
   return guarded([&] {
     const calibration::CArmHistory record = value_or_throw(calibration::read_history(arguments.record));
     const calibration::CArmCheck check = value_or_throw(pipeline::check_against_record(
-        acquisitions_of(arguments.folder, console), record, arguments.record.string()));
+        acquisitions_of(arguments.folder, console).entries, record, arguments.record.string()));
     const std::optional<Failure> change = pipeline::c_arm_change(check);
-    const std::vector<Warning> limits = pipeline::limits_of(check);
-    print_warnings(limits, console);
+    print_warnings(pipeline::limits_of(check), console);
     if (console.json) {
       Json answer = report::to_json(check);
-      answer["warnings"] = Json::array();
-      for (const Warning& limit : limits) answer["warnings"].push_back(pipeline::to_json(limit));
       answer["status"] = change ? "refused" : "ok";
       answer["failure"] = change ? pipeline::to_json(*change) : Json();
       console.out << to_text(answer) << '\n';

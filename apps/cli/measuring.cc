@@ -35,6 +35,9 @@ Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pip
                                    path.string(), std::sqrt(result.calibration->variance_scale))
                              : fmt::format("helicarm: {}: {} earlier acquisitions, {} added\n", path.string(),
                                            growth->earlier, growth->added));
+  if (!console.quiet && growth->is_new)
+    console.progress << fmt::format(
+        "helicarm: note: {} did not exist: the record of this C-arm begins with this case\n", path.string());
   return {};
 }
 

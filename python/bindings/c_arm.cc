@@ -27,7 +27,7 @@ std::size_t add_to_c_arm(const std::filesystem::path& record, const std::filesys
   return value_or_raise(without_gil([&] {
     return guarded([&] {
       value_or_throw(calibration::check_history_file(record));
-      const auto acquired = value_or_throw(pipeline::c_arm_acquisitions(folder, threads)).entries;
+      const auto acquired = value_or_throw(pipeline::c_arm_acquisitions(folder, threads));
       return value_or_throw(pipeline::add_to_record(record, acquired)).added;
     });
   }));

@@ -49,7 +49,11 @@ case_registration::Measurement run(const std::filesystem::path& folder, const st
     });
   }));
   if (measured.result.failure) raise(*measured.result.failure, py::cast(measured));
-  if (history) value_or_raise(pipeline::add_to_record(*history, measured.result));
+  if (history && value_or_raise(pipeline::add_to_record(*history, measured.result)).is_new)
+    warn({{Reason::missing_file,
+           fmt::format("{} did not exist: the record of this C-arm begins with this case", history->string()),
+           {},
+           {}}});
   return measured;
 }
 

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/c_arm_history_file.h"
+#include "helicarm/calibration/c_arm_position.h"
 #include "helicarm/core/codec.h"
 #include "helicarm/core/file_lock.h"
 #include "helicarm/core/files.h"
@@ -25,6 +26,7 @@ constexpr double prior_weight = 4;
 constexpr int rounds = 50;
 constexpr double least_information = 1e-9;  // 1 / mm^2
 constexpr std::size_t most_entries = 10000;
+constexpr std::size_t most_maps = 60;  // of one field
 constexpr Range tolerance_range_mm{0, 100};
 
 Vector3d squares(double focal, double principal) {
@@ -71,19 +73,21 @@ void describe_acquisition(Codec& codec, Entry& entry) {
       [&](JsonReader& reader) {
         const Json& map = reader.raw("map");
         if constexpr (!std::is_const_v<Entry>)
-          if (!map.is_null()) entry.map = value_or_throw(rectification::distortion_map_from_json(map, "map"));
+          if (!map.is_null())
+            entry.plate = PlateMap{value_or_throw(rectification::distortion_map_from_json(map, "map"))};
       },
-      [&] { return entry.map ? std::optional(to_json(*entry.map)) : std::nullopt; });
+      [&] { return entry.plate ? std::optional(to_json(entry.plate->map)) : std::nullopt; });
   codec.custom(
       "field_radius_px", false, {{"type", "number"}, {"minimum", 0}, {"maximum", 1e5}},
       "of a map: farthest distance of its dots from their middle",
       [&](JsonReader& reader) {
+        const double radius_px = reader.optional_number("field_radius_px", {0, 1e5}).value_or(0);
         if constexpr (!std::is_const_v<Entry>)
-          entry.field_radius_px = reader.optional_number("field_radius_px", {0, 1e5}).value_or(0);
+          if (entry.plate) entry.plate->field_radius_px = radius_px;
       },
-      [&] { return entry.map ? std::optional<Json>(entry.field_radius_px) : std::nullopt; });
+      [&] { return entry.plate ? std::optional<Json>(entry.plate->field_radius_px) : std::nullopt; });
   codec.check([&](JsonReader& reader) {
-    if (entry.map && !(entry.field_radius_px > 0))
+    if (entry.plate && !(entry.plate->field_radius_px > 0))
       reader.refuse(Reason::bad_value, "field_radius_px", "must be positive where there is a map");
   });
 }
@@ -92,6 +96,18 @@ template <class Codec, class Entries>
 void describe_acquisitions(Codec& codec, const char* key, bool required, Entries& entries) {
   codec.list(key, entries, required, most_entries, "one entry per image, see below",
              [](auto& inner, auto& entry) { describe_acquisition(inner, entry); });
+}
+
+template <class Codec, class Run>
+void describe_run(Codec& codec, Run& run) {
+  codec.text("run", run.run, "digest of its first image, so that each run is added only once", {0, 200});
+  codec.text("date", run.date, "day on which it was added, UTC", {0, 20});
+  codec.integer("images", run.images, 1, 1000, "accepted");
+  codec.number("arc_deg", run.arc_deg, {0, 3600}, "between the first and the last image");
+  codec.number("radius_mm", run.radius_mm, {0, 1e4}, "from the isocentre to the farthest central ray");
+  codec.vector("sigma_mm", run.sigma_mm, {0, 1e4},
+               "standard deviation of the isocentre, in the calibrator's frame");
+  codec.number("source_to_axis_mm", run.source_to_axis_mm, {0, 1e4}, "mean of the images");
 }
 
 /// machine.json (docs/formats.md).
@@ -110,6 +126,8 @@ void describe_history(Codec& codec, History& history) {
                                          "of the principal point, per axis");
                });
   describe_acquisitions(codec, "shots", true, history.entries);
+  codec.list("runs", history.runs, false, most_entries, "one entry per run of images, see below",
+             [](auto& inner, auto& run) { describe_run(inner, run); });
 }
 
 }  // namespace
@@ -205,29 +223,79 @@ Expected<CArmHistory> history_at(const std::filesystem::path& path) {
   return read_history(path);
 }
 
+bool are_of_one_field(const rectification::DistortionMap& a, const rectification::DistortionMap& b) {
+  constexpr double tolerance = 0.02;
+  const double pixel_a = a.rectified_pixel_mm.value_or(0), pixel_b = b.rectified_pixel_mm.value_or(0);
+  return a.width == b.width && a.height == b.height && std::abs(pixel_a - pixel_b) <= tolerance * pixel_b;
+}
+
+std::vector<std::size_t> entries_with_latest_maps(std::span<const HistoryEntry> entries) {
+  constexpr double alike = 0.99;  // correlation: within 6 degrees
+  constexpr int most_alike = 4;
+  std::vector<std::size_t> chosen;
+  const auto direction_of = [&](std::size_t i) {
+    return c_arm_direction(entries[i].primary_deg, entries[i].secondary_deg);
+  };
+  for (std::size_t i = entries.size(); i-- > 0 && chosen.size() < most_maps;) {
+    if (!entries[i].plate) continue;
+    if (!chosen.empty() && !are_of_one_field(entries[i].plate->map, entries[chosen.front()].plate->map))
+      continue;
+    const auto near_it = [&](std::size_t k) {
+      return position_correlation(direction_of(i), direction_of(k)) > alike;
+    };
+    if (std::ranges::count_if(chosen, near_it) < most_alike) chosen.push_back(i);
+  }
+  std::ranges::reverse(chosen);
+  return chosen;
+}
+
+void forget_old_maps(CArmHistory& history) {
+  std::vector<HistoryEntry> unseen = history.entries;  // of the fields that were not looked at yet
+  for (auto kept = entries_with_latest_maps(unseen); !kept.empty(); kept = entries_with_latest_maps(unseen)) {
+    const rectification::DistortionMap latest = unseen[kept.back()].plate->map;
+    for (std::size_t i = 0; i < unseen.size(); ++i)
+      if (unseen[i].plate && are_of_one_field(unseen[i].plate->map, latest)) {
+        unseen[i].plate.reset();
+        if (!std::ranges::binary_search(kept, i)) history.entries[i].plate.reset();
+      }
+  }
+}
+
 std::size_t add_entries(CArmHistory& history, std::span<const HistoryEntry> entries) {
   const std::size_t earlier = history.entries.size();
-  for (const HistoryEntry& entry : entries)
-    if (std::ranges::find(history.entries, entry.image, &HistoryEntry::image) == history.entries.end())
+  for (const HistoryEntry& entry : entries) {
+    const auto held = std::ranges::find(history.entries, entry.image, &HistoryEntry::image);
+    if (held == history.entries.end())
       history.entries.push_back(entry);
+    else if (!held->plate)
+      held->plate = entry.plate;
+  }
   return history.entries.size() - earlier;
 }
 
 Expected<HistoryGrowth> add_to_history(const std::filesystem::path& path,
-                                       std::span<const HistoryEntry> entries) {
+                                       std::span<const HistoryEntry> entries,
+                                       const std::optional<RunIsocentre>& run) {
   return guarded([&] {
     value_or_throw(check_history_file(path));
     const FileLock lock = value_or_throw(FileLock::of(path));
     CArmHistory history = value_or_throw(history_at(lock.file()));
+    const bool is_new = !std::filesystem::exists(lock.file());
+    const Json before = to_json(history);
     std::vector<HistoryEntry> dated(entries.begin(), entries.end());
     for (HistoryEntry& entry : dated) entry.date = today();
-    HistoryGrowth growth{history.entries.size(), add_entries(history, dated)};
+    HistoryGrowth growth{history.entries.size(), add_entries(history, dated), is_new};
+    forget_old_maps(history);
+    if (run && std::ranges::find(history.runs, run->run, &RunIsocentre::run) == history.runs.end()) {
+      history.runs.push_back(*run);
+      history.runs.back().date = today();
+    }
     if (history.entries.size() > most_entries)
       throw BadInput(Reason::cannot_write,
                      fmt::format("{}: holds {} acquisitions, limit {}: begin a new file", path.string(),
                                  growth.earlier, most_entries));
-    if (growth.added > 0 || !std::filesystem::exists(lock.file()))
-      value_or_throw(write_file(lock.file(), to_text(to_json(history)) + "\n"));
+    const Json after = to_json(history);
+    if (is_new || after != before) value_or_throw(write_file(lock.file(), to_text(after) + "\n"));
     return growth;
   });
 }
@@ -258,12 +326,36 @@ Json acquisitions_json(const std::vector<HistoryEntry>& entries) {
 Json to_json(const CArmHistory& history) {
   ToJson codec(ToJson::Unset::null);
   describe_history(codec, history);
+  if (history.runs.empty()) codec.json.erase("runs");  // which earlier versions do not know
   return std::move(codec.json);
 }
 
 Json history_schema() {
   const CArmHistory shape;
   return schema_of("machine.json", [&](ToSchema& codec) { describe_history(codec, shape); });
+}
+
+Expected<std::optional<RunIsocentre>> isocentre_of_result(const Json& json, const std::string& origin) {
+  return guarded([&]() -> std::optional<RunIsocentre> {
+    if (!json.is_object() || json.value("format", "") != "helicarm-sweep/1") return {};
+    JsonReader reader(json, origin);
+    std::vector<HistoryEntry> entries;
+    FromJson codec(reader);
+    describe_acquisitions(codec, "acquisitions", false, entries);
+    const Json& path = reader.raw("path");
+    if (!path.is_object() || entries.empty()) return {};
+    JsonReader of_path(path, origin + ": path");
+    RunIsocentre run{entries.front().image};
+    const Json& frames = reader.raw("frames");
+    run.images = int(std::ranges::count_if(frames, [](const Json& frame) {
+      return frame.is_object() && frame.value("decision", "refuse") != "refuse";
+    }));
+    run.arc_deg = of_path.number("arc_deg", {0, 3600});
+    run.radius_mm = of_path.number("isocentre_radius_mm", {0, 1e4});
+    run.sigma_mm = Vector3d(of_path.numbers("isocentre_sigma_mm", 3, {0, 1e4}).data());
+    run.source_to_axis_mm = of_path.number("source_to_axis_mm", {0, 1e4});
+    return run;
+  });
 }
 
 Expected<std::vector<HistoryEntry>> acquisitions_of_result(const Json& json, const std::string& origin) {

@@ -15,6 +15,12 @@
 
 namespace helicarm::calibration {
 
+/// Distortion by an image's own plate.
+struct PlateMap {
+  rectification::DistortionMap map;  ///< without covariance
+  double field_radius_px = 0;        ///< distance of its dots from their middle, at most
+};
+
 /// Intrinsics estimated from one image's fiducials without the prior: focal length, and principal point from
 /// the image's centre (u, v; as if not mirrored), mm on the detector.
 struct HistoryEntry {
@@ -23,10 +29,20 @@ struct HistoryEntry {
   Eigen::Vector3d estimate_mm;
   Eigen::Matrix3d information;  ///< inverse covariance, 1 / mm^2
   std::optional<double> primary_deg = {},
-                        secondary_deg = {};              ///< positioner angles, if the image states them
-  std::string date = {};                                 ///< UTC, on which it was added: 2026-11-26
-  std::optional<rectification::DistortionMap> map = {};  ///< by the image's own plate; without covariance
-  double field_radius_px = 0;  ///< of a map: distance of its dots from their middle, at most
+                        secondary_deg = {};  ///< positioner angles, if the image states them
+  std::string date = {};                     ///< UTC, on which it was added: 2026-11-26
+  std::optional<PlateMap> plate = {};
+};
+
+/// Where the central rays of a run of images meet.
+struct RunIsocentre {
+  std::string run;                                     ///< digest of the first image that it tells of
+  std::string date = {};                               ///< UTC, on which it was added
+  int images = 0;                                      ///< accepted
+  double arc_deg = 0;                                  ///< between the first and the last
+  double radius_mm = 0;                                ///< to the farthest central ray
+  Eigen::Vector3d sigma_mm = Eigen::Vector3d::Zero();  ///< of the isocentre, in the calibrator's frame
+  double source_to_axis_mm = 0;
 };
 
 /// Differences from what the history predicts that are no change of the C-arm, mm.
@@ -38,6 +54,7 @@ struct CArmTolerances {
 struct CArmHistory {
   std::vector<HistoryEntry> entries;
   CArmTolerances tolerances = {};
+  std::vector<RunIsocentre> runs = {};
 };
 
 /// Prior of the next views from a history: mean, and variation about it.
@@ -61,7 +78,18 @@ std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const st
 geometry::IntrinsicsPrior learned_prior(geometry::IntrinsicsPrior prior, const LearnedIntrinsics& knowledge,
                                         bool mirrored);
 
-/// Adds the entries of images that the history does not hold; returns how many.
+/// Whether both are of one image size and one field of the intensifier.
+bool are_of_one_field(const rectification::DistortionMap& a, const rectification::DistortionMap& b);
+
+/// Those whose maps count, in their order: of the latest one's field the latest few of each position, so that
+/// daily images of two positions do not push out the others.
+std::vector<std::size_t> entries_with_latest_maps(std::span<const HistoryEntry> entries);
+
+/// Takes the maps away that no longer count in their own field: a record would grow by them for ever.
+void forget_old_maps(CArmHistory& history);
+
+/// Adds the entries of images that the history does not hold, and the map of an image that it holds without
+/// one; returns how many entries.
 std::size_t add_entries(CArmHistory& history, std::span<const HistoryEntry> entries);
 
 /// machine.json (docs/formats.md).

@@ -9,11 +9,13 @@ namespace helicarm::calibration {
 struct HistoryGrowth {
   std::size_t earlier = 0;
   std::size_t added = 0;
+  bool is_new = false;  ///< there was no file
 };
-/// Adds entries to the file under its lock, to what other programs added meanwhile; creates it if needed.
-/// Refuses as `read_history` and `FileLock`.
+/// Adds entries, and the isocentre of their run, to the file under its lock, to what other programs added
+/// meanwhile; creates it if needed. Refuses as `read_history` and `FileLock`.
 Expected<HistoryGrowth> add_to_history(const std::filesystem::path& path,
-                                       std::span<const HistoryEntry> entries);
+                                       std::span<const HistoryEntry> entries,
+                                       const std::optional<RunIsocentre>& run = {});
 /// Whether entries can be added to the file (cannot_write): ask before a measurement.
 Expected<void> check_history_file(const std::filesystem::path& path);
 
@@ -24,5 +26,7 @@ Json history_schema();
 /// Of a result (helicarm-result/1) or a run of images (helicarm-sweep/1). Refuses one that was refused or
 /// holds none (too_few_views), with what to do.
 Expected<std::vector<HistoryEntry>> acquisitions_of_result(const Json& json, const std::string& origin);
+/// Of a run of images that tells of the C-arm; nothing of a result or a run without a path.
+Expected<std::optional<RunIsocentre>> isocentre_of_result(const Json& json, const std::string& origin);
 
 }  // namespace helicarm::calibration

@@ -106,15 +106,39 @@ TEST(CArmHistoryJson, RoundTrip) {
 
 TEST(CArmHistoryJson, KeepsAMapWithItsField) {
   HistoryEntry entry{"a", "AP", {901, 2, 3}, Eigen::Matrix3d::Identity()};
-  entry.map = rectification::identity_map(512, 384, 0.3);
-  entry.field_radius_px = 250;
+  entry.plate = PlateMap{rectification::identity_map(512, 384, 0.3), 250};
   Json json = to_json(CArmHistory{{entry}});
   const HistoryEntry read = history_from_json(json, "machine.json").value().entries.at(0);
-  ASSERT_TRUE(read.map);
-  EXPECT_EQ(read.map->height, 384);
-  EXPECT_EQ(read.field_radius_px, 250);
+  ASSERT_TRUE(read.plate);
+  EXPECT_EQ(read.plate->map.height, 384);
+  EXPECT_EQ(read.plate->field_radius_px, 250);
   json["shots"][0].erase("field_radius_px");
   EXPECT_EQ(history_from_json(json, "machine.json").error().reason, Reason::bad_value);
+}
+
+TEST(CArmHistoryJson, ARunsIsocentreIsAddedOnce) {
+  const HistoryEntry entry{"a", "RUN/1", {901, 2, 3}, Eigen::Vector3d(1, 2, 3).asDiagonal()};
+  const Json path{{"arc_deg", 200.5},
+                  {"isocentre_radius_mm", 1.25},
+                  {"isocentre_sigma_mm", {0.1, 0.2, 0.3}},
+                  {"source_to_axis_mm", 620}};
+  const Json frames{{{"decision", "accept"}}, {{"decision", "refuse"}}, {{"decision", "warn"}}};
+  const Json sweep{{"format", "helicarm-sweep/1"},
+                   {"acquisitions", acquisitions_json({entry})},
+                   {"path", path},
+                   {"frames", frames}};
+  const auto run = isocentre_of_result(sweep, "sweep.json").value();
+  ASSERT_TRUE(run);
+  const TemporaryFolder folder;
+  for (int time = 0; time < 2; ++time)
+    ASSERT_TRUE(add_to_history(folder.path() / "arm.json", std::vector{entry}, run));
+  const CArmHistory read = read_history(folder.path() / "arm.json").value();
+  ASSERT_EQ(read.runs.size(), 1u);
+  EXPECT_EQ(read.runs[0].images, 2);
+  EXPECT_EQ(read.runs[0].radius_mm, 1.25);
+  EXPECT_EQ(read.runs[0].sigma_mm.z(), 0.3);
+  EXPECT_FALSE(read.runs[0].date.empty());
+  EXPECT_FALSE(isocentre_of_result({{"format", "helicarm-result/1"}}, "result.json").value());
 }
 
 Json result_with(const std::vector<HistoryEntry>& entries) {

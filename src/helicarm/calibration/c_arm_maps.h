@@ -13,7 +13,6 @@ namespace helicarm::calibration {
 
 /// A map beside what others predict of it.
 struct MapCheck {
-  std::size_t entry = 0;     ///< index in the model
   double error_px = 0;       ///< per axis, root mean square over the field
   double of_one_map_px = 0;  ///< of the mean of the others
   double predicted_px = 0;   ///< what the model expects of `error_px`
@@ -23,26 +22,29 @@ struct MapCheck {
 /// are a Gaussian process over the position (Rasmussen and Williams 2006, 2.2), the same for all places of
 /// the field, with a constant mean.
 struct CArmMaps {
-  /// That have a map, of the latest one's image size and pixel size; of one position the latest few.
-  std::vector<HistoryEntry> entries;
+  std::vector<HistoryEntry> entries;  ///< `entries_with_latest_maps`
   rectification::MapField field;
   std::vector<Eigen::MatrixX2d> displacements;  ///< of each entry's map, at the field's places, px
   double repeat_share = 0;  ///< of the variance, from one acquisition to the next in one position
   rectification::MapVariation variation;
-  std::vector<MapCheck> checks;  ///< of each entry, from two on
 };
 
-/// Keeps the map of an image's own plate (in it, or of a plate image beside it) in its entry; any other map
+/// The map of an image's own plate (in it, or of a plate image beside it); nothing of any other map, which
 /// tells nothing new.
-void keep_map(HistoryEntry& entry, const rectification::Rectification& rectification);
+std::optional<PlateMap> plate_map_of(const rectification::Rectification& rectification);
 
 /// Fits share and variation to the entries' maps, from what each is off its prediction by the others; without
 /// a map there is no model.
 std::optional<CArmMaps> c_arm_maps(std::span<const HistoryEntry> entries);
 
-/// An acquisition's own map beside the model, which does not hold it; nothing without a map of this image
-/// size.
-std::optional<MapCheck> check_map(const CArmMaps& model, const HistoryEntry& acquired);
+/// Each of the model's maps beside a model of the others; nothing of a single map.
+std::vector<MapCheck> leave_one_out(const CArmMaps& model);
+
+/// Whether a map is of the image size and the field of the model's.
+bool is_of_their_field(const CArmMaps& model, const PlateMap& plate);
+
+/// An acquisition's map, of their field, beside the model, which does not hold it.
+MapCheck check_map(const CArmMaps& model, const HistoryEntry& acquired);
 
 /// Whether the maps say little more of these angles than their mean: none are stated, or no map is near.
 bool is_far_from_maps(const CArmMaps& model, std::optional<double> primary_deg,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/calibration/c_arm_maps.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -42,8 +43,7 @@ struct Intensifier {
         dots.push_back({mm, raw, 0.03});
       }
     HistoryEntry recorded;
-    recorded.map = value_or_throw(rectification::fit_map(dots, size, size, {})).map;
-    recorded.field_radius_px = 330;
+    recorded.plate = PlateMap{value_or_throw(rectification::fit_map(dots, size, size, {})).map, 330};
     recorded.estimate_mm = {1000, 0, 0};
     recorded.information.setIdentity();
     recorded.primary_deg = primary_deg;
@@ -73,7 +73,7 @@ TEST(CArmMaps, BetweenRecordedPositionsIsNearerThanOneMapForAll) {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     const Intensifier intensifier(seed);
     const CArmMaps model = c_arm_maps(intensifier.around(steps_deg)).value();
-    const rectification::DistortionMap truth = *intensifier.at(15, 0).map;
+    const rectification::DistortionMap truth = intensifier.at(15, 0).plate->map;
     by_position += rms(off(map_at(model, 15, 0), truth, model.field));
     by_one += rms(off(map_at(model, {}, {}), truth, model.field));
   }
@@ -87,7 +87,7 @@ TEST(CArmMaps, StatedErrorsHold) {
     const CArmMaps model = c_arm_maps(intensifier.around(steps_deg)).value();
     for (const double angle : {-75.0, -20.0, 10.0, 50.0, 110.0}) {
       const rectification::DistortionMap map = map_at(model, angle, 0);
-      const Eigen::MatrixX2d errors = off(map, *intensifier.at(angle, 0).map, model.field);
+      const Eigen::MatrixX2d errors = off(map, intensifier.at(angle, 0).plate->map, model.field);
       const Eigen::VectorXd sigmas = map.covariance_px2(model.field.places).diagonal().cwiseSqrt();
       for (Eigen::Index i = 0; i < errors.rows(); ++i)
         for (int axis = 0; axis < 2; ++axis) inside += std::abs(errors(i, axis)) < 1.96 * sigmas[i];
@@ -109,17 +109,18 @@ TEST(CArmMaps, FartherFromRecordedPositionsErrorsAreLarger) {
 TEST(CArmMaps, OfOneMapIsThatMapWithUsualErrors) {
   const Intensifier intensifier(1);
   const CArmMaps model = c_arm_maps(intensifier.around({0})).value();
-  EXPECT_TRUE(model.checks.empty());
+  EXPECT_TRUE(leave_one_out(model).empty());
   const rectification::DistortionMap there = map_at(model, 0, 0), elsewhere = map_at(model, 90, 0);
-  EXPECT_LT(rms(off(there, *model.entries[0].map, model.field)), 5e-3);
+  EXPECT_LT(rms(off(there, model.entries[0].plate->map, model.field)), 5e-3);
   const Vector2d edge = model.field.places.back();
   EXPECT_GT(elsewhere.sigma_px(edge), 3 * there.sigma_px(edge));
 }
 
 TEST(CArmMaps, EachMapIsCheckedByTheOthers) {
   const CArmMaps model = c_arm_maps(Intensifier(2).around(steps_deg)).value();
-  ASSERT_EQ(model.checks.size(), steps_deg.size());
-  const MapCheck& middle = model.checks[3];
+  const std::vector<MapCheck> checks = leave_one_out(model);
+  ASSERT_EQ(checks.size(), steps_deg.size());
+  const MapCheck& middle = checks[3];
   EXPECT_LT(middle.error_px, 0.5 * middle.of_one_map_px);
   EXPECT_LT(middle.error_px, 3 * middle.predicted_px);
 }
@@ -148,6 +149,55 @@ TEST(CArmMaps, ManyMapsOfOnePositionDoNotPushOutTheOthers) {
   ASSERT_EQ(kept.size(), 6u);  // the latest four at 0 degrees, and two others
   EXPECT_EQ(kept[0].primary_deg, 45);
   EXPECT_EQ(kept[1].primary_deg, 90);
+}
+
+TEST(CArmMaps, MapsThatAreNotComparedAreNamed) {
+  const Intensifier intensifier(1);
+  const CArmPrior unknown{IntrinsicsVariation{10, 1}, IntrinsicsVariation{10, 3}};
+  const CArmModel model = c_arm_model(intensifier.around(steps_deg), {1000, 0, 0}, unknown),
+                  few = c_arm_model(intensifier.around({0, 30, 60}), {1000, 0, 0}, unknown);
+  HistoryEntry other_field = intensifier.at(15, 0, 2 * side), same_field = intensifier.at(15, 0);
+  other_field.view = "magnified";
+  same_field.view = "AP";
+  const CArmCheck check = check_c_arm(model, std::vector{other_field, same_field}, {});
+  EXPECT_EQ(check.uncompared_maps, std::vector<std::string>{"magnified"});
+  EXPECT_EQ(check.maps.size(), 1u);
+  EXPECT_EQ(check_c_arm(few, std::vector{same_field}, {}).uncompared_maps, std::vector<std::string>{"AP"});
+}
+
+TEST(CArmMaps, OfARecordsMapsOnlyThoseThatCountInTheirFieldAreKept) {
+  const Intensifier intensifier(1);
+  CArmHistory history{intensifier.around({0, 45})};
+  history.entries.push_back(intensifier.at(0, 0, 2 * side));
+  for (int day = 0; day < 6; ++day) history.entries.push_back(history.entries[0]);
+  const CArmMaps before = c_arm_maps(history.entries).value();
+  forget_old_maps(history);
+  EXPECT_EQ(std::ranges::count_if(history.entries, [](const HistoryEntry& e) { return e.plate.has_value(); }),
+            6);  // four at 0 degrees, one at 45, one of the other field
+  EXPECT_FALSE(history.entries[0].plate);
+  EXPECT_TRUE(history.entries[1].plate && history.entries[2].plate);
+  EXPECT_EQ(history.entries.size(), 9u);
+  EXPECT_EQ(c_arm_maps(history.entries)->displacements, before.displacements);
+}
+
+TEST(CArmMaps, AnEntryWithoutItsMapTakesItWhenAddedAgain) {
+  CArmHistory history{Intensifier(1).around({0})};
+  const std::vector<HistoryEntry> again = history.entries;
+  history.entries[0].plate.reset();
+  EXPECT_EQ(add_entries(history, again), 0u);
+  EXPECT_TRUE(history.entries[0].plate);
+}
+
+TEST(CArmMaps, LeftOutMapsAreOffAsFarAsNewOnes) {
+  double left_out = 0, fresh = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Intensifier intensifier(seed);
+    const CArmMaps five = c_arm_maps(intensifier.around({-60, -30, 0, 30, 60})).value(),
+                   four = c_arm_maps(intensifier.around({-60, -30, 30, 60})).value();
+    left_out += leave_one_out(five)[2].error_px;
+    fresh += check_map(four, intensifier.at(0, 0)).error_px;
+  }
+  EXPECT_NEAR(left_out, fresh, 0.02 * fresh);
 }
 
 TEST(CArmMaps, MapsOfAnotherImageSizeAreLeftOut) {

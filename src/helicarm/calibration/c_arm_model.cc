@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include <Eigen/Cholesky>
@@ -146,6 +148,46 @@ CArmModel c_arm_model(std::span<const HistoryEntry> entries, const Vector3d& nom
   return model;
 }
 
+namespace {
+
+/// Since the first of them; an entry without a date is of the first day.
+VectorXd years_of(std::span<const HistoryEntry> entries) {
+  using namespace std::chrono;
+  constexpr double days_a_year = 365.25;
+  std::vector<std::optional<sys_days>> days;
+  for (const HistoryEntry& entry : entries) {
+    int year_number = 0;
+    unsigned month_number = 0, day_number = 0;
+    const bool is_date =
+        std::sscanf(entry.date.c_str(), "%d-%u-%u", &year_number, &month_number, &day_number) == 3;
+    const year_month_day date{year(year_number), month(month_number), day(day_number)};
+    days.push_back(is_date && date.ok() ? std::optional(sys_days(date)) : std::nullopt);
+  }
+  std::optional<sys_days> first;
+  for (const auto& at : days)
+    if (at && (!first || *at < *first)) first = at;
+  VectorXd years = VectorXd::Zero(std::ssize(days));
+  for (std::size_t i = 0; i < days.size(); ++i)
+    if (days[i]) years[Index(i)] = double((*days[i] - *first).count()) / days_a_year;
+  return years;
+}
+
+}  // namespace
+
+std::optional<CArmDrift> c_arm_drift(const CArmModel& model) {
+  const VectorXd years = years_of(model.entries);
+  if (model.entries.empty() || years.maxCoeff() <= 0) return {};
+  MatrixXd covariance = covariance_between(model, model.entries, model.entries, true);
+  add_noise(covariance, model.entries);
+  MatrixXd by_year(covariance.rows(), 3);
+  for (Index i = 0; i < years.size(); ++i) by_year.middleRows<3>(3 * i) = years[i] * Matrix3d::Identity();
+  const Eigen::LLT<MatrixXd> factor(covariance);
+  const MatrixXd weighted = factor.solve(by_year);
+  const Matrix3d of_drift = (by_year.transpose() * weighted).inverse();
+  return CArmDrift{of_drift * (weighted.transpose() * deviations(model, model.entries)),
+                   of_drift.diagonal().cwiseSqrt()};
+}
+
 IntrinsicsPrediction predict_intrinsics(const CArmModel& model, std::span<const HistoryEntry> at) {
   IntrinsicsPrediction predicted;
   predicted.mean_mm = model.nominal_mm.replicate(Index(at.size()), 1);
@@ -176,17 +218,20 @@ void mark_those_that_tell(CArmCheck& check) {
 
 namespace {
 
-std::vector<MapDifference> check_maps(const CArmModel& model, std::span<const HistoryEntry> acquired) {
+void check_maps(CArmCheck& check, const CArmModel& model, std::span<const HistoryEntry> acquired) {
   constexpr double significant = 3, noticeable_px = 0.2;
-  constexpr std::size_t least_maps = 4;  // fewer do not tell what is usual of this C-arm
-  std::vector<MapDifference> differences;
   const auto maps = c_arm_maps(model.entries);
-  if (!maps || maps->entries.size() < least_maps) return differences;
-  for (const HistoryEntry& entry : acquired)
-    if (const auto check = check_map(*maps, entry))
-      differences.push_back({entry.view, check->error_px, check->predicted_px,
-                             check->error_px > std::max(noticeable_px, significant * check->predicted_px)});
-  return differences;
+  check.recorded_maps = maps ? maps->entries.size() : 0;
+  for (const HistoryEntry& entry : acquired) {
+    if (!entry.plate) continue;
+    if (check.recorded_maps < least_compared_maps || !is_of_their_field(*maps, *entry.plate)) {
+      check.uncompared_maps.push_back(entry.view);
+      continue;
+    }
+    const MapCheck of_map = check_map(*maps, entry);
+    check.maps.push_back({entry.view, of_map.error_px, of_map.predicted_px,
+                          of_map.error_px > std::max(noticeable_px, significant * of_map.predicted_px)});
+  }
 }
 
 }  // namespace
@@ -195,7 +240,7 @@ CArmCheck check_c_arm(const CArmModel& model, std::span<const HistoryEntry> acqu
                       const CArmTolerances& tolerances) {
   CArmCheck check;
   if (acquired.empty()) return check;
-  check.maps = check_maps(model, acquired);
+  check_maps(check, model, acquired);
   const IntrinsicsPrediction predicted = predict_intrinsics(model, acquired);
   MatrixXd covariance = predicted.covariance_mm2;
   add_noise(covariance, acquired);

@@ -17,16 +17,26 @@ struct CArmVariation {
 
 /// Intrinsics of a C-arm as a Gaussian process over its position (Rasmussen and Williams 2006, 2.2, 5.4.1).
 struct CArmModel {
-  Eigen::Vector3d nominal_mm;         ///< focal length and principal point, as HistoryEntry::estimate_mm
-  CArmPrior unknown;                  ///< before any acquisition
-  std::vector<HistoryEntry> entries;  ///< the latest 150 of the history
-  CArmVariation focal, principal;     ///< of greatest posterior density
+  Eigen::Vector3d nominal_mm;           ///< focal length and principal point, as HistoryEntry::estimate_mm
+  CArmPrior unknown;                    ///< before any acquisition
+  std::vector<HistoryEntry> entries;    ///< the latest 150 of the history
+  CArmVariation focal, principal;       ///< of greatest posterior density
+  std::vector<RunIsocentre> runs = {};  ///< of the history
 };
 
 /// Fits both variations to the history's latest entries. With few entries they stay near those of an unknown
 /// C-arm.
 CArmModel c_arm_model(std::span<const HistoryEntry> entries, const Eigen::Vector3d& nominal_mm,
                       const CArmPrior& unknown);
+
+/// Change of the intrinsics with time, mm a year, and its standard deviation.
+struct CArmDrift {
+  Eigen::Vector3d mm_a_year, sigma;
+};
+
+/// By generalised least squares, beside sag and repeatability; nothing where all acquisitions were added on
+/// one day.
+std::optional<CArmDrift> c_arm_drift(const CArmModel& model);
 
 /// Joint prediction of acquisitions: three values each, in the entries' order, without their own errors.
 struct IntrinsicsPrediction {
@@ -62,7 +72,13 @@ struct CArmCheck {
   double limit = 0;                 ///< its 99.9 % quantile
   bool changed = false;             ///< significant, and beyond the history's tolerances in one acquisition
   std::vector<MapDifference> maps;  ///< of the acquisitions with a map, beside those of the history
+  /// Views whose maps are not compared: of another field than those of the history, or these are too few.
+  std::vector<std::string> uncompared_maps;
+  std::size_t recorded_maps = 0;  ///< that count
 };
+
+/// Fewer recorded maps do not tell what is usual of a C-arm.
+inline constexpr std::size_t least_compared_maps = 4;
 
 CArmCheck check_c_arm(const CArmModel& model, std::span<const HistoryEntry> acquired,
                       const CArmTolerances& tolerances);

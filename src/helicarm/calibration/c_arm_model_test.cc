@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "helicarm/core/random.h"
@@ -134,6 +135,27 @@ TEST(CArmModel, ImagesWithoutAnglesAreNotTakenForOnePosition) {
   HistoryEntry next = arm.acquisition(0);
   next.primary_deg.reset();
   EXPECT_FALSE(check_c_arm(model, {&next, 1}, {}).changed);
+}
+
+TEST(CArmModel, DriftIsFoundBesideTheSag) {
+  int inside = 0;
+  for (const double drift : {0.0, 4.0})
+    for (std::uint64_t seed = 0; seed < 8; ++seed) {
+      SaggingArm arm(seed);
+      std::vector<HistoryEntry> entries;
+      for (int month = 0; month < 12; ++month)
+        for (const double angle : {0.0, 40.0, 80.0}) {
+          entries.push_back(arm.acquisition(angle, Vector3d(drift * month / 12, 0, 0)));
+          entries.back().date = fmt::format("2026-{:02}-10", 1 + month);
+        }
+      const auto found = c_arm_drift(c_arm_model(entries, arm_nominal_mm, unknown_arm));
+      ASSERT_TRUE(found);
+      inside += std::abs(found->mm_a_year.x() - drift) < 1.96 * found->sigma.x();
+      EXPECT_LT(found->sigma.x(), 2);
+      for (HistoryEntry& entry : entries) entry.date = "2026-05-05";
+      EXPECT_FALSE(c_arm_drift(c_arm_model(entries, arm_nominal_mm, unknown_arm)));
+    }
+  EXPECT_GE(inside, 13);
 }
 
 }  // namespace

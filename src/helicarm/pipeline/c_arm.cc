@@ -26,7 +26,7 @@ Expected<CArmAcquisitions> measured_acquisitions(const Case& the_case, unsigned 
           "the residuals contradict the noise model, or no view alone determines its camera: the case "
           "says nothing of the C-arm (exchanged plate images, wrong pixel size or calibrator's file: "
           "`helicarm run` of it names causes)");
-    return CArmAcquisitions{result.calibration->entries, result.warnings};
+    return CArmAcquisitions{result.calibration->entries, result.warnings, {}};
   });
 }
 
@@ -52,10 +52,11 @@ Expected<CArmAcquisitions> c_arm_acquisitions(const std::filesystem::path& from,
     result /= holds("result.json") ? "result.json" : "sweep.json";
   }
   return read_json(result).and_then([&](const Json& json) {
-    return calibration::acquisitions_of_result(json, result.string())
-        .map([](std::vector<calibration::HistoryEntry> entries) {
-          return CArmAcquisitions{std::move(entries), {}};
-        });
+    return guarded([&] {
+      return CArmAcquisitions{value_or_throw(calibration::acquisitions_of_result(json, result.string())),
+                              {},
+                              value_or_throw(calibration::isocentre_of_result(json, result.string()))};
+    });
   });
 }
 
@@ -67,7 +68,10 @@ Expected<calibration::CArmModel> model_of_record(const calibration::CArmHistory&
         fmt::format("{}: holds no acquisition beside these; add cases with `helicarm c-arm add`", origin));
   std::vector<double> focal_mm;
   for (const calibration::HistoryEntry& entry : record.entries) focal_mm.push_back(entry.estimate_mm.x());
-  return calibration::c_arm_model(record.entries, {median(std::move(focal_mm)), 0, 0}, unknown_c_arm());
+  calibration::CArmModel model =
+      calibration::c_arm_model(record.entries, {median(std::move(focal_mm)), 0, 0}, unknown_c_arm());
+  model.runs = record.runs;
+  return model;
 }
 
 Expected<calibration::CArmCheck> check_against_record(std::vector<calibration::HistoryEntry> acquired,
@@ -80,14 +84,36 @@ Expected<calibration::CArmCheck> check_against_record(std::vector<calibration::H
   });
 }
 
+namespace {
+
+/// Of maps that are not compared with the record's; nothing where it holds none.
+std::optional<Warning> uncompared_maps(const calibration::CArmCheck& check) {
+  if (check.uncompared_maps.empty() || check.recorded_maps == 0) return {};
+  const bool are_few = check.recorded_maps < calibration::least_compared_maps;
+  return Warning{
+      Reason::plate_mismatch,
+      fmt::format("the distortion of {} is not compared with the record: {}",
+                  fmt::join(check.uncompared_maps, ", "),
+                  are_few ? fmt::format("it holds {} maps, and {} tell what is usual", check.recorded_maps,
+                                        calibration::least_compared_maps)
+                          : "its image size or pixel size (another field of the intensifier) is not that of "
+                            "the record's latest map"),
+      {},
+      {{"maps", double(check.recorded_maps)}}};
+}
+
+}  // namespace
+
 std::vector<Warning> limits_of(const calibration::CArmCheck& check) {
+  std::vector<Warning> limits;
+  if (auto maps = uncompared_maps(check)) limits.push_back(*std::move(maps));
   std::vector<double> sigmas_mm;
   for (const calibration::AcquisitionCheck& one : check.acquisitions)
     if (!one.entry.primary_deg) sigmas_mm.push_back(one.sigma_mm.tail<2>().maxCoeff());
-  if (sigmas_mm.empty()) return {};
+  if (sigmas_mm.empty()) return limits;
   const auto count = sigmas_mm.size();
   const double sigma_mm = median(std::move(sigmas_mm));
-  return {
+  limits.push_back(
       {Reason::intrinsics_weak,
        fmt::format(
            "{} of {} acquisitions state no positioner angles: each counts as a position of its own, and "
@@ -95,18 +121,19 @@ std::vector<Warning> limits_of(const calibration::CArmCheck& check) {
            "another C-arm that is alike, are not seen",
            count, check.acquisitions.size(), sigma_mm),
        {},
-       {{"acquisitions", double(count)}, {"sigma_mm", sigma_mm}}}};
+       {{"acquisitions", double(count)}, {"sigma_mm", sigma_mm}}});
+  return limits;
 }
 
 Expected<calibration::HistoryGrowth> add_to_record(const std::filesystem::path& record,
-                                                   const std::vector<calibration::HistoryEntry>& acquired) {
+                                                   const CArmAcquisitions& acquired) {
   return guarded([&] {
     const calibration::CArmHistory earlier = value_or_throw(calibration::history_at(record));
-    if (holds_others(earlier, acquired)) {
-      const auto check = value_or_throw(check_against_record(acquired, earlier, record.string()));
+    if (holds_others(earlier, acquired.entries)) {
+      const auto check = value_or_throw(check_against_record(acquired.entries, earlier, record.string()));
       if (const auto change = c_arm_change(check)) throw BadInput(*change);
     }
-    return value_or_throw(calibration::add_to_history(record, acquired));
+    return value_or_throw(calibration::add_to_history(record, acquired.entries, acquired.run));
   });
 }
 

@@ -15,6 +15,7 @@ namespace helicarm::pipeline {
 struct CArmAcquisitions {
   std::vector<calibration::HistoryEntry> entries;
   std::vector<Finding> warnings;
+  std::optional<calibration::RunIsocentre> run = {};  ///< of a run of images
 };
 
 /// Measures the case in a folder, or reads a result.json or sweep.json (or a folder that holds one and no
@@ -32,14 +33,15 @@ Expected<calibration::CArmCheck> check_against_record(std::vector<calibration::H
                                                       const std::string& origin);
 
 /// What a check cannot see: acquisitions without positioner angles, each of which counts as a position of its
-/// own (intrinsics_weak, with the standard deviation of their prediction).
+/// own (intrinsics_weak, with the standard deviation of their prediction), and maps that it does not compare
+/// (plate_mismatch).
 std::vector<Warning> limits_of(const calibration::CArmCheck& check);
 
 /// Adds acquisitions to a record, which is made where there is none. Fails with c_arm_changed, and adds
 /// nothing, where they lie beyond what the record predicts and its tolerances; else as
 /// `calibration::add_to_history`.
 Expected<calibration::HistoryGrowth> add_to_record(const std::filesystem::path& record,
-                                                   const std::vector<calibration::HistoryEntry>& acquired);
+                                                   const CArmAcquisitions& acquired);
 
 /// Adds a measurement's acquisitions to the record that it was made with; none where the measurement found
 /// the C-arm changed.

@@ -46,14 +46,14 @@ TEST(CArm, AcquisitionsOfAnotherArmAreNotAdded) {
   const TemporaryFolder folder;
   const std::filesystem::path file = folder.path() / "arm.json";
   calibration::CArmHistory record = record_of(10);
-  ASSERT_EQ(add_to_record(file, record.entries)->added, 10u);
+  ASSERT_EQ(add_to_record(file, {record.entries, {}})->added, 10u);
   calibration::HistoryEntry other = record.entries[5], same = record.entries[4];
   other.image = "other";
   other.estimate_mm.x() += 100;
-  EXPECT_EQ(add_to_record(file, std::vector{other}).error().reason, Reason::c_arm_changed);
+  EXPECT_EQ(add_to_record(file, CArmAcquisitions{{other}, {}}).error().reason, Reason::c_arm_changed);
   EXPECT_EQ(calibration::read_history(file)->entries.size(), 10u);
   same.image = "same";
-  EXPECT_EQ(add_to_record(file, std::vector{same, record.entries[0]})->added, 1u);
+  EXPECT_EQ(add_to_record(file, CArmAcquisitions{{same, record.entries[0]}, {}})->added, 1u);
 }
 
 TEST(CArm, CheckWithoutAnglesSaysThatItSeesLittle) {
@@ -68,6 +68,21 @@ TEST(CArm, CheckWithoutAnglesSaysThatItSeesLittle) {
   EXPECT_EQ(limits[0].reason, Reason::intrinsics_weak);
   EXPECT_EQ(limits[0].figures.at("acquisitions"), 1);
   EXPECT_GT(limits[0].figures.at("sigma_mm"), 1);
+}
+
+TEST(CArm, CheckSaysWhichMapsItDoesNotCompare) {
+  calibration::CArmCheck check;
+  EXPECT_TRUE(limits_of(check).empty());
+  check.uncompared_maps = {"AP", "LAT"};
+  EXPECT_TRUE(limits_of(check).empty());  // a record without maps: nothing was expected of them
+  for (const std::size_t recorded : {std::size_t{3}, std::size_t{7}}) {
+    check.recorded_maps = recorded;
+    const auto limits = limits_of(check);
+    ASSERT_EQ(limits.size(), 1u);
+    EXPECT_EQ(limits[0].reason, Reason::plate_mismatch);
+    EXPECT_NE(limits[0].message.find("AP, LAT"), std::string::npos);
+    EXPECT_EQ(limits[0].message.find("field") != std::string::npos, recorded == 7);
+  }
 }
 
 TEST(CArm, UnchangedArmIsNoFailure) {

@@ -47,7 +47,7 @@ std::vector<calibration::HistoryEntry> entries_of(const LabelledViews& views,
     if (auto entry = calibration::history_entry_of(fiducials[i], acquisition.instance_key, common)) {
       entry->primary_deg = acquisition.primary_angle_deg;
       entry->secondary_deg = acquisition.secondary_angle_deg;
-      calibration::keep_map(*entry, views[i].rectification);
+      entry->plate = calibration::plate_map_of(views[i].rectification);
       entries.push_back(*std::move(entry));
     }
   }

@@ -101,8 +101,8 @@ TEST_F(SimulatedNavigation, WithoutAPlateTheRecordsMapsRectify) {
   options.history.emplace();
   options.history->entries = by_plate.calibration->entries;
   ASSERT_EQ(options.history->entries.size(), 2u);
-  EXPECT_TRUE(options.history->entries[0].map);
-  EXPECT_GT(options.history->entries[0].field_radius_px, 150);
+  ASSERT_TRUE(options.history->entries[0].plate);
+  EXPECT_GT(options.history->entries[0].plate->field_radius_px, 150);
   given_.plate.reset();
   const Result by_record = result_of(given_, options).value();
   ASSERT_FALSE(by_record.failure) << by_record.failure->message;
@@ -115,7 +115,7 @@ TEST_F(SimulatedNavigation, WithoutAPlateTheRecordsMapsRectify) {
     EXPECT_LT(off.norm(), 0.5) << real.name;
   }
   // What the record told is not told to it again.
-  for (const calibration::HistoryEntry& entry : by_record.calibration->entries) EXPECT_FALSE(entry.map);
+  for (const calibration::HistoryEntry& entry : by_record.calibration->entries) EXPECT_FALSE(entry.plate);
 }
 
 TEST_F(SimulatedNavigation, MirroredCalibratorFileIsRefused) {

@@ -76,7 +76,7 @@ Expected<KnownMap> map_of(const xray::XrayImage& xray_image, const CaseView& fro
       return {value_or_throw(plate_image_map(from, *plate, options.method, options.cache)),
               MapSource::plate_image};
     const xray::Acquisition& acquisition = xray_image.acquisition;
-    if (options.maps) check_size(xray_image, *options.maps->entries.back().map);
+    if (options.maps) check_size(xray_image, options.maps->entries.back().plate->map);
     if (options.maps)
       return {map_at(*options.maps, acquisition.primary_angle_deg, acquisition.secondary_angle_deg),
               MapSource::record};

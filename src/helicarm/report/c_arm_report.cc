@@ -12,6 +12,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
+#include "helicarm/pipeline/c_arm.h"
 #include "helicarm/report/chart.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/pdf_document.h"
@@ -22,6 +23,7 @@ namespace {
 using calibration::AcquisitionCheck;
 using calibration::CArmMaps;
 using calibration::CArmModel;
+using calibration::MapCheck;
 
 constexpr std::array<const char*, 3> intrinsic_names{"focal", "u0", "v0"};
 constexpr std::array<const char*, 3> intrinsic_titles{"source distance", "principal point, column",
@@ -118,6 +120,10 @@ std::string summary(const CArmModel& model, std::span<const AcquisitionCheck> le
       card(fmt::format("{:.1f} to {:.1f} mm", found.at_positions->first[axis],
                        found.at_positions->second[axis]),
            std::string(intrinsic_titles[std::size_t(axis)]) + ", predicted at the recorded positions");
+  if (const auto drift = calibration::c_arm_drift(model))
+    for (int axis = 0; axis < 3; ++axis)
+      card(fmt::format("{:+.2f} ±{:.2f} mm a year", drift->mm_a_year[axis], drift->sigma[axis]),
+           std::string(intrinsic_titles[std::size_t(axis)]) + ", drift");
   card(fmt::format("{} of {}", inside_95(left_out), left_out.size()),
        "inside the 95 % region predicted by all others");
   return html + "</div>\n";
@@ -165,61 +171,69 @@ Json json_of(std::span<const AcquisitionCheck> acquisitions) {
   return list;
 }
 
+struct LeftOutMap {
+  calibration::HistoryEntry entry;
+  MapCheck check;
+};
+
+std::vector<LeftOutMap> left_out_maps(const CArmMaps& maps) {
+  const std::vector<MapCheck> checks = calibration::leave_one_out(maps);
+  std::vector<LeftOutMap> rows;
+  for (std::size_t i = 0; i < checks.size(); ++i) rows.push_back({maps.entries[i], checks[i]});
+  return rows;
+}
+
 }  // namespace
 
 Table c_arm_map_table(const CArmMaps& maps) {
-  using calibration::MapCheck;
-  const auto entry_of = [&](const MapCheck& check) -> const calibration::HistoryEntry& {
-    return maps.entries[check.entry];
-  };
   const auto pixels = [](const char* title, const char* definition, double MapCheck::*value) {
-    return ColumnOf<MapCheck>{{title, definition, true},
-                              [value](const MapCheck& check) { return Cell{fixed(check.*value, 3)}; }};
+    return ColumnOf<LeftOutMap>{{title, definition, true},
+                                [value](const LeftOutMap& map) { return Cell{fixed(map.check.*value, 3)}; }};
   };
-  return without_empty_columns(table_of<MapCheck>(
+  return without_empty_columns(table_of<LeftOutMap>(
       "Distortion",
-      {{{"View", "Its name"}, [=](const MapCheck& c) { return Cell{entry_of(c).view}; }},
-       {{"Date", "On which it was added, UTC"}, [=](const MapCheck& c) { return Cell{entry_of(c).date}; }},
+      {{{"View", "Its name"}, [](const LeftOutMap& m) { return Cell{m.entry.view}; }},
+       {{"Date", "On which it was added, UTC"}, [](const LeftOutMap& m) { return Cell{m.entry.date}; }},
        {{"Primary, degrees", "Positioner angle", true},
-        [=](const MapCheck& c) { return angle_cell(entry_of(c).primary_deg); }},
+        [](const LeftOutMap& m) { return angle_cell(m.entry.primary_deg); }},
        {{"Secondary, degrees", "Positioner angle", true},
-        [=](const MapCheck& c) { return angle_cell(entry_of(c).secondary_deg); }},
+        [](const LeftOutMap& m) { return angle_cell(m.entry.secondary_deg); }},
        pixels("By position, px", "From the map that the others predict there, rms per axis over the field",
               &MapCheck::error_px),
        pixels("By one map, px", "From the mean of the others' maps, likewise", &MapCheck::of_one_map_px),
        pixels("Expected, px", "Of the difference by position, as its standard deviation states",
               &MapCheck::predicted_px)},
-      maps.checks));
+      left_out_maps(maps)));
 }
 
 namespace {
 
 /// Root mean square of a column of the maps' checks.
-double rms_of(const CArmMaps& maps, double calibration::MapCheck::*value) {
+double rms_of(const std::vector<MapCheck>& checks, double MapCheck::*value) {
   double sum = 0;
-  for (const calibration::MapCheck& check : maps.checks) sum += check.*value * check.*value;
-  return std::sqrt(sum / double(std::max<std::size_t>(1, maps.checks.size())));
+  for (const MapCheck& check : checks) sum += check.*value * check.*value;
+  return std::sqrt(sum / double(std::max<std::size_t>(1, checks.size())));
 }
 
 std::string map_text(const CArmModel& model) {
-  using calibration::MapCheck;
   const auto maps = calibration::c_arm_maps(model.entries);
   if (!maps) return "";
-  if (maps->checks.empty()) return "  distortion: one map\n";
+  const std::vector<MapCheck> checks = calibration::leave_one_out(*maps);
+  if (checks.empty()) return "  distortion: one map\n";
   return fmt::format(
       "  distortion: {} maps; each is {:.2f} px rms off its prediction by the others ({:.2f} expected), "
       "{:.2f} px "
       "off one map for all\n",
-      maps->checks.size(), rms_of(*maps, &MapCheck::error_px), rms_of(*maps, &MapCheck::predicted_px),
-      rms_of(*maps, &MapCheck::of_one_map_px));
+      checks.size(), rms_of(checks, &MapCheck::error_px), rms_of(checks, &MapCheck::predicted_px),
+      rms_of(checks, &MapCheck::of_one_map_px));
 }
 
 Json map_json(const CArmModel& model) {
   const auto maps = calibration::c_arm_maps(model.entries);
   if (!maps) return {};
   Json list = Json::array();
-  for (const calibration::MapCheck& check : maps->checks)
-    list.push_back({{"view", maps->entries[check.entry].view},
+  for (const auto& [entry, check] : left_out_maps(*maps))
+    list.push_back({{"view", entry.view},
                     {"error_px", check.error_px},
                     {"one_map_px", check.of_one_map_px},
                     {"expected_px", check.predicted_px}});
@@ -229,18 +243,83 @@ Json map_json(const CArmModel& model) {
 std::string map_csv(const CArmMaps& maps) {
   std::string csv = "view,date,primary_deg,secondary_deg,error_px,one_map_px,expected_px\n";
   const auto angle = [](const std::optional<double>& deg) { return deg ? fmt::format("{:.6g}", *deg) : ""; };
-  for (const calibration::MapCheck& check : maps.checks) {
-    const calibration::HistoryEntry& entry = maps.entries[check.entry];
+  for (const auto& [entry, check] : left_out_maps(maps))
     csv += fmt::format("{},{},{},{},{:.4f},{:.4f},{:.4f}\n", csv_field(entry.view), entry.date,
                        angle(entry.primary_deg), angle(entry.secondary_deg), check.error_px,
                        check.of_one_map_px, check.predicted_px);
-  }
   return csv;
 }
 
+std::vector<ColumnOf<calibration::RunIsocentre>> run_columns() {
+  using calibration::RunIsocentre;
+  return {
+      {{"date", "on which it was added, UTC"}, [](const RunIsocentre& r) { return Cell{r.date}; }},
+      {{"images", "accepted", true}, [](const RunIsocentre& r) { return Cell{fmt::format("{}", r.images)}; }},
+      {{"arc deg", "between the first and the last image", true},
+       [](const RunIsocentre& r) { return Cell{fixed(r.arc_deg, 1)}; }},
+      {{"radius mm", "from the isocentre to the farthest central ray", true},
+       [](const RunIsocentre& r) { return Cell{fixed(r.radius_mm, 2)}; }},
+      {{"sigma mm", "standard deviation of the isocentre, root mean square of three axes", true},
+       [](const RunIsocentre& r) { return Cell{fixed(r.sigma_mm.norm() / std::sqrt(3.0), 3)}; }},
+      {{"source to axis mm", "mean of the images", true},
+       [](const RunIsocentre& r) { return Cell{fixed(r.source_to_axis_mm, 2)}; }}};
+}
+
+Table run_table(const CArmModel& model) {
+  return table_of<calibration::RunIsocentre>("Isocentre, by runs of images", run_columns(), model.runs);
+}
+
+std::string run_text(const CArmModel& model) {
+  if (model.runs.empty()) return "";
+  const auto [least, most] = std::ranges::minmax(model.runs, {}, &calibration::RunIsocentre::radius_mm);
+  return fmt::format("  isocentre: farthest central ray {:.2f} to {:.2f} mm off it, in {} {}\n",
+                     least.radius_mm, most.radius_mm, model.runs.size(),
+                     model.runs.size() == 1 ? "run" : "runs");
+}
+
+Json run_json(const CArmModel& model) {
+  Json list = Json::array();
+  for (const calibration::RunIsocentre& run : model.runs)
+    list.push_back({{"date", run.date},
+                    {"images", run.images},
+                    {"arc_deg", run.arc_deg},
+                    {"radius_mm", run.radius_mm},
+                    {"sigma_mm", {run.sigma_mm.x(), run.sigma_mm.y(), run.sigma_mm.z()}},
+                    {"source_to_axis_mm", run.source_to_axis_mm}});
+  return list;
+}
+
+std::string run_csv(const CArmModel& model) {
+  std::string csv = "date,images,arc_deg,radius_mm,sx_mm,sy_mm,sz_mm,source_to_axis_mm\n";
+  for (const calibration::RunIsocentre& run : model.runs)
+    csv += fmt::format("{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}\n", run.date, run.images, run.arc_deg,
+                       run.radius_mm, run.sigma_mm.x(), run.sigma_mm.y(), run.sigma_mm.z(),
+                       run.source_to_axis_mm);
+  return csv;
+}
+
+std::string drift_text(const CArmModel& model) {
+  const auto drift = calibration::c_arm_drift(model);
+  if (!drift) return "";
+  std::string text = "  drift, mm a year:";
+  for (int axis = 0; axis < 3; ++axis)
+    text += fmt::format("{} {} {:+.2f} ±{:.2f}", axis == 0 ? "" : ",", intrinsic_names[std::size_t(axis)],
+                        drift->mm_a_year[axis], drift->sigma[axis]);
+  return text + "\n";
+}
+
+Json drift_json(const CArmModel& model) {
+  const auto drift = calibration::c_arm_drift(model);
+  if (!drift) return {};
+  const auto row = [](const Eigen::Vector3d& v) { return Json{v.x(), v.y(), v.z()}; };
+  return {{"mm_a_year", row(drift->mm_a_year)}, {"sigma", row(drift->sigma)}};
+}
+
+bool has_left_out(const std::optional<CArmMaps>& maps) { return maps && maps->entries.size() > 1; }
+
 std::string map_html(const CArmModel& model) {
   const auto maps = calibration::c_arm_maps(model.entries);
-  return maps && !maps->checks.empty() ? html_of(c_arm_map_table(*maps)) : "";
+  return has_left_out(maps) ? html_of(c_arm_map_table(*maps)) : "";
 }
 
 }  // namespace
@@ -256,12 +335,12 @@ std::string c_arm_text(const CArmModel& model) {
   line("principal point", found.principal);
   if (!found.at_positions)
     return text + "  no acquisition states its angles: sag is not told from repeatability\n" +
-           map_text(model);
+           drift_text(model) + run_text(model) + map_text(model);
   text += "  predicted at the recorded positions, mm:";
   for (int axis = 0; axis < 3; ++axis)
     text += fmt::format("{} {} {:.1f} to {:.1f}", axis == 0 ? "" : ",", intrinsic_names[std::size_t(axis)],
                         found.at_positions->first[axis], found.at_positions->second[axis]);
-  return text + "\n" + map_text(model);
+  return text + "\n" + drift_text(model) + run_text(model) + map_text(model);
 }
 
 Json to_json(const CArmModel& model) {
@@ -283,7 +362,9 @@ Json to_json(const CArmModel& model) {
           {"principal_mm", variation(found.principal)},
           {"at_positions_mm", at_positions},
           {"acquisitions", json_of(calibration::leave_one_out(model))},
-          {"distortion", map_json(model)}};
+          {"distortion", map_json(model)},
+          {"drift", drift_json(model)},
+          {"runs", run_json(model)}};
 }
 
 Json to_json(const calibration::CArmCheck& check) {
@@ -296,7 +377,8 @@ Json to_json(const calibration::CArmCheck& check) {
   return {{"chi2", check.chi2},
           {"limit", check.limit},
           {"acquisitions", json_of(check.acquisitions)},
-          {"distortion", std::move(maps)}};
+          {"distortion", std::move(maps)},
+          {"warnings", pipeline::json_list_of(pipeline::limits_of(check))}};
 }
 
 std::string c_arm_report_html(const CArmModel& model, std::span<const AcquisitionCheck> left_out) {
@@ -304,7 +386,8 @@ std::string c_arm_report_html(const CArmModel& model, std::span<const Acquisitio
   return page_html(
       "helicarm C-arm", "C-arm",
       summary(model, left_out) + (charts.empty() ? std::string() : chart_svg(charts)) +
-          html_of(c_arm_table(left_out)) + map_html(model),
+          html_of(c_arm_table(left_out)) + (model.runs.empty() ? "" : html_of(run_table(model))) +
+          map_html(model),
       ". Millimetres on the detector; focal is the source distance, u0 and v0 the principal point "
       "from the image's centre.");
 }
@@ -321,7 +404,8 @@ std::string c_arm_report_pdf(const CArmModel& model, std::span<const Acquisition
                             inside_95(left_out), left_out.size()));
   for (const Chart& chart : charts_of(model)) pdf.chart(chart);
   pdf.table(c_arm_table(left_out));
-  if (const auto maps = calibration::c_arm_maps(model.entries); maps && !maps->checks.empty())
+  if (!model.runs.empty()) pdf.table(run_table(model));
+  if (const auto maps = calibration::c_arm_maps(model.entries); has_left_out(maps))
     pdf.table(c_arm_map_table(*maps));
   pdf.blanks({"C-arm, serial number", "Measured by", "Checked by", "Date", "Signature"});
   return pdf.bytes();
@@ -330,7 +414,8 @@ std::string c_arm_report_pdf(const CArmModel& model, std::span<const Acquisition
 Expected<void> write_c_arm_report(const CArmModel& model, const std::filesystem::path& folder) {
   const std::vector<AcquisitionCheck> left_out = calibration::leave_one_out(model);
   const std::vector<Chart> charts = charts_of(model);
-  forget_files(folder, {"report.html", "report.pdf", "c_arm.csv", "c_arm_maps.csv", "c_arm.svg"});
+  forget_files(folder,
+               {"report.html", "report.pdf", "c_arm.csv", "c_arm_maps.csv", "c_arm_runs.csv", "c_arm.svg"});
   const auto maps = calibration::c_arm_maps(model.entries);
   return write_file(folder / "c_arm.csv", c_arm_csv(left_out))
       .and_then([&] {
@@ -338,6 +423,9 @@ Expected<void> write_c_arm_report(const CArmModel& model, const std::filesystem:
       })
       .and_then(
           [&] { return maps ? write_file(folder / "c_arm_maps.csv", map_csv(*maps)) : Expected<void>(); })
+      .and_then([&] {
+        return model.runs.empty() ? Expected<void>() : write_file(folder / "c_arm_runs.csv", run_csv(model));
+      })
       .and_then([&] { return write_file(folder / "report.pdf", c_arm_report_pdf(model, left_out)); })
       .and_then([&] { return write_file(folder / "report.html", c_arm_report_html(model, left_out)); });
 }

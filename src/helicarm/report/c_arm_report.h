@@ -22,14 +22,15 @@ std::string c_arm_csv(std::span<const calibration::AcquisitionCheck> acquisition
 /// others, and off one map for all.
 Table c_arm_map_table(const calibration::CArmMaps& maps);
 
-/// Lines of text: both variations with their intervals, and the range predicted at the positions.
+/// Lines of text: both variations with their intervals, the range predicted at the positions, drift,
+/// isocentres.
 std::string c_arm_text(const calibration::CArmModel& model);
 
 /// Both variations with their intervals, the range predicted at the positions, and each acquisition beside
 /// the prediction by all others.
 Json to_json(const calibration::CArmModel& model);
 
-/// Chi-square of all acquisitions with its limit, and each acquisition.
+/// Chi-square of all acquisitions with its limit, each acquisition, and what the check cannot see.
 Json to_json(const calibration::CArmCheck& check);
 
 /// A page with the C-arm's variation, its curves over the primary angle, and each acquisition beside the
@@ -41,8 +42,8 @@ std::string c_arm_report_html(const calibration::CArmModel& model,
 std::string c_arm_report_pdf(const calibration::CArmModel& model,
                              std::span<const calibration::AcquisitionCheck> left_out);
 
-/// Writes report.html, report.pdf, c_arm.csv, c_arm.svg and, of distortion maps, c_arm_maps.csv of a history
-/// into `folder`, without files of an earlier report.
+/// Writes report.html, report.pdf, c_arm.csv, c_arm.svg and, of distortion maps and runs, c_arm_maps.csv and
+/// c_arm_runs.csv of a history into `folder`, without files of an earlier report.
 Expected<void> write_c_arm_report(const calibration::CArmModel& model, const std::filesystem::path& folder);
 
 }  // namespace helicarm::report

@@ -63,6 +63,22 @@ TEST(CArmReport, OfOneAcquisitionTheVariationsAreNotDetermined) {
   EXPECT_THAT(c_arm_text(one), HasSubstr("not determined by these data"));
 }
 
+TEST(CArmReport, RunsHaveTheirIsocentreAndDaysTheirDrift) {
+  calibration::CArmModel recorded = model();
+  recorded.entries.back().date = "2026-07-02";
+  recorded.runs.push_back({"digest", "2026-07-02", 133, 200, 1.25, {0.1, 0.1, 0.1}, 620});
+  const std::string text = c_arm_text(recorded);
+  EXPECT_THAT(text, HasSubstr("farthest central ray 1.25 to 1.25 mm off it, in 1 run\n"));
+  EXPECT_THAT(text, HasSubstr("drift, mm a year: focal "));
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_c_arm_report(recorded, folder.path()));
+  EXPECT_THAT(*read_file(folder.path() / "report.html", 1 << 24), HasSubstr("source to axis mm"));
+  EXPECT_THAT(*read_file(folder.path() / "c_arm_runs.csv", 1 << 24),
+              HasSubstr("\n2026-07-02,133,200.0000,1.2500,0.1000,0.1000,0.1000,620.0000\n"));
+  EXPECT_EQ(to_json(recorded)["runs"].size(), 1U);
+  EXPECT_TRUE(to_json(model())["drift"].is_null());
+}
+
 TEST(CArmReport, WithoutAnglesThereIsNoCurve) {
   calibration::CArmModel without = model();
   for (calibration::HistoryEntry& entry : without.entries) entry.primary_deg.reset();

@@ -67,9 +67,7 @@ void estimate_from(FrameEstimate& estimate, const Frame& frame, xray::XrayImage 
   if (map.rectified_plane == rectification::RectifiedPlane::detector || map.is_identity())
     estimate.pixel_mm = map.rectified_pixel_mm;
   if (!map.is_identity()) estimate.map = map;
-  calibration::HistoryEntry entry;
-  calibration::keep_map(entry, rectified.front().rectification);
-  if (entry.map) estimate.own_map = std::move(entry);
+  estimate.plate = calibration::plate_map_of(rectified.front().rectification);
   const pipeline::LabelledView labelled =
       expected ? labelled_near(std::move(rectified.front()), *expected, one, options)
                : passed(pipeline::label_views(std::move(rectified), one, options)).front();

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "helicarm/calibration/c_arm_history.h"
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/pipeline/result.h"
 #include "helicarm/rectification/distortion_map.h"
@@ -22,7 +23,7 @@ struct FrameEstimate {
   std::optional<double> source_detector_mm;                      ///< likewise
   std::string image;                                             ///< digest of the pixels
   std::optional<rectification::DistortionMap> map;               ///< unless it is the identity
-  std::optional<calibration::HistoryEntry> own_map;              ///< map and field of its own plate
+  std::optional<calibration::PlateMap> plate;                    ///< by its own plate
   calibration::ViewFiducials fiducials;  ///< labelled by the evidence of this image; outliers are `rejected`
   std::optional<calibration::CalibratedView> alone;
   double variance_scale = 1;  ///< of the residuals over the noise model, where inconsistent

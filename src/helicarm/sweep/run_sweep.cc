@@ -240,8 +240,8 @@ std::vector<calibration::HistoryEntry> acquisitions_of(const std::vector<FrameEs
     auto entry = calibration::history_entry_of(at.fiducials, at.image, common);
     if (!entry) continue;
     entry->primary_deg = at.primary_angle_deg;
-    if (at.own_map) entry->map = at.own_map->map, entry->field_radius_px = at.own_map->field_radius_px;
     entry->secondary_deg = at.secondary_angle_deg;
+    entry->plate = at.plate;
     entries.push_back(*std::move(entry));
   }
   return entries;
