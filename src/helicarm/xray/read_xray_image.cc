@@ -16,12 +16,13 @@
 #include "helicarm/xray/image_file.h"
 #include "helicarm/xray/image_in_memory.h"
 #include "helicarm/xray/jpeg.h"
+#include "helicarm/xray/nrrd_sequence.h"
 #include "helicarm/xray/read_dicom.h"
 
 namespace helicarm::xray {
 namespace fs = std::filesystem;
 
-enum class FileKind { dicom, png, tiff, jpeg, bmp, film };
+enum class FileKind { dicom, png, tiff, jpeg, bmp, film, nrrd };
 
 namespace {
 
@@ -66,6 +67,7 @@ FileKind file_kind(std::string_view bytes, const std::string& origin) {
   if (image::is_tiff(bytes)) return FileKind::tiff;
   if (is_jpeg_file(bytes)) return FileKind::jpeg;
   if (image::is_bmp(bytes)) return FileKind::bmp;
+  if (is_nrrd_sequence(bytes)) return FileKind::nrrd;
   if (looks_like_dicom(bytes)) return FileKind::dicom;
   const auto foreign = foreign_file(bytes);
   throw BadInput(Reason::not_an_image,
@@ -77,6 +79,7 @@ FileKind file_kind(std::string_view bytes, const std::string& origin) {
 int frames_of(std::string_view bytes, FileKind kind, const std::string& origin) {
   if (kind == FileKind::dicom) return value_or_throw(check_dicom(bytes, origin)).frames;
   if (kind == FileKind::tiff) return value_or_throw(image::count_tiff_pages(bytes, origin));
+  if (kind == FileKind::nrrd) return images_of_sequence(bytes, origin);
   return 1;
 }
 
@@ -86,6 +89,8 @@ image::GreyImage grey_image_of(std::string_view bytes, FileKind kind, int page, 
       return value_or_throw(image::decode_png(bytes, origin));
     case FileKind::tiff:
       return value_or_throw(image::decode_tiff(bytes, page, origin));
+    case FileKind::nrrd:
+      return image_of_sequence(bytes, page, origin);
     case FileKind::jpeg:
       return value_or_throw(decode_jpeg_file(bytes, origin));
     default:
@@ -140,9 +145,10 @@ XrayImage read_by_content(const fs::path& path, std::string_view bytes, FileKind
 XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
   if (const auto film = Film::at(path))
     return read_by_content(path, {}, FileKind::film, nullptr, film.get(), frame);
-  const std::string bytes = value_or_throw(read_file(path, max_image_file_bytes));
+  std::string bytes = value_or_throw(read_file(path, max_image_file_bytes));
   const std::string origin = path.filename().string();
   const FileKind kind = file_kind(bytes, origin);
+  if (kind == FileKind::nrrd) bytes = unpacked_sequence(std::move(bytes), origin);
   if (kind != FileKind::dicom) return read_by_content(path, bytes, kind, nullptr, nullptr, frame);
   const DicomOutline outline = value_or_throw(check_dicom(bytes, origin));
   return read_by_content(path, bytes, kind, &outline, nullptr, frame);
@@ -187,6 +193,8 @@ Expected<std::shared_ptr<const ImageFile>> ImageFile::open(const fs::path& path)
         Content{path, value_or_throw(read_file(path, max_image_file_bytes * run_factor))});
     const std::string origin = path.filename().string();
     content->kind = file_kind(content->bytes, origin);
+    if (content->kind == FileKind::nrrd)
+      content->bytes = unpacked_sequence(std::move(content->bytes), origin);
     if (content->kind == FileKind::dicom) {
       content->outline = value_or_throw(check_dicom(content->bytes, origin));
       content->frames = content->outline->frames;
