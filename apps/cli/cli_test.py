@@ -26,9 +26,10 @@ class CommandLine(SimulatedCase):
 
     def test_history_contains_each_image_once(self):
         machine = self.root / "machine.json"
-        for _ in range(2):
+        for begins in (True, False):
             done = run("run", self.root / "case", "--out", self.root / "known", "--no-report", "--machine", machine)
             self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual("did not exist" in done.stderr, begins)
         self.assertEqual([shot["view"] for shot in json.loads(machine.read_text())["shots"]], ["AP", "LAT"])
         machine.write_text("{}")
         self.assertEqual(run("run", self.root / "case", "--machine", machine).returncode, 2)
@@ -70,6 +71,7 @@ class CommandLine(SimulatedCase):
         done = run("c-arm", "check", record, self.root / "case", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertLess(json.loads(done.stdout)["chi2"], json.loads(done.stdout)["limit"])
+        self.assertEqual([each["code"] for each in json.loads(done.stdout)["warnings"]], ["plate_mismatch"])  # two maps do not tell
         self.assertEqual(run("c-arm", "report", record, "--out", self.root / "arm").returncode, 0)
         self.assertEqual(len((self.root / "arm/c_arm.csv").read_text().splitlines()), 3)
         moved = json.loads(record.read_text())

@@ -224,7 +224,8 @@ def test_plate_of_the_other_kind_is_refused_where_the_calibrator_shows_it(case):
 
 def test_history_is_made_and_added_to_once(case, tmp_path):
     history = tmp_path / "arm.json"
-    helicarm.run_case(case[0], history=history)
+    with pytest.warns(UserWarning, match="did not exist"):
+        helicarm.run_case(case[0], history=history)
     entries = json.loads(history.read_text())["shots"]
     assert len(entries) == 2
     helicarm.run_case(case[0], history=history)
@@ -258,6 +259,9 @@ def test_images_without_plate_take_their_distortion_from_the_record(case, result
     record, bare = tmp_path / "arm.json", tmp_path / "bare"
     assert helicarm.add_to_c_arm(record, case[0]) == 2
     assert helicarm.c_arm_report(record)["distortion"]["maps"] == 2
+    copy = tmp_path / "copy.json"
+    copy.write_text(record.read_text().replace('"picture": "', '"picture": "other '))
+    assert [each["code"] for each in helicarm.check_c_arm(copy, case[0])["warnings"]] == ["plate_mismatch"]  # two maps do not tell
     shutil.copytree(case[0], bare)
     given = json.loads((bare / "case.json").read_text())
     given["plate"] = None
