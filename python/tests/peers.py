@@ -18,6 +18,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import zlib
 
 import numpy as np
 
@@ -169,8 +170,32 @@ def pydicom_writes_series(folder, count=COUNT):
     return count, far, off
 
 
+def compressed_bits(pydicom, dataset, frames, coding):
+    """Replaces the frames of Bits Allocated 1 by compressed ones: RLE, Deflated Image Frame Compression, JPEG 2000."""
+    packed = [np.packbits(frame.ravel(), bitorder="little") for frame in frames]
+    dataset.is_little_endian, dataset.is_implicit_VR = True, False
+    if coding == 0:
+        syntax, coded = pydicom.uid.RLELossless, [pydicom.pixel_data_handlers.rle_handler.rle_encode_frame(p[None]) for p in packed]
+    elif coding == 1 or not importlib.util.find_spec("PIL"):
+        syntax = pydicom.uid.UID("1.2.840.10008.1.2.8.1")
+        pydicom._uid_dict.UID_dictionary.setdefault(syntax, ("Deflated Image Frame Compression", "Transfer Syntax", "", "", ""))
+        coded = [zlib.compress(p.tobytes(), wbits=-15) for p in packed]
+    else:
+        syntax, coded = pydicom.uid.JPEG2000Lossless, [jpeg_2000(frame.astype(np.uint8)) for frame in frames]
+    dataset.file_meta.TransferSyntaxUID = syntax
+    dataset.PixelData = pydicom.encaps.encapsulate([bytes(one) for one in coded])
+    dataset["PixelData"].is_undefined_length = True
+
+
+def jpeg_2000(frame):
+    stream = io.BytesIO()
+    importlib.import_module("PIL.Image").fromarray(frame).save(stream, format="JPEG2000", no_jp2=True)
+    return stream.getvalue()
+
+
 def pydicom_writes_segmentations(folder, count=COUNT):
-    """(files, largest distance in mm, voxels that differ): DICOM segmentations of one to four segments, without empty frames."""
+    """(files, largest distance in mm, voxels that differ): DICOM segmentations of one to four segments, without empty frames. A
+    half of them compressed: packed bits in pydicom's RLE or deflated by zlib, pixels in JPEG 2000 by Pillow."""
     pydicom = importlib.import_module("pydicom")
     random, far, off = np.random.default_rng(7), 0.0, 0
     digits, Dataset, Sequence = pydicom.valuerep.format_number_as_ds, pydicom.Dataset, pydicom.Sequence
@@ -219,6 +244,9 @@ def pydicom_writes_segmentations(folder, count=COUNT):
         dataset.save_as(path, write_like_original=False)
         peer = pydicom.dcmread(path)
         assert np.array_equal(peer.pixel_array.reshape(np.shape(bits)), bits)
+        if n % 6 >= 3:
+            compressed_bits(pydicom, dataset, bits, n % 6 - 3)
+            dataset.save_as(path, write_like_original=False)
         volume = helicarm.read_volume(path)
         flipped = volume.affine[:3, 2] @ place[:3, 2] < 0
         expected = place.copy()
@@ -244,11 +272,6 @@ def pydicom_writes_label_maps(folder, count=70):
         return made
 
     pillow = importlib.util.find_spec("PIL")
-
-    def jpeg_2000(frame):
-        stream = io.BytesIO()
-        importlib.import_module("PIL.Image").fromarray(frame).save(stream, format="JPEG2000", no_jp2=True)
-        return stream.getvalue()
 
     for n in range(count):
         datasets, shape, place, _ = ct_datasets(pydicom, random, 4 * n)  # of a gantry that is not tilted

@@ -130,10 +130,10 @@ void check_bits(const DicomElements& elements, Kind kind) {
 }
 
 /// Values that changed in compression would be other labels, or another outline.
-void check_compression(const DicomElements& elements, Kind kind) {
+void check_compression(const DicomElements& elements) {
   if (elements.fragments.empty()) return;
   const xray::TransferSyntax* syntax = xray::transfer_syntax(elements.transfer_syntax);
-  if (kind == Kind::binary || syntax == nullptr)
+  if (syntax == nullptr)
     elements.refuse(Reason::unsupported, xray::tags::pixel_data,
                     "is compressed: decompress the file, for example with dcmconv or gdcmconv --raw");
   if (syntax->coding == xray::Coding::jpeg ||
@@ -147,7 +147,7 @@ void check_compression(const DicomElements& elements, Kind kind) {
 Kind checked_kind(const DicomElements& elements) {
   const Kind kind = kind_of(elements);
   check_bits(elements, kind);
-  check_compression(elements, kind);
+  check_compression(elements);
   if (!elements.find(xray::tags::pixel_data))
     elements.refuse(Reason::bad_value, xray::tags::pixel_data, "is missing");
   return kind;
@@ -271,16 +271,18 @@ class Frames {
     const std::string unpacked = compressed_.empty() ? std::string() : decoded(frame);
     const std::size_t first = compressed_.empty() ? frame * area_ : 0;
     const std::string_view values = compressed_.empty() ? values_ : std::string_view(unpacked);
+    const std::size_t bits = compressed_.empty() ? bits_ : std::max<std::size_t>(bits_, 8);
     for (std::size_t i = 0; i < area_; ++i)
-      if (const int segment = segment_of(value_at(values, first + i), of_frame, frame)) take(i, segment);
+      if (const int segment = segment_of(value_at(values, first + i, bits), of_frame, frame))
+        take(i, segment);
   }
 
  private:
-  /// Bits are packed from the least significant one on; words are little-endian.
-  int value_at(std::string_view values, std::size_t at) const {
+  /// Of `bits` each: these are packed from the least significant one on; words are little-endian.
+  static int value_at(std::string_view values, std::size_t at, std::size_t bits) {
     const auto byte = [&](std::size_t i) { return int(static_cast<unsigned char>(values[i])); };
-    if (bits_ == 1) return byte(at / 8) >> (at % 8) & 1;
-    return bits_ == 8 ? byte(at) : byte(2 * at) | byte(2 * at + 1) << 8;
+    if (bits == 1) return byte(at / 8) >> (at % 8) & 1;
+    return bits == 8 ? byte(at) : byte(2 * at) | byte(2 * at + 1) << 8;
   }
 
   /// 0: of none.
@@ -298,9 +300,11 @@ class Frames {
     std::string bytes;
     for (std::size_t i = compressed_[frame].first; i < compressed_[frame].last; ++i)
       bytes += elements_.fragments[i];
-    return value_or_throw(xray::decode_compressed(
-        std::move(bytes), xray::transfer_syntax(elements_.transfer_syntax)->coding, size_, int(bits_ / 8),
-        fmt::format("{}: frame {}", elements_.origin, frame + 1)));
+    const xray::Coding coding = xray::transfer_syntax(elements_.transfer_syntax)->coding;
+    const std::string origin = fmt::format("{}: frame {}", elements_.origin, frame + 1);
+    return value_or_throw(
+        bits_ == 1 ? xray::decode_compressed_bits(std::move(bytes), coding, size_, origin)
+                   : xray::decode_compressed(std::move(bytes), coding, size_, int(bits_ / 8), origin));
   }
 
   const DicomElements& elements_;

@@ -170,16 +170,47 @@ TEST_F(Segments, AChoiceThatFitsNoneOrSeveralListsThem) {
   EXPECT_THAT(refusal({{}, "Bone", {}}), HasSubstr("several segments labelled \"Bone\""));
 }
 
-TEST_F(Segments, SharesInRleAreDecoded) {
-  // A header of 64 bytes, a literal run, and a repetition of 0.
-  const auto rle = [](std::initializer_list<int> literal) {
-    std::string frame = DicomBuilder::number(1, 4) + DicomBuilder::number(64, 4) + std::string(56, '\0');
-    frame += char(literal.size() - 1);
-    for (const int value : literal) frame += char(value);
-    frame += char(1 - (9 - int(literal.size())));
-    frame += '\0';
-    return frame;
+/// In RLE: a header of 64 bytes, a literal run, and a repetition of 0 up to 9 bytes.
+std::string rle(std::initializer_list<int> literal, int bytes = 9) {
+  std::string frame = DicomBuilder::number(1, 4) + DicomBuilder::number(64, 4) + std::string(56, '\0');
+  frame += char(literal.size() - 1);
+  for (const int value : literal) frame += char(value);
+  if (const int zeros = bytes - int(literal.size())) frame += {char(1 - zeros), '\0'};
+  return frame;
+}
+
+/// As one block that is stored as it is (RFC 1951, 3.2.4).
+std::string deflated(std::initializer_list<int> bytes) {
+  std::string frame = "\x01" + DicomBuilder::number(int(bytes.size()), 2) +
+                      DicomBuilder::number(0xFFFF - int(bytes.size()), 2);
+  for (const int value : bytes) frame += char(value);
+  return frame;
+}
+
+TEST_F(Segments, BitsInCompressedFramesAreDecoded) {
+  const auto plain = read_seg(two_segments());
+  ASSERT_TRUE(plain);
+  // Each frame begins with a byte of its own. Bits 0 and 8, 1, 4 and 5.
+  const auto packed = [](const char* syntax, std::vector<std::string> frames) {
+    return two_segments().syntax(syntax).fragments(frames);
   };
+  const char *in_rle = "1.2.840.10008.1.2.5", *in_deflated = "1.2.840.10008.1.2.8.1";
+  for (const auto& seg :
+       {packed(in_rle, {rle({1, 1}, 2), rle({2, 0}, 2), rle({48, 0}, 2)}),
+        packed(in_rle, {rle({1, 0, 0, 0, 0, 0, 0, 0, 255}), rle({0, 1}), rle({0, 0, 0, 0, 1, 1})}),
+        packed(in_deflated, {deflated({1, 1}), deflated({2, 0, 0}), deflated({48, 0})})}) {
+    const auto volume = read_seg(seg);
+    ASSERT_TRUE(volume) << volume.error().message;
+    EXPECT_EQ(volume->voxels, plain->voxels);
+  }
+  expect_refused(packed(in_rle, {rle({1}, 3), rle({2, 0}, 2), rle({48, 0}, 2)}), Reason::truncated,
+                 "frame 1");
+  expect_refused(packed(in_deflated, {deflated({1, 1}), deflated({2}), deflated({48, 0})}), Reason::truncated,
+                 "1 bytes, must be 2");
+  expect_refused(packed("1.2.840.10008.1.2.4.50", {"a", "b", "c"}), Reason::unsupported, "with loss");
+}
+
+TEST_F(Segments, SharesInRleAreDecoded) {
   auto packed = shares();
   packed.syntax("1.2.840.10008.1.2.5").fragments({rle({100, 50, 49}), rle({100}), rle({10})});
   put("seg.dcm", packed.bytes());
@@ -254,8 +285,6 @@ TEST_F(Segments, WhatIsNotReadIsNamed) {
                  "is \"SURFACE\", must be BINARY, FRACTIONAL or LABELMAP");
   expect_refused(two_segments().word(0x00280100, 8), Reason::unsupported,
                  "Bits Allocated (0028,0100) is 8, must be 1");
-  expect_refused(two_segments().syntax("1.2.840.10008.1.2.5").fragments({"ab"}), Reason::unsupported,
-                 "is compressed");
   expect_refused(two_segments().erase(0x7FE00010), Reason::bad_value, "Pixel Data (7FE0,0010) is missing");
   expect_refused(two_segments().erase(0x52009230), Reason::bad_value, "(5200,9230) is missing");
   expect_refused(two_segments().raw(0x52009229, "SQ", ""), Reason::bad_value,

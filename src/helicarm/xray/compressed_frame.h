@@ -15,4 +15,10 @@ namespace helicarm::xray {
 Expected<std::string> decode_compressed(std::string bytes, Coding coding, const Eigen::Vector2i& size,
                                         int word_bytes, const std::string& origin);
 
+/// A byte for each pixel, 0 or not, of one compressed frame of Bits Allocated 1. In RLE and deflated frames
+/// the bits are packed (CP 2301), or of an RLE encoder that expands them a byte each; other codings hold
+/// pixels.
+Expected<std::string> decode_compressed_bits(std::string bytes, Coding coding, const Eigen::Vector2i& size,
+                                             const std::string& origin);
+
 }  // namespace helicarm::xray

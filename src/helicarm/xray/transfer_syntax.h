@@ -9,7 +9,7 @@
 namespace helicarm::xray {
 
 /// How Pixel Data are stored.
-enum class Coding { native, rle, jpeg, jpeg_lossless, jpeg_ls, jpeg_2000 };
+enum class Coding { native, rle, deflated_frames, jpeg, jpeg_lossless, jpeg_ls, jpeg_2000 };
 
 struct TransferSyntax {
   std::string_view uid;
@@ -25,6 +25,7 @@ inline constexpr std::array transfer_syntaxes = {
     TransferSyntax{"1.2.840.10008.1.2.1"},
     TransferSyntax{.uid = "1.2.840.10008.1.2", .explicit_vr = false},
     TransferSyntax{"1.2.840.10008.1.2.5", Coding::rle},
+    TransferSyntax{"1.2.840.10008.1.2.8.1", Coding::deflated_frames},
     TransferSyntax{"1.2.840.10008.1.2.4.70", Coding::jpeg_lossless},
     TransferSyntax{"1.2.840.10008.1.2.4.57", Coding::jpeg_lossless},
     TransferSyntax{"1.2.840.10008.1.2.4.80", Coding::jpeg_ls},
