@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -45,22 +46,64 @@ RigidCovariance inverse_of(const RigidCovariance& matrix) {
 
 namespace {
 
-/// The standard deviations of the model's size by which the own solutions agree best.
-double common_scale(const std::vector<OwnSolution>& own) {
+/// One pose and size for the own solutions, the size in its standard deviations.
+struct PoseAndSize {
   Eigen::Matrix<double, 7, 7> information = Eigen::Matrix<double, 7, 7>::Zero();
   Eigen::Matrix<double, 7, 1> sum = Eigen::Matrix<double, 7, 1>::Zero();
-  information(6, 6) = 1;
-  for (const OwnSolution& each : own) {
-    Eigen::Matrix<double, 6, 7> map;
-    map << RigidCovariance::Identity(), each.by_scale;
-    const Eigen::Matrix<double, 7, 6> weighted = map.transpose() * inverse_of(each.covariance);
-    information += weighted * map;
-    sum += weighted * each.step;
+  double squares = 0;
+
+  explicit PoseAndSize(const std::vector<OwnSolution>& own) {
+    information(6, 6) = 1;
+    for (const OwnSolution& each : own) {
+      Eigen::Matrix<double, 6, 7> map;
+      map << RigidCovariance::Identity(), each.by_scale;
+      const Eigen::Matrix<double, 7, 6> weighted = map.transpose() * inverse_of(each.covariance);
+      information += weighted * map;
+      sum += weighted * each.step;
+      squares += sum_of_squares(each);
+    }
   }
-  return geometry::solve_spd(information, sum).solution(6, 0);
+  Eigen::Matrix<double, 7, 1> solution() const { return geometry::solve_spd(information, sum).solution; }
+
+ private:
+  static double sum_of_squares(const OwnSolution& each) {
+    return each.step.dot(inverse_of(each.covariance) * each.step);
+  }
+};
+
+/// The standard deviations of the model's size by which the own solutions agree best.
+double common_scale(const std::vector<OwnSolution>& own) { return PoseAndSize(own).solution()[6]; }
+
+/// Nothing where it is not positive definite.
+template <class Matrix>
+std::optional<double> log_determinant(const Matrix& matrix) {
+  const Eigen::LLT<Matrix> root(matrix);
+  if (root.info() != Eigen::Success) return std::nullopt;
+  return 2 * root.matrixLLT().diagonal().array().log().sum();
+}
+
+/// Log density of the differences between own solutions of one pose and size (restricted likelihood), up to a
+/// constant.
+std::optional<double> log_density_of_differences(const std::vector<OwnSolution>& own) {
+  const PoseAndSize one(own);
+  double doubled = one.squares - one.sum.dot(one.solution());
+  for (const OwnSolution& each : own) {
+    const auto spread = log_determinant(each.covariance);
+    if (!spread) return std::nullopt;
+    doubled += *spread;
+  }
+  const auto known = log_determinant(one.information);
+  return known ? std::optional(-(doubled + *known) / 2) : std::nullopt;
 }
 
 }  // namespace
+
+OwnSolution OwnSolution::with_edges(double ratio) const {
+  OwnSolution changed = *this;
+  changed.covariance += (ratio - 1) * by_edges;
+  changed.by_edges = ratio * by_edges;
+  return changed;
+}
 
 Disagreement disagreement_of(const std::vector<RegistrationView>& views, const Vector3d& centre,
                              const std::vector<OwnSolution>& found) {
@@ -123,7 +166,8 @@ Problem pose_and_strain(const Observation& observation, const ErrorModel& errors
 
 }  // namespace
 
-double edge_variance_ratio(const Observation& observation, const ErrorModel& errors, const Vector3d& centre) {
+double edge_variance_ratio(const Observation& observation, const ErrorModel& errors, const Vector3d& centre,
+                           const std::vector<OwnSolution>& own) {
   const Problem problem = pose_and_strain(observation, errors, centre);
   const Linearised both = linearised(observation, problem, errors.correlation_px);
   const auto of_strain = [](const MatrixXd& covariance) -> Eigen::Matrix<double, 6, 6> {
@@ -144,8 +188,12 @@ double edge_variance_ratio(const Observation& observation, const ErrorModel& err
     const Eigen::LLT<Eigen::Matrix<double, 6, 6>> root(other + ratio * edges);
     if (root.info() != Eigen::Success) return 1;
     const Eigen::Matrix<double, 6, 1> white = root.matrixL().solve(strain);
+    std::vector<OwnSolution> by_ratio;
+    for (const OwnSolution& each : own) by_ratio.push_back(each.with_edges(ratio));
+    const auto differences = log_density_of_differences(by_ratio);
+    if (!differences) return 1;
     ratios.push_back(ratio);
-    logs.push_back(-root.matrixLLT().diagonal().array().log().sum() - white.squaredNorm() / 2);
+    logs.push_back(*differences - root.matrixLLT().diagonal().array().log().sum() - white.squaredNorm() / 2);
   }
   double sum = 0, weights = 0;
   for (std::size_t i = 0; i < logs.size(); ++i) {

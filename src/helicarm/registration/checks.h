@@ -13,6 +13,11 @@ struct OwnSolution {
   RigidStep step;
   RigidCovariance covariance;
   RigidStep by_scale = RigidStep::Zero();  ///< per standard deviation of the model's size
+  /// What the stated bias of the model's edges (`EdgeSigma`) has in the covariance.
+  RigidCovariance by_edges = RigidCovariance::Zero();
+
+  /// As if that bias had `ratio` of its stated variance.
+  OwnSolution with_edges(double ratio) const;
 };
 
 /// Differences between each view's own solution and the others' weighted mean; in mm along the direction
@@ -28,10 +33,11 @@ Deformation deformation_of(const Observation& observation, const ErrorModel& err
                            const Eigen::Vector3d& centre);
 
 /// Variance of the bias common to a view's edges, in units of the stated one (`EdgeSigma`): its mean given
-/// the strains that the images require, which such a bias causes as it causes errors of the pose. Beforehand
-/// each size from 0.01 to 4 times the stated one is as likely as another. Needs two or more views.
+/// the strains that the images require and how far the views' own solutions are apart, both of which such a
+/// bias causes as it causes errors of the pose. Beforehand each size from 0.01 to 4 times the stated one is
+/// as likely as another. Needs two or more views.
 double edge_variance_ratio(const Observation& observation, const ErrorModel& errors,
-                           const Eigen::Vector3d& centre);
+                           const Eigen::Vector3d& centre, const std::vector<OwnSolution>& own);
 
 /// Sets decision, failure, warnings and notes from the figures.
 void decide(const Model& model, const std::vector<geometry::RigidTransform>& starts,

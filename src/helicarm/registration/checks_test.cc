@@ -61,10 +61,22 @@ Observation edges_of_body(const std::vector<RegistrationView>& views, double gro
   return observation;
 }
 
-double ratio_of(double growth_mm, double scale_sigma = 0) {
+/// Two views' own solutions that are this far apart along z, which both see to 0.01 mm; 0.3 mm across.
+std::vector<OwnSolution> solutions_apart(double apart_mm) {
+  OwnSolution one{RigidStep::Zero(), RigidCovariance::Zero()};
+  one.covariance.diagonal() << 1e-6, 1e-6, 1e-6, 0.09, 0.09, 1e-4;
+  one.by_edges(5, 5) = stated.shift_mm * stated.shift_mm;
+  one.covariance += one.by_edges;
+  OwnSolution other = one;
+  one.step[5] = apart_mm / 2, other.step[5] = -apart_mm / 2;
+  return {one, other};
+}
+
+double ratio_of(double growth_mm, double scale_sigma = 0, double apart_mm = 0) {
   const auto views = two_views();
   const ErrorModel errors{views, radius_mm, Eigen::MatrixXd::Zero(22, 22), {5, 5}, stated, scale_sigma};
-  return edge_variance_ratio(edges_of_body(views, growth_mm), errors, Vector3d::Zero());
+  return edge_variance_ratio(edges_of_body(views, growth_mm), errors, Vector3d::Zero(),
+                             solutions_apart(apart_mm));
 }
 
 TEST(EdgeVariance, IsSmallWhereTheImagesRequireNoStrain) { EXPECT_LT(ratio_of(0), 0.3); }
@@ -73,6 +85,24 @@ TEST(EdgeVariance, IsThatOfTheStrainWhichTheImagesRequire) {
   EXPECT_GT(ratio_of(0.04), ratio_of(0));
   EXPECT_GT(ratio_of(0.15), 1);
   EXPECT_LE(ratio_of(4), 16);
+}
+
+TEST(EdgeVariance, IsThatOfTheDistanceBetweenTheViewsOwnSolutions) {
+  EXPECT_LT(ratio_of(0), 0.1);
+  EXPECT_GT(ratio_of(0, 0, 0.1), 2 * ratio_of(0));
+  EXPECT_GT(ratio_of(0, 0, 0.4), 1);
+  EXPECT_LE(ratio_of(0, 0, 4), 16);
+}
+
+TEST(EdgeVariance, ASizeInCommonIsNoDifferenceBetweenTheViews) {
+  const auto views = two_views();
+  const ErrorModel errors{views, radius_mm, Eigen::MatrixXd::Zero(22, 22), {5, 5}, stated};
+  const Observation observation = edges_of_body(views, 0);
+  auto own = solutions_apart(0.4);
+  const double apart = edge_variance_ratio(observation, errors, Vector3d::Zero(), own);
+  // One standard deviation of the size moves the solutions apart by as much.
+  own[0].by_scale[5] = 0.2, own[1].by_scale[5] = -0.2;
+  EXPECT_LT(edge_variance_ratio(observation, errors, Vector3d::Zero(), own), 0.7 * apart);
 }
 
 TEST(EdgeVariance, AStrainThatTheSizeExplainsIsNoneOfTheEdges) {

@@ -104,13 +104,12 @@ RigidCovariance prior_information(const Observation& observation, const ErrorMod
   return unit * information;
 }
 
-/// Each view alone, from the joint solution, and how they differ. By this the covariance is inflated, if the
-/// edges' bias has `edge_ratio` of its stated variance; the decisions take the stated one.
-double compare_views(const RegistrationProblem& scene, const ErrorModel& errors, const Level& level,
-                     const Estimate& joint, double edge_ratio, Registration& result) {
+/// Each view alone, from the joint solution; none of a single view.
+std::vector<OwnSolution> own_solutions(const RegistrationProblem& scene, const ErrorModel& errors,
+                                       const Level& level, const Estimate& joint, const Vector3d& centre) {
   const std::size_t n = scene.views().size();
-  if (n < 2) return 1;
-  std::vector<OwnSolution> own, by_edge_ratio;
+  std::vector<OwnSolution> own;
+  if (n < 2) return own;
   for (std::size_t i = 0; i < n; ++i) {
     const RigidCovariance prior = prior_information(joint.observation, errors, alone_prior_mm);
     Problem problem{.views = std::vector<bool>(n, false), .prior = prior};
@@ -124,16 +123,25 @@ double compare_views(const RegistrationProblem& scene, const ErrorModel& errors,
     prior_covariance.bottomRightCorner<3, 3>().diagonal().setConstant(alone_prior_mm * alone_prior_mm);
     const Linearised sum = linearised(alone.observation, problem, errors.correlation_px);
     const RigidCovariance shrink = geometry::solve_spd(sum.information, prior).solution;
-    own.push_back({step_about(joint.pose, alone.pose, result.centre),
-                   errors.covariance(alone.observation, result.centre, problem, sum) +
+    own.push_back({step_about(joint.pose, alone.pose, centre),
+                   errors.covariance(alone.observation, centre, problem, sum) +
                        shrink * prior_covariance * shrink.transpose(),
-                   errors.scale_sigma * errors.by_size(alone.observation, problem)});
-    by_edge_ratio.push_back(own.back());
-    by_edge_ratio.back().covariance +=
-        (edge_ratio - 1) * errors.of_edges(alone.observation, result.centre, problem);
+                   errors.scale_sigma * errors.by_size(alone.observation, problem),
+                   errors.of_edges(alone.observation, centre, problem)});
   }
+  return own;
+}
+
+/// How the views' own solutions differ. By this the covariance is inflated, if the edges' bias has
+/// `edge_ratio` of its stated variance; the decisions take the stated one.
+double compare_views(const RegistrationProblem& scene, const std::vector<OwnSolution>& own, double edge_ratio,
+                     Registration& result) {
+  if (own.empty()) return 1;
   result.disagreement = disagreement_of(scene.views(), result.centre, own);
-  for (std::size_t i = 0; i < n; ++i) result.views[i].held_out_mm = result.disagreement->held_out_mm[i];
+  for (std::size_t i = 0; i < own.size(); ++i)
+    result.views[i].held_out_mm = result.disagreement->held_out_mm[i];
+  std::vector<OwnSolution> by_edge_ratio;
+  for (const OwnSolution& each : own) by_edge_ratio.push_back(each.with_edges(edge_ratio));
   return disagreement_of(scene.views(), result.centre, by_edge_ratio).ratio();
 }
 
@@ -268,16 +276,17 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
                           correlations_px(views, model, result.centre),
                           edge_sigma_of(model, result.spacing_mm, views.size()),
                           options.scale_sigma};
+  const std::vector<OwnSolution> own = own_solutions(scene, errors, stages.back().level, best, result.centre);
   // The edges of a surface are not those of a CT; a single view shows no strain along its rays.
   const double edge_ratio =
-      model.surface || views.size() < 2 ? 1 : edge_variance_ratio(best.observation, errors, result.centre);
+      model.surface || own.empty() ? 1 : edge_variance_ratio(best.observation, errors, result.centre, own);
   result.covariance = errors.covariance(best.observation, result.centre) +
                       (edge_ratio - 1) * errors.of_edges(best.observation, result.centre);
   if (model.voxel_mm > 0)
     result.covariance +=
         (voxel_residual_inflation - 1) * linearised(best.observation, {}, errors.correlation_px).covariance();
   result.deformation = deformation_of(best.observation, errors, result.centre);
-  result.covariance *= compare_views(scene, errors, stages.back().level, best, edge_ratio, result);
+  result.covariance *= compare_views(scene, own, edge_ratio, result);
   const RigidStep by_size = errors.by_size(best.observation);
   result.scale_sigma = options.scale_sigma;
   result.by_scale = options.scale_sigma * by_size;
