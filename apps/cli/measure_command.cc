@@ -10,6 +10,7 @@
 
 #include "command_line.h"
 #include "helicarm/calibration/saved_calibration.h"
+#include "helicarm/case_registration/bone_measures.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/localization/pick_checks.h"
@@ -27,12 +28,21 @@ struct Point {
   Eigen::Matrix3d covariance_mm2;
   std::map<std::string, measures::Click> seen = {};  ///< by view
   Json warnings = Json::array();
+  /// Whose plan holds it, where it is at the registration's first acquisition.
+  std::optional<case_registration::PosedModel> model = {};
 };
 
 /// A calibration and the points located with it.
 struct Measured {
   calibration::SavedCalibration calibration;
   std::map<std::string, Point> points = {};
+
+  /// The view in which the point is where the result or the registration has it.
+  geometry::View view_of(const Point& point, std::size_t view) const {
+    if (!point.model) return calibration.views[view].view;
+    return value_or_throw(
+        case_registration::view_of_model(*point.model, case_registration::views_of(calibration)[view]));
+  }
 };
 
 /// The images in which a point was picked or found.
@@ -58,13 +68,15 @@ bool rays_miss(JsonReader& point) {
 }
 
 /// Adds the points that have a position and a covariance.
-void add_points(std::vector<JsonReader> entries, Measured& measured) {
+void add_points(std::vector<JsonReader> entries, Measured& measured,
+                const std::optional<case_registration::PosedModel>& model = {}) {
   constexpr Range numbers{-1e9, 1e9};
   for (JsonReader& entry : entries) {
     if (!entry.has("xyz_mm") || !entry.has("covariance_mm2")) continue;
     const std::string name = entry.text("name");
     Point point{Eigen::Vector3d(entry.numbers("xyz_mm", 3, numbers).data()),
                 Eigen::Map<const Eigen::Matrix3d>(entry.matrix("covariance_mm2", 3, 3, numbers).data())};
+    point.model = model;
     if (entry.has("seen") && !rays_miss(entry))
       point.seen = seen_in(entry.object("seen"), name, measured.calibration.views);
     for (JsonReader& warning : entry.objects("warnings", false)) {
@@ -84,9 +96,13 @@ Measured measured_from(const MeasureArguments& arguments) {
   add_points(JsonReader(json, origin).objects("points", false), measured);
   if (!arguments.registration) return measured;
   const Json registration = value_or_throw(read_json(*arguments.registration));
-  JsonReader models(registration, arguments.registration->filename().string());
-  for (JsonReader& model : models.objects("models", true))
-    add_points(model.objects("points", false), measured);
+  const std::string registered = arguments.registration->filename().string();
+  const auto posed = value_or_throw(case_registration::posed_models_from(registration, registered));
+  JsonReader models(registration, registered);
+  for (JsonReader& model : models.objects("models", true)) {
+    const auto found = std::ranges::find(posed, model.text("name"), &case_registration::PosedModel::name);
+    if (found != posed.end()) add_points(model.objects("points", false), measured, *found);
+  }
   return measured;
 }
 
@@ -123,7 +139,9 @@ std::optional<measures::ObjectPlane> plane_of(const MeasureArguments& arguments,
   }
   if (arguments.at) {
     const Point& point = point_named(measured, *arguments.at, "--at");
-    return value_or_throw(measures::plane_through(view, point.xyz_mm, point.covariance_mm2));
+    calibration::CalibratedView then = view;
+    then.view = measured.view_of(point, view_named(measured, view.name, "--at"));
+    return value_or_throw(measures::plane_through(then, point.xyz_mm, point.covariance_mm2));
   }
   phantom::Calibrator calibrator;
   calibrator.balls = measured.calibration.balls;
@@ -154,8 +172,9 @@ measures::Click click_from(const CsvTable& table, std::size_t row, const std::op
                      fmt::format("{}: no pixels: a located point needs --calibration", where));
     const Point& point = point_named(*measured, name, where);
     if (const auto seen = point.seen.find(view_name); seen != point.seen.end()) return seen->second;
-    const auto& view = measured->calibration.views[view_named(*measured, view_name, where)].view;
-    return value_or_throw(measures::click_of(name, point.xyz_mm, point.covariance_mm2, view));
+    return value_or_throw(
+        measures::click_of(name, point.xyz_mm, point.covariance_mm2,
+                           measured->view_of(point, view_named(*measured, view_name, where))));
   }
   const Eigen::Vector2d uv{*u, *v};
   double sigma_px = sigma.value_or(fiducials::click_sigma_px);

@@ -138,19 +138,43 @@ TEST(MeasureCommand, PlaneBehindTheReceiverIsRefused) {
   EXPECT_THAT(behind.result.error().message, HasSubstr("1200 mm from the source"));
 }
 
-TEST(MeasureCommand, PlannedPointOfARegistrationIsGivenInPerCent) {
+/// The positions of a planned point at FS, of a femur that is shifted by this along x at the acquisition of
+/// LAT.
+Json of_planned_point(double shift_mm) {
   const fs::path file = fs::temp_directory_path() / fmt::format("helicarm_registration_{}.json", ::getpid());
+  const auto shifted = [](double by) {
+    return geometry::json_rows(geometry::RigidTransform{Eigen::Matrix3d::Identity(), {by, 0, 0}}.matrix());
+  };
   const Json planned{{"name", "planned"},
-                     {"xyz_mm", {4, 3, 20}},
+                     {"xyz_mm", {4 - shift_mm, 3, 20}},
                      {"covariance_mm2", geometry::json_rows(0.01 * Eigen::Matrix3d::Identity())}};
-  ASSERT_TRUE(write_file(file, Json{{"models", {{{"name", "femur"}, {"points", {planned}}}}}}.dump()));
+  const Json femur{{"name", "femur"},
+                   {"decision", "accept"},
+                   {"world_from_model", shifted(0)},
+                   {"covariance", geometry::json_rows(1e-6 * Eigen::Matrix<double, 6, 6>::Identity())},
+                   {"centre_mm", {0, 0, 0}},
+                   {"points", {planned}},
+                   {"acquisitions",
+                    {{{"view", "AP"}, {"world_from_model", shifted(0)}},
+                     {{"view", "LAT"}, {"world_from_model", shifted(shift_mm)}}}}};
+  EXPECT_TRUE(write_file(file, Json{{"models", {femur}}}.dump()));
   MeasureArguments arguments;
   arguments.registration = file;
   std::string rows = quadrants;
   rows.replace(rows.find("FS,,,"), 2, "planned");
-  const Json by_plan = measured(rows, arguments).measures()[0]["positions"][0];
-  EXPECT_EQ(by_plan["percent"], measured(quadrants).measures()[0]["positions"][0]["percent"]);
+  const Json positions = measured(rows, arguments).measures()[0]["positions"][0];
   fs::remove(file);
+  return positions;
+}
+
+TEST(MeasureCommand, PlannedPointOfARegistrationIsGivenInPerCent) {
+  EXPECT_EQ(of_planned_point(0)["percent"], measured(quadrants).measures()[0]["positions"][0]["percent"]);
+}
+
+TEST(MeasureCommand, APlannedPointIsWhereItsBoneWasInTheImage) {
+  const Json moved = of_planned_point(9)["percent"], here = of_planned_point(0)["percent"];
+  for (const char* part : {"depth", "height"})
+    EXPECT_NEAR(moved[part].get<double>(), here[part].get<double>(), 1e-9);
 }
 
 TEST(MeasureCommand, TableNamesPlaneAndSigma) {

@@ -4,7 +4,6 @@
 #include "command_line.h"
 #include "helicarm/calibration/saved_calibration.h"
 #include "helicarm/case_registration/bone_measures.h"
-#include "helicarm/case_registration/same_views.h"
 
 namespace helicarm::cli {
 namespace {
@@ -12,19 +11,14 @@ namespace {
 case_registration::BoneScene bone_scene_of(const MeasureArguments& arguments) {
   case_registration::BoneScene scene;
   scene.zones = value_or_throw(measures::zones_of(arguments.zones));
-  Json registration = Json::object();
-  std::string registered;
-  if (arguments.registration) {
-    registered = arguments.registration->filename().string();
-    registration = value_or_throw(read_json(*arguments.registration));
-    scene.models = value_or_throw(case_registration::posed_models_from(registration, registered));
-  }
+  if (arguments.registration)
+    scene.models = value_or_throw(case_registration::posed_models_from(
+        value_or_throw(read_json(*arguments.registration)), arguments.registration->filename().string()));
   if (!arguments.calibration) return scene;
   const std::string origin = arguments.calibration->filename().string();
   const Json json = value_or_throw(read_json(*arguments.calibration));
-  for (const auto& view : value_or_throw(calibration::saved_calibration_from_json(json, origin)).views)
-    scene.views.push_back({view.name, view.view});
-  value_or_throw(case_registration::check_same_views(registration, registered, scene.views));
+  scene.views =
+      case_registration::views_of(value_or_throw(calibration::saved_calibration_from_json(json, origin)));
   scene.located = value_or_throw(case_registration::located_points_from(json, origin));
   return scene;
 }

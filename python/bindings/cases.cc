@@ -68,6 +68,7 @@ HeldCalibration calibration_of(const pipeline::Result& result) {
              {},
              {}});
     held.maps.emplace_back(view.rectification->map);
+    held.calibrator_from_bone.push_back(view.calibrator_from_bone);
   }
   return held;
 }

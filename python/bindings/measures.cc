@@ -5,7 +5,6 @@
 #include "checks.h"
 #include "held_calibration.h"
 #include "helicarm/case_registration/bone_measures.h"
-#include "helicarm/case_registration/same_views.h"
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/localization/pick_checks.h"
 #include "helicarm/measures/measure_json.h"
@@ -118,9 +117,9 @@ py::dict measure_landmarks(const std::string& word, const Coordinates& landmarks
   checked(sigma_mm, not_negative, "sigma_mm");
   case_registration::BoneScene scene;
   scene.zones = value_or_raise(measures::zones_of(zones));
-  const Json registered = registration.is_none() ? Json::object() : json_from(registration);
   if (!registration.is_none())
-    scene.models = value_or_raise(case_registration::posed_models_from(registered, "registration"));
+    scene.models =
+        value_or_raise(case_registration::posed_models_from(json_from(registration), "registration"));
   if (!model && scene.models.size() > 1)
     raise({Reason::usage, "model is required: the registration has several models", {}, {}});
   const std::string name = model ? *model : scene.models.empty() ? "" : scene.models.front().name;
@@ -130,10 +129,7 @@ py::dict measure_landmarks(const std::string& word, const Coordinates& landmarks
     scene.located[point] = {row_of<3>(value.first, point),
                             checked_covariance(matrix_of(value.second, 3, 3, point), point)};
   }
-  if (calibration != nullptr)
-    for (const calibration::CalibratedView& view : calibration->views)
-      scene.views.push_back({view.name, view.view});
-  value_or_raise(case_registration::check_same_views(registered, "registration", scene.views));
+  if (calibration != nullptr) scene.views = case_registration::views_of(*calibration);
   return python_from(measures::to_json(value_or_raise(measured_in_bone(set, scene))));
 }
 
@@ -172,8 +168,8 @@ model's plan in registration, or one of points}; names as of measure, and axis_m
 in a true lateral image (not of tibia_ml). Other names are points, given in per cent. sigma_mm: of a coordinate per axis.
 registration: the content of registration.json, such as register returns; model: one of its models, the only one if not
 given. points: {name: (xyz_mm (3,), covariance_mm2 (3, 3))} in the calibrator frame, carried into the model with the
-registration's error. calibration: its views within 30 degrees of a lateral one are compared with it; the registration is of the same views. zones: a zones.json in
-place of the built-in published positions.
+registration's error. calibration: its views within 30 degrees of a lateral one are compared with it; the registration is of the same views,
+or the case of each has the poses of the marker on the bone. zones: a zones.json in place of the built-in published positions.
 Returns {"name", "model", "view": None, "kind", "depth_mm": None, "quantities", "positions": [{"point", "percent",
 "covariance_percent2", "zones": [{"name", "source", "from_centre_percent", "outside"}], "warnings"}], "laterals": [{"view",
 "off_deg", "apart_mm", "is_lateral", "message", "positions"}], "clicked": [], "missing": []}. Raises InputError: usage,

@@ -341,3 +341,25 @@ def test_stubs_name_what_the_module_has():
         for member in vars(thing):
             if not member.startswith("_"):
                 assert re.search(rf"def {member}\(", body), f"{name}.{member}"
+
+
+def test_a_result_tells_where_the_tracked_bones_were(tmp_path):
+    helicarm.simulate_case(tmp_path, seed=3, size=512, kind="tunnels")
+    result = helicarm.run_case(tmp_path)
+    views = json.loads((tmp_path / "case.json").read_text())["views"]
+    for view, found in zip(views, result.to_dict()["views"]):
+        poses = view["poses"]
+        for bone, pose in poses["tracker_from_bone"].items():
+            expected = np.linalg.inv(poses["tracker_from_calibrator"]) @ pose
+            assert np.allclose(found["calibrator_from_bone"][bone], expected, atol=1e-6)
+    # A model in the femur's marker is found in these views, which its registration does not name.
+    first = np.array(result.to_dict()["views"][0]["calibrator_from_bone"]["femur"])
+    lateral = {"axis_medial": (0, -30, 0), "axis_lateral": (0, 30, 0), "anterior": (25, 0, 0), "posterior": (-25, 0, 0), "p": (5, 0, 0)}
+    registration = {"views": [], "models": [{"name": "femur", "decision": "accept", "world_from_model": np.eye(4).tolist(),
+                                             "covariance": (1e-6 * np.eye(6)).tolist(), "centre_mm": [0, 0, 0], "moves_with": "femur",
+                                             "bone_from_model": np.linalg.inv(first).tolist()}]}
+    found = helicarm.measure_landmarks("tibia_ap", lateral, registration=registration, calibration=result.calibration)
+    assert next(iter(found["positions"][0]["percent"].values())) == pytest.approx(40)
+    registration["models"][0]["moves_with"] = "another"
+    with pytest.raises(helicarm.InputError, match='"femur" moves with a bone\'s marker'):
+        helicarm.measure_landmarks("tibia_ap", lateral, registration=registration, calibration=result.calibration)

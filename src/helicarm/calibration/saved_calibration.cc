@@ -46,6 +46,17 @@ std::optional<rectification::DistortionMap> map_from(JsonReader& reader) {
       rectification::distortion_map_from_json(rectification.raw("map"), rectification.where() + ": map"));
 }
 
+std::map<std::string, geometry::RigidTransform> bones_from(JsonReader& view) {
+  std::map<std::string, geometry::RigidTransform> poses;
+  if (!view.has("calibrator_from_bone")) return poses;
+  const Json bones = view.raw("calibrator_from_bone");
+  JsonReader reader = view.object("calibrator_from_bone");
+  for (const auto& [bone, ignored] : bones.items())
+    poses[bone] = value_or_throw(geometry::rigid_transform_from(matrix_from<4, 4>(reader, bone.c_str()),
+                                                                reader.where() + ": " + bone));
+  return poses;
+}
+
 std::vector<phantom::CalibratorBall> balls_from(JsonReader calibrator) {
   constexpr std::size_t most_balls = 10000;
   std::vector<phantom::CalibratorBall> balls;
@@ -113,6 +124,11 @@ void read_figures(JsonReader calibration, SavedCalibration& saved) {
 
 }  // namespace
 
+std::map<std::string, geometry::RigidTransform> SavedCalibration::bones_in(std::size_t view) const {
+  return view < calibrator_from_bone.size() ? calibrator_from_bone[view]
+                                            : std::map<std::string, geometry::RigidTransform>();
+}
+
 Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(json, origin);
@@ -125,6 +141,7 @@ Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const s
     for (JsonReader& view : reader.objects("views", true, 100)) {
       saved.views.push_back(view_from(view));
       saved.maps.push_back(map_from(view));
+      saved.calibrator_from_bone.push_back(bones_from(view));
       auto& fiducials = saved.fiducials.emplace_back();
       if (has_places)
         for (JsonReader& fiducial : view.objects("fiducials", false))
@@ -153,6 +170,8 @@ Json to_json(const SavedCalibration& calibration) {
     if (i < calibration.fiducials.size())
       for (const fiducials::Fiducial& fiducial : calibration.fiducials[i])
         entry["fiducials"].push_back(json_of(fiducial));
+    for (const auto& [bone, pose] : calibration.bones_in(i))
+      entry["calibrator_from_bone"][bone] = geometry::json_rows(pose.matrix());
     json["views"].push_back(std::move(entry));
   }
   json["calibration"] = {{"joint_covariance", calibration.joint_covariance.size() > 0

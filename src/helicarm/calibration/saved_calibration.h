@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "helicarm/calibration/calibrated_view.h"
@@ -18,6 +20,11 @@ struct SavedCalibration : Calibration {
   std::vector<std::optional<rectification::DistortionMap>>
       maps;                                    ///< per view; nothing if the image was not rectified
   std::vector<phantom::CalibratorBall> balls;  ///< empty in results of earlier versions
+  /// Per view, of the bones whose marker was read at its acquisition; may be empty.
+  std::vector<std::map<std::string, geometry::RigidTransform>> calibrator_from_bone = {};
+
+  /// Of a view: none where there are none.
+  std::map<std::string, geometry::RigidTransform> bones_in(std::size_t view) const;
 };
 
 /// From "views" (name, projection, camera_from_calibrator, rectification.map, fiducials) and "calibration"

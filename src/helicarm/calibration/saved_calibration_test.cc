@@ -27,6 +27,7 @@ TEST(SavedCalibration, RoundTripKeepsViewsCovarianceAndFiducials) {
   SavedCalibration given = saved_example();
   given.fiducials[1][2].status = fiducials::FiducialStatus::not_found;
   given.views[1].by_paper = true;
+  given.calibrator_from_bone = {{{"L4", {Eigen::Matrix3d::Identity(), {1, 2, 3}}}}, {}};
   const auto read = saved_calibration_from_json(to_json(given), "calibration.json");
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_TRUE(read->joint_covariance.isApprox(given.joint_covariance, 1e-12));
@@ -38,6 +39,8 @@ TEST(SavedCalibration, RoundTripKeepsViewsCovarianceAndFiducials) {
   EXPECT_EQ(read->fiducials[1][2].centre_in_calibrator, given.fiducials[1][2].centre_in_calibrator);
   EXPECT_EQ(read->fiducials[0][5].uv, given.fiducials[0][5].uv);
   EXPECT_EQ(read->dof, given.dof);
+  EXPECT_EQ(read->bones_in(0).at("L4").translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_TRUE(read->bones_in(1).empty());
   EXPECT_TRUE(!read->views[0].by_paper && read->views[1].by_paper);
 }
 

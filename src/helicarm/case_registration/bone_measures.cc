@@ -3,8 +3,10 @@
 
 #include <algorithm>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "helicarm/calibration/saved_calibration.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/measures/measure.h"
@@ -26,14 +28,32 @@ const PosedModel* posed_model(const BoneScene& scene, const std::string& name) {
   return found == scene.models.end() ? nullptr : &*found;
 }
 
-/// Nothing for a point that is neither planned nor located.
-std::optional<Landmark> found_by_name(const std::string& name, const PosedModel& model,
-                                      const WorldPoints& located) {
-  if (const auto planned = model.planned.find(name); planned != model.planned.end())
-    return Landmark{name, planned->second, Matrix3d::Zero()};
-  if (const auto point = located.find(name); point != located.end())
-    return in_model(name, point->second, model);
-  return std::nullopt;
+/// How far two poses of a camera are apart.
+struct Apart {
+  double mm, deg;
+  /// Of one acquisition; another prior moves the camera a little.
+  bool is_same() const { return mm <= 5 && deg <= 1; }
+};
+
+/// Nothing where the file does not state the camera of this name.
+std::optional<Apart> from_registered(const PosedModel& model, const SceneView& view) {
+  const auto registered = model.cameras.find(view.name);
+  if (registered == model.cameras.end()) return std::nullopt;
+  const RigidTransform now = view.view.camera_from_world.inverse(), then = registered->second.inverse();
+  return Apart{(now.translation - then.translation).norm(),
+               Eigen::AngleAxisd(now.rotation.transpose() * then.rotation).angle() * 180 / double(EIGEN_PI)};
+}
+
+/// Whether the views are of another moment than the registration.
+bool are_other_images(const PosedModel& model, std::span<const SceneView> views) {
+  if (model.cameras.empty() || views.empty()) return false;
+  bool has_common = false;
+  for (const SceneView& view : views)
+    if (const auto apart = from_registered(model, view)) {
+      if (!apart->is_same()) return true;
+      has_common = true;
+    }
+  return !has_common;
 }
 
 bool has_moved(const PosedModel& model) {
@@ -42,21 +62,39 @@ bool has_moved(const PosedModel& model) {
   });
 }
 
-/// The views as if the bone were where it was at the first acquisition.
-std::vector<measures::NamedView> views_of_bone_at_first(const PosedModel& model,
-                                                        std::vector<measures::NamedView> views) {
-  if (!has_moved(model)) return views;
-  for (measures::NamedView& view : views) {
-    const auto then = model.at_acquisitions.find(view.name);
-    if (then == model.at_acquisitions.end())
-      throw BadInput(Reason::bad_value,
-                     fmt::format("view \"{}\": \"{}\" moved between the acquisitions and was not registered "
-                                 "in this view: the registration is of other views",
-                                 view.name, model.name));
-    view.view.camera_from_world =
-        view.view.camera_from_world * then->second * model.world_from_model.inverse();
-  }
-  return views;
+/// world_from_model at the view's acquisition.
+RigidTransform pose_at(const PosedModel& model, const SceneView& view) {
+  if (model.bone)
+    if (const auto bone = view.world_from_bone.find(model.bone->name); bone != view.world_from_bone.end())
+      return bone->second * model.bone->bone_from_model;
+  const auto apart = from_registered(model, view);
+  if (apart && !apart->is_same())
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("view \"{}\": its camera is {:.1f} mm and {:.1f} degrees from that of the registration: "
+                    "they are of other images; register and calibrate the same, or give both cases the poses "
+                    "of the marker on the bone (\"moves_with\" of \"{}\")",
+                    view.name, apart->mm, apart->deg, model.name));
+  const auto then = model.at_acquisitions.find(view.name);
+  if (then != model.at_acquisitions.end()) return then->second;
+  if (model.bone || has_moved(model))
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("view \"{}\": \"{}\" moves with a bone's marker and was not registered in this "
+                    "view, and the calibration's result has no pose of that marker then: give its "
+                    "case the bone's \"poses\", or register the model in these images",
+                    view.name, model.name));
+  return model.world_from_model;
+}
+
+/// Nothing for a point that is neither planned nor located.
+std::optional<Landmark> found_by_name(const std::string& name, const PosedModel& model,
+                                      const WorldPoints& located) {
+  if (const auto planned = model.planned.find(name); planned != model.planned.end())
+    return Landmark{name, planned->second, Matrix3d::Zero()};
+  if (const auto point = located.find(name); point != located.end())
+    return in_model(name, point->second, model);
+  return std::nullopt;
 }
 
 std::vector<Landmark> landmarks_of(const LandmarkSet& set, const BoneScene& scene) {
@@ -77,6 +115,12 @@ std::vector<Landmark> landmarks_of(const LandmarkSet& set, const BoneScene& scen
                      fmt::format("{}: \"{}\" has no coordinates, and is neither a point of the model's plan "
                                  "in --registration nor a located one of --calibration",
                                  each.row, each.name));
+    if (!model->planned.contains(each.name) && are_other_images(*model, scene.views))
+      throw BadInput(
+          Reason::bad_value,
+          fmt::format("{}: \"{}\" was located in other images than \"{}\" was registered in: register "
+                      "the model there too, its \"measures\" then hold the point",
+                      each.row, each.name, set.model));
     landmarks.push_back(*std::move(found));
   }
   return landmarks;
@@ -170,9 +214,29 @@ void check_set(const LandmarkSet& set, const pipeline::Case& the_case,
 
 }  // namespace
 
+std::vector<SceneView> views_of(const calibration::SavedCalibration& calibration) {
+  std::vector<SceneView> views;
+  for (std::size_t i = 0; i < calibration.views.size(); ++i)
+    views.push_back({{calibration.views[i].name, calibration.views[i].view}, calibration.bones_in(i)});
+  return views;
+}
+
+Expected<geometry::View> view_of_model(const PosedModel& model, const SceneView& view) {
+  return guarded([&] {
+    geometry::View moved = view.view;
+    const RigidTransform pose = pose_at(model, view);
+    if (pose.matrix() != model.world_from_model.matrix())
+      moved.camera_from_world = moved.camera_from_world * pose * model.world_from_model.inverse();
+    return moved;
+  });
+}
+
 Expected<std::vector<PosedModel>> posed_models_from(const Json& registration, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(registration, origin);
+    std::map<std::string, RigidTransform> cameras;
+    for (JsonReader& view : reader.objects("views", false))
+      if (view.has("camera_from_world")) cameras[view.text("name")] = pose_in(view, "camera_from_world");
     std::vector<PosedModel> models;
     for (JsonReader& model : reader.objects("models", true)) {
       if (model.text("decision") == "refuse" || !model.has("world_from_model")) continue;
@@ -185,6 +249,9 @@ Expected<std::vector<PosedModel>> posed_models_from(const Json& registration, co
             posed.world_from_model.inverse() * Vector3d(point.numbers("xyz_mm", 3, world_mm).data());
       for (JsonReader& view : model.objects("acquisitions", false))
         posed.at_acquisitions[view.text("view")] = pose_in(view, "world_from_model");
+      if (model.has("moves_with") && model.has("bone_from_model"))
+        posed.bone = {model.text("moves_with"), pose_in(model, "bone_from_model")};
+      posed.cameras = cameras;
       models.push_back(std::move(posed));
     }
     return models;
@@ -223,10 +290,13 @@ Landmark in_model(const std::string& name, const WorldPoint& point, const PosedM
 Expected<InBone> measured_in_bone(const LandmarkSet& set, const BoneScene& scene) {
   return guarded([&] {
     const PosedModel* model = posed_model(scene, set.model);
+    std::vector<measures::NamedView> views;
+    if (model)
+      for (const SceneView& view : scene.views)
+        views.push_back({view.name, value_or_throw(view_of_model(*model, view))});
     return value_or_throw(
         measures::measure_in_bone(set.name, set.model, set.kind, landmarks_of(set, scene), scene.zones,
-                                  model ? std::optional(model->world_from_model) : std::nullopt,
-                                  model ? views_of_bone_at_first(*model, scene.views) : scene.views));
+                                  model ? std::optional(model->world_from_model) : std::nullopt, views));
   });
 }
 
@@ -256,7 +326,7 @@ std::vector<InBone> measures_of(const ModelMeasures& wanted, const WorldPoints& 
   if (model.registration.failure || !model.registration.is_determined()) return {};
   BoneScene scene{{posed(model)}, located, {}, wanted.zones};
   for (std::size_t i = 0; i < std::min(loaded.views.size(), model.views.size()); ++i)
-    scene.views.push_back({loaded.views[i].name, model.views[i]});
+    scene.views.push_back({{loaded.views[i].name, model.views[i]}});
   std::vector<InBone> found;
   for (LandmarkSet set : wanted.sets) {
     std::vector<std::string> missing;

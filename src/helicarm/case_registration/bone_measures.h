@@ -15,6 +15,9 @@
 namespace helicarm::pipeline {
 struct Result;
 }
+namespace helicarm::calibration {
+struct SavedCalibration;
+}
 
 namespace helicarm::case_registration {
 
@@ -29,6 +32,12 @@ struct WorldPoint {
 };
 using WorldPoints = std::map<std::string, WorldPoint>;
 
+/// A bone with a marker that carries a model.
+struct CarryingBone {
+  guidance::Bone name;
+  geometry::RigidTransform bone_from_model;
+};
+
 /// A registered model as a measure needs it.
 struct PosedModel {
   std::string name;
@@ -38,7 +47,21 @@ struct PosedModel {
   std::map<std::string, Eigen::Vector3d> planned = {};  ///< points of its plan, in the model, exact
   /// world_from_model at each view's acquisition, by the view's name; empty: the same in every view.
   std::map<std::string, geometry::RigidTransform> at_acquisitions = {};
+  std::optional<CarryingBone> bone = {};  ///< nothing: its marker was not read at every acquisition
+  /// camera_from_world of the views that it was registered in; empty: a file of an earlier version.
+  std::map<std::string, geometry::RigidTransform> cameras = {};
 };
+
+/// A calibrated view with the bones' poses at its acquisition, as far as they were read.
+struct SceneView : measures::NamedView {
+  std::map<guidance::Bone, geometry::RigidTransform> world_from_bone = {};
+};
+std::vector<SceneView> views_of(const calibration::SavedCalibration& calibration);
+
+/// The view as if the model were where it was at the registration's first acquisition. In images of another
+/// moment than the registration's a model is where its bone's marker was; refuses (bad_value) such a view
+/// without that marker.
+Expected<geometry::View> view_of_model(const PosedModel& model, const SceneView& view);
 
 /// Of registration.json, without the models that were refused. Fails as JsonReader.
 Expected<std::vector<PosedModel>> posed_models_from(const Json& registration, const std::string& origin);
@@ -53,14 +76,14 @@ measures::Landmark in_model(const std::string& name, const WorldPoint& point, co
 struct BoneScene {
   std::vector<PosedModel> models;
   WorldPoints located;
-  std::vector<measures::NamedView> views;
+  std::vector<SceneView> views;  ///< the located points are at the first one's acquisition
   std::vector<measures::Zone> zones;
 };
 
 /// A point without coordinates is one of the model's plan, or a located one carried into the model. Refuses
-/// (bad_value) a point that is neither, a model that is not registered, and a view that a bone which moved
-/// was not registered in, and as `measure_in_bone`. A set whose landmarks all have coordinates needs no
-/// model; without one it has no lateral views.
+/// (bad_value) a point that is neither, one that is located in images of another moment than the
+/// registration's, a model that is not registered, and as `measure_in_bone` and `view_of_model`. A set whose
+/// landmarks all have coordinates needs no model; without one it has no lateral views.
 Expected<measures::InBone> measured_in_bone(const measures::LandmarkSet& set, const BoneScene& scene);
 
 /// A model's table of landmarks and zones.

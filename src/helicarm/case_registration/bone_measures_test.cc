@@ -104,6 +104,7 @@ TEST(BoneMeasures, EveryInterfaceHasTheSameFiguresAndWords) {
   tibia.model.measures = tibia.measured();
   CaseRegistration result;
   result.loaded.views.emplace_back().name = "LAT";
+  result.loaded.views[0].view = lateral_view();
   result.models.push_back(tibia.model);
   const Json json = to_json(result);
   EXPECT_EQ(json["models"][0]["measures"][0], measures::to_json(tibia.model.measures[0]));
@@ -114,8 +115,10 @@ TEST(BoneMeasures, EveryInterfaceHasTheSameFiguresAndWords) {
   // The file's numbers give the same again.
   Json saved = json;
   saved["models"][0]["points"] = Json::array({{{"name", "FS"}, {"xyz_mm", {0, 2, 0}}}});
-  BoneScene scene{
-      *posed_models_from(saved, "registration.json"), {}, {{"LAT", lateral_view()}}, *measures::zones_of({})};
+  BoneScene scene{*posed_models_from(saved, "registration.json"),
+                  {},
+                  {SceneView{{"LAT", lateral_view()}, {}}},
+                  *measures::zones_of({})};
   const auto sets = *measures::read_landmark_table(*tibia.the_case.models[0].measures);
   EXPECT_EQ(measures::to_json(*measured_in_bone(sets.at(0), scene)), json["models"][0]["measures"][0]);
 }
@@ -141,7 +144,7 @@ TEST(BoneMeasures, OfAFileABoneIsWhereItWasInEachView) {
   saved["models"][0]["points"] = Json::array({{{"name", "FS"}, {"xyz_mm", {0, 2, 0}}}});
   BoneScene scene{*posed_models_from(saved, "registration.json"),
                   {},
-                  {{"LAT", lateral_view()}, {"LATER", lateral_view()}},
+                  {SceneView{{"LAT", lateral_view()}, {}}, SceneView{{"LATER", lateral_view()}, {}}},
                   *measures::zones_of({})};
   const auto set = measures::read_landmark_table(*tibia.the_case.models[0].measures)->at(0);
   const auto found = measured_in_bone(set, scene);
@@ -152,11 +155,88 @@ TEST(BoneMeasures, OfAFileABoneIsWhereItWasInEachView) {
   EXPECT_FALSE(found->laterals[1].is_lateral);
   // Where the bone was in another view is not known.
   scene.views[1].name = "elsewhere";
-  EXPECT_THAT(measured_in_bone(set, scene).error().message, HasSubstr("\"elsewhere\": \"tibia\" moved"));
+  EXPECT_THAT(measured_in_bone(set, scene).error().message,
+              HasSubstr("\"elsewhere\": \"tibia\" moves with a bone's marker"));
   // Of a bone that did not move it is.
   saved["models"][0]["acquisitions"] = Json::array();
   scene.models = *posed_models_from(saved, "registration.json");
   EXPECT_TRUE(measured_in_bone(set, scene)->laterals.at(1).is_lateral);
+}
+
+/// The tibia registered in "LAT", with its own table; `tracked`: with a marker, 40 mm from it.
+struct RegisteredTibia {
+  static constexpr double marker_mm = 40;
+  Tibia tibia{plateau + "t,tibia_ap,tibia,FS,,,\n"};
+  BoneScene scene;
+
+  explicit RegisteredTibia(bool tracked, const std::string& rows = {}) {
+    CaseRegistration result;
+    result.loaded.views.emplace_back().name = "LAT";
+    result.loaded.views[0].view = lateral_view();
+    if (tracked) {
+      tibia.model.moves_with = "tibia";
+      tibia.model.world_from_bone = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {marker_mm, 0, 0}};
+    }
+    result.models.push_back(tibia.model);
+    Json saved = to_json(result);
+    saved["models"][0]["points"] = Json::array({{{"name", "FS"}, {"xyz_mm", {0, 2, 0}}}});
+    scene.models = *posed_models_from(saved, "registration.json");
+    scene.zones = *measures::zones_of({});
+    EXPECT_TRUE(write_file(tibia.folder.path() / "rows.csv", head + plateau + rows));
+  }
+  Expected<measures::InBone> measured() const {
+    return measured_in_bone(measures::read_landmark_table(tibia.folder.path() / "rows.csv")->at(0), scene);
+  }
+  /// A later image of the same name by a C-arm that was moved, of the bone turned about its own axis.
+  void take_later(double turn_deg, bool with_marker) {
+    const geometry::RigidTransform motion{
+        Eigen::AngleAxisd(turn_deg * EIGEN_PI / 180, Eigen::Vector3d::UnitZ()).toRotationMatrix(),
+        {30, 9, 0}};
+    geometry::View view = lateral_view();
+    view.camera_from_world = view.camera_from_world * motion.inverse();
+    SceneView later{{"LAT", view}};
+    if (with_marker) later.world_from_bone["tibia"] = motion * *tibia.model.world_from_bone;
+    scene.views = {later};
+  }
+};
+
+TEST(BoneMeasures, InLaterImagesABoneIsWhereItsMarkerWas) {
+  RegisteredTibia of(true);
+  of.take_later(10, true);
+  const auto found = of.measured();
+  ASSERT_TRUE(found) << found.error().message;
+  // The C-arm went with the bone.
+  ASSERT_EQ(found->laterals.size(), 1U);
+  EXPECT_LT(found->laterals[0].lateral.off_deg, 1e-6);
+  of.scene.views[0].view = lateral_view();  // it stayed
+  EXPECT_NEAR(of.measured()->laterals.at(0).lateral.off_deg, 10, 1);
+}
+
+TEST(BoneMeasures, LaterImagesWithoutTheMarkersPoseAreRefused) {
+  RegisteredTibia of(true);
+  of.take_later(0, false);
+  EXPECT_THAT(of.measured().error().message, HasSubstr("its camera is 31.3 mm and 0.0 degrees"));
+  of.scene.views[0].name = "later";
+  EXPECT_THAT(of.measured().error().message, HasSubstr("has no pose of that marker then"));
+}
+
+TEST(BoneMeasures, OfABoneWithoutAMarkerImagesOfTheSameNameMustBeTheRegistered) {
+  RegisteredTibia of(false);
+  of.scene.views = {SceneView{{"LAT", lateral_view()}, {}}};
+  of.scene.views[0].view.camera_from_world.translation.x() += 1;  // another prior
+  EXPECT_TRUE(of.measured());
+  of.take_later(0, false);
+  EXPECT_THAT(of.measured().error().message, HasSubstr("give both cases the poses of the marker"));
+  of.scene.models[0].cameras.clear();  // a file of an earlier version
+  EXPECT_TRUE(of.measured());
+}
+
+TEST(BoneMeasures, APointThatIsLocatedInOtherImagesIsRefused) {
+  RegisteredTibia of(true, "t,tibia_ap,tibia,L,,,\n");
+  of.scene.located["L"] = {{0, 2, 0}, Eigen::Matrix3d::Identity()};
+  EXPECT_TRUE(of.measured());
+  of.take_later(10, true);
+  EXPECT_THAT(of.measured().error().message, HasSubstr("\"L\" was located in other images"));
 }
 
 TEST(BoneMeasures, BadTablesAreRefusedBeforeTheRegistration) {

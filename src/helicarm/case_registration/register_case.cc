@@ -79,6 +79,8 @@ class Registrar {
     const bool follows = case_model.moves_with && tracked(given_, *case_model.moves_with);
     const auto views = follows ? following(loaded_.views, given_, *case_model.moves_with) : loaded_.views;
     for (const RegistrationView& view : views) made.views.push_back(view.view);
+    if (follows)
+      made.world_from_bone = guidance::calibrator_from(*case_model.moves_with, given_.views.front().poses);
     LoadedModel files = value_or_throw(load_model(case_model, plan));
     std::optional<registration::Model>& model = files.model;
     const double motion_sigma_mm = follows ? 0 : options_.run.motion_sigma_mm;

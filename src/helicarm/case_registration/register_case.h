@@ -59,6 +59,8 @@ struct RegisteredModel {
   bool by_landmarks_only = false;
   bool is_surface = false;
   std::optional<guidance::Bone> moves_with;
+  /// `moves_with` at the first acquisition, if its marker was read at all of them.
+  std::optional<geometry::RigidTransform> world_from_bone = {};
   std::vector<RegisteredPoint> points;
   std::vector<guidance::Tunnel> tunnels;
   std::vector<pipeline::TunnelEnds> tunnel_ends;  ///< of each tunnel, among the points

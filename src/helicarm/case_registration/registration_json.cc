@@ -182,6 +182,15 @@ void describe_model(Output& output, const RegisteredModel& model, const CaseRegi
         row.value(
             "world_from_model", [&] { return at.world_from_model.matrix(); }, "at its acquisition, mm");
       });
+  output.value(
+      "moves_with", [&] { return model.world_from_bone ? model.moves_with : std::nullopt; },
+      "the bone whose marker was read at every acquisition; else `null`");
+  output.value("bone_from_model",
+               if_set(model.world_from_bone,
+                      [&](const geometry::RigidTransform& bone) -> Eigen::Matrix4d {
+                        return (bone.inverse() * found.world_from_model).matrix();
+                      }),
+               "the model in that bone's marker, mm: where it is in images of another moment");
   describe_search(output, found);
   output.object("landmarks", model.landmarks.has_value(), "`null` if there are none",
                 [&](auto& row) { describe_landmarks(row, model); });

@@ -146,7 +146,8 @@ Json recorded(const CaseRegistration& registration) {
   for (Json& view : json["views"]) view.erase("camera_from_world");
   for (Json& model : json["models"]) {
     model.erase("seconds");
-    model.erase("acquisitions");  // follow from other records; sessions of earlier versions lack them
+    for (const char* key : {"acquisitions", "moves_with", "bone_from_model"})
+      model.erase(key);  // follow from other records; sessions of earlier versions lack them
   }
   return json;
 }

@@ -76,6 +76,10 @@ Result initial_result(const Case& the_case, const CaseCalibration& calibration, 
     views.push_back(reported(calibration.images[i]));
     views[i].found->fiducials = calibration.fiducials[i];
     views[i].calibrated = calibration.views[i];
+    const guidance::Poses& poses = the_case.views[i].poses;
+    for (const auto& [bone, of_tracker] : poses.tracker_from_bone)
+      if (const auto pose = guidance::calibrator_from(bone, poses))
+        views[i].calibrator_from_bone[bone] = *pose;
   }
   Result result = initial_result(the_case, options, std::move(views));
   append_warnings(result.warnings, calibration);

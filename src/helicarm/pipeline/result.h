@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <ranges>
@@ -63,6 +64,8 @@ struct ViewResult {
   std::optional<calibration::CalibratedView> calibrated;
   std::optional<detection::ImageDots> dots = {};
   std::vector<fiducials::GuessedLabel> guessed = {};  ///< the best labelling where it was refused
+  /// Of the bones whose marker was read at the acquisition, with the calibrator's.
+  std::map<guidance::Bone, geometry::RigidTransform> calibrator_from_bone = {};
 };
 
 /// The dots that may be fiducials, of a view whose labelling was refused; else none.

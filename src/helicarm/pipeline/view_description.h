@@ -212,6 +212,14 @@ void describe_view(Output& output, const ViewResult& view) {
   describe_guess(output, view);
   describe_labelling(output, view.found);
   describe_calibrated(output, view);
+  output.value(
+      "calibrator_from_bone",
+      [&] {
+        std::vector<std::pair<std::string, Eigen::Matrix4d>> poses;
+        for (const auto& [bone, pose] : view.calibrator_from_bone) poses.emplace_back(bone, pose.matrix());
+        return poses;
+      },
+      "of each bone with a marker: its pose at the acquisition, mm; empty without the case's `poses`");
 }
 
 }  // namespace helicarm::pipeline
