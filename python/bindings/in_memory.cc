@@ -5,7 +5,11 @@
 
 #include "arrays.h"
 #include "checks.h"
+#include "helicarm/case_registration/bone_checks.h"
 #include "helicarm/case_registration/register_in_memory.h"
+#include "helicarm/guidance/bone_check_description.h"
+#include "helicarm/guidance/tunnel.h"
+#include "helicarm/pipeline/model_description.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/registration/model.h"
 #include "helicarm/sweep/sweep.h"
@@ -36,6 +40,24 @@ geometry::RigidTransform pose_from(const Doubles& matrix, const std::string& nam
   return pose;
 }
 
+struct GivenVolume {
+  VolumePointer volume;
+  std::optional<volume::Volume> mask = {};
+  std::optional<registration::HuWindow> window = {};
+};
+
+GivenVolume volume_in(const py::dict& entries, const std::string& name) {
+  GivenVolume given{entries["volume"].cast<VolumePointer>()};
+  if (entries.contains("mask")) given.mask = *entries["mask"].cast<VolumePointer>();
+  if (entries.contains("window_hu")) {
+    const auto [low, high] = entries["window_hu"].cast<std::pair<double, double>>();
+    checked(low, any_number, name + ": window_hu");
+    checked(high, {low, std::numeric_limits<double>::infinity(), true}, name + ": window_hu");
+    given.window = registration::HuWindow{low, high};
+  }
+  return given;
+}
+
 case_registration::GivenModel model_of(const std::string& name, const py::dict& entries,
                                        const std::vector<Doubles>& starts) {
   case_registration::GivenModel loaded;
@@ -44,18 +66,10 @@ case_registration::GivenModel model_of(const std::string& name, const py::dict& 
     loaded.model = value_or_raise(without_gil([&] { return registration::model_from(name, *surface); }));
     loaded.model.warnings = surface->warnings;
   } else {
-    const auto held = entries["volume"].cast<VolumePointer>();
-    std::optional<volume::Volume> mask;
-    if (entries.contains("mask")) mask = *entries["mask"].cast<VolumePointer>();
-    std::optional<registration::HuWindow> window;
-    if (entries.contains("window_hu")) {
-      const auto [low, high] = entries["window_hu"].cast<std::pair<double, double>>();
-      checked(low, any_number, name + ": window_hu");
-      checked(high, {low, std::numeric_limits<double>::infinity(), true}, name + ": window_hu");
-      window = registration::HuWindow{low, high};
-    }
-    loaded.model =
-        value_or_raise(without_gil([&] { return registration::model_from(name, *held, mask, window); }));
+    const auto [held, mask, window] = volume_in(entries, name);
+    loaded.model = value_or_raise(without_gil([&, &held = held, &mask = mask, &window = window] {
+      return registration::model_from(name, *held, mask, window);
+    }));
     loaded.model.warnings = held->warnings;
     for (Warning& warning : value_or_raise(volume::check_hounsfield(*held, name + ": volume")))
       loaded.model.warnings.push_back(std::move(warning));
@@ -132,6 +146,48 @@ py::object register_given(const std::vector<std::pair<std::string, py::dict>>& m
   return answer;
 }
 
+/// Name, start and end, diameter, required bridge.
+using GivenTunnel = std::tuple<std::string, Doubles, double, std::optional<double>>;
+
+py::dict check_tunnels(const py::dict& entries, const std::vector<GivenTunnel>& tunnels) {
+  case_registration::MarkupPlan plan;
+  for (const auto& [name, ends, diameter_mm, bridge_mm] : tunnels) {
+    const std::vector<Eigen::Vector3d> points = rows_of<3>(ends, name);
+    if (points.size() != 2) raise({Reason::bad_value, name + ": is not a start and an end", {}, {}});
+    if ((points[1] - points[0]).norm() < guidance::shortest_tunnel_mm)
+      raise({Reason::bad_value,
+             fmt::format("{}: is shorter than {:g} mm", name, guidance::shortest_tunnel_mm),
+             {},
+             {}});
+    plan.tunnels.push_back(
+        {name, plan.points.size(), plan.points.size() + 1,
+         checked(diameter_mm, within(pipeline::description::tunnel_diameter_mm), name + ": diameter_mm"),
+         checked(bridge_mm.value_or(pipeline::usual_bridge_mm),
+                 within(pipeline::description::tunnel_bridge_mm), name + ": bridge_mm")});
+    plan.points.push_back({name + "_start", points[0]});
+    plan.points.push_back({name + "_end", points[1]});
+  }
+  const registration::Model model = model_of("model", entries, {}).model;
+  std::shared_ptr<const registration::BoneSurface> bone;
+  if (model.surface) {
+    bone = without_gil([&] { return registration::bone_surface(*model.surface, model.voxel_mm); });
+  } else {
+    const GivenVolume given = volume_in(entries, "model");
+    if (!given.mask && !given.window)
+      raise({Reason::usage,
+             "a volume needs a \"mask\" or \"window_hu\": without one it has no outline",
+             {},
+             {}});
+    bone = without_gil([&] { return registration::bone_surface(*given.volume, given.mask, given.window); });
+  }
+  const auto checks = without_gil([&] { return case_registration::bone_checks(plan, bone.get()); });
+  py::dict answer;
+  for (std::size_t i = 0; i < checks.size(); ++i)
+    answer[py::str(plan.tunnels[i].name)] = python_from(
+        output_of([&](OutputJson& output) { guidance::describe_bone_check(output, *checks[i]); }));
+  return answer;
+}
+
 sweep::Sweep sweep_images(const std::vector<ImagePointer>& images, const phantom::Calibrator& calibrator,
                           const std::optional<phantom::Plate>& plate, std::optional<bool> mirrored,
                           const std::optional<std::string>& path, const std::optional<std::string>& check,
@@ -176,6 +232,7 @@ void add_in_memory(py::module_& module) {
              py::arg("max_error_mm") = py::none(), py::arg("motion_sigma_mm") = usual.run.motion_sigma_mm,
              py::arg("search_mm") = usual.search.shift_mm, py::arg("search_deg") = usual.search.turn_deg,
              py::arg("threads") = usual.run.threads, py::arg("progress") = py::none());
+  module.def("_check_tunnels", &check_tunnels, py::arg("model"), py::arg("tunnels"));
   const sweep::SweepOptions free;
   module.def("_sweep_images", &sweep_images, py::arg("images"), py::arg("calibrator"), py::arg("plate"),
              py::arg("mirrored"), py::kw_only(), py::arg("path") = py::none(), py::arg("check") = py::none(),

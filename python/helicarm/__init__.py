@@ -18,7 +18,7 @@ from ._helicarm import (  # noqa: F401
     read_image, read_surface, read_volume, rectify, run_case, schema, simulate_case, verify_phantom)
 from .arrays import as_camera, as_image, as_surface, as_volume  # noqa: F401
 from .cameras import solve  # noqa: F401
-from .data import drr, migration, register, register_sequence, segment, sweep, track  # noqa: F401
+from .data import check_tunnels, drr, migration, register, register_sequence, segment, sweep, track  # noqa: F401
 from .errors import HelicarmError, InputError, RefusedError  # noqa: F401
 from .results import install as _install
 from .session import Record, Session  # noqa: F401
@@ -29,7 +29,7 @@ __all__ = [
     "CArmPrior", "Calibration", "Calibrator", "Camera", "DistortionMap", "HelicarmError", "InputError", "IntrinsicsPrior",
     "LocatedPoint", "MeasuredPhantom", "Plate", "Record", "Rectification", "RefusedError", "Result", "ResultPoint", "Session",
     "Surface", "Sweep", "Track", "ViewPoints", "Volume", "XrayImage", "as_camera", "as_image", "as_surface", "as_volume",
-    "add_to_c_arm", "bundle", "c_arm_report", "calibrate", "check_c_arm", "detect", "drr", "figures", "import_camera", "import_transform",
+    "add_to_c_arm", "bundle", "c_arm_report", "calibrate", "check_c_arm", "check_tunnels", "detect", "drr", "figures", "import_camera", "import_transform",
     "label", "measure", "measure_landmarks", "measure_phantom", "migration", "new_case", "read_image", "read_surface", "read_volume", "rectify",
     "register", "register_sequence", "run_case", "schema", "segment", "simulate_case", "solve", "sweep", "track", "verify_phantom"]
 

@@ -158,6 +158,27 @@ def register(folder=None, *, models=None, views=None, starts=None, camera_covari
                      poses, held, covariance, [(usable or {}).get(name) for name in names], **options)
 
 
+def check_tunnels(model, tunnels, *, diameter_mm, bridge_mm=None):
+    """Planned tunnels against their bone, without images: bridge, length in the bone, entry, exit, angles, distances.
+
+    model: as register takes it: a volume with "mask" or "window_hu", or a surface. tunnels: {name: (start, end)}, (2, 3) L, P, S,
+    mm, drilled from the start. diameter_mm, bridge_mm (bone that the wall should keep; None: as of a case): of all, or {name:
+    value}.
+    Releases the GIL. Returns {name: bone_check} as in registration.json: "bridge_mm", "bridge_sigma_mm", "length_in_bone_mm",
+    "entry_mm", "exit_mm", "entry_angle_deg", "end_mm", "breach", "thin", "to_tunnels", ... The error of a registration is no part
+    of it: "breach" is that of the surface's own error. Raises InputError: bad_value, usage, and as register of a model.
+    """
+    def of(name, value, what):
+        if not isinstance(value, Mapping):
+            return value
+        if name not in value:
+            raise InputError("bad_value", f'{what}: there is none of "{name}"')
+        return value[name]
+
+    return _c._check_tunnels(as_model(model), [(name, ends, of(name, diameter_mm, "diameter_mm"), of(name, bridge_mm, "bridge_mm"))
+                                               for name, ends in tunnels.items()])
+
+
 def register_sequence(folder, frames, **options):
     return _answered(SequenceAnswer, _c.register_sequence, folder, frames, **options)
 

@@ -220,3 +220,26 @@ def test_a_result_with_models_writes_their_files(planned, tmp_path):
     helicarm.run_case(planned).write(tmp_path)
     assert json.loads((tmp_path / "registration.json").read_text())["status"] == "ok"
     assert (tmp_path / "registration/report.html").exists()
+
+
+def test_tunnels_are_compared_with_a_bone_in_memory():
+    # A box of 24 x 24 x 40 mm of bone in voxels of 1 mm; walls 2 and 3 mm below its faces.
+    hu = np.zeros((34, 34, 50), np.float32)
+    hu[5:29, 5:29, 5:45] = 1000
+    volume, mask = helicarm.Volume(hu, np.eye(4), frame="LPS"), hu > 500
+    lines = {"thin": ([28.5 - 5, 16.5, 0], [28.5 - 5, 16.5, 49]), "blind": ([16.5, 28.5 - 6, 0], [16.5, 28.5 - 6, 30])}
+    found = helicarm.check_tunnels({"volume": volume, "mask": mask}, lines, diameter_mm=6, bridge_mm={"thin": 3, "blind": 2})
+    assert found["thin"]["bridge_mm"] == pytest.approx(2, abs=0.3) and found["thin"]["thin"] and not found["thin"]["breach"]
+    assert found["thin"]["length_in_bone_mm"] == pytest.approx(40, abs=0.5)
+    assert found["blind"]["bridge_mm"] == pytest.approx(3, abs=0.3) and not found["blind"]["thin"]
+    assert found["blind"]["exit_mm"] is None and found["blind"]["end_mm"] == pytest.approx(14.5, abs=0.5)
+    assert [other["name"] for other in found["blind"]["to_tunnels"]] == ["thin"]
+    by_window = helicarm.check_tunnels({"volume": volume, "window_hu": (500, 2000)}, lines, diameter_mm=6)
+    assert by_window["thin"]["bridge_mm"] == pytest.approx(found["thin"]["bridge_mm"], abs=0.2)
+    assert by_window["thin"]["required_bridge_mm"] == 2
+    for model, given, message in ((volume, lines, "without one it has no outline"), ({"volume": volume, "mask": mask}, {"a": lines["thin"][0]}, "a"),
+                                  ({"volume": volume, "mask": mask}, {"a": ([1, 2, 3], [1, 2, 3])}, "a: is shorter than")):
+        with pytest.raises(helicarm.InputError, match=message):
+            helicarm.check_tunnels(model, given, diameter_mm=6)
+    with pytest.raises(helicarm.InputError, match='bridge_mm: there is none of "blind"'):
+        helicarm.check_tunnels({"volume": volume, "mask": mask}, lines, diameter_mm=6, bridge_mm={"thin": 3})

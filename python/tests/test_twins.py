@@ -30,7 +30,7 @@ TWINS = {
     "sweep": ["sweep"],
     "c-arm": ["add_to_c_arm", "check_c_arm", "c_arm_report", "run_case"],
     "phantom": ["Calibrator", "measure_phantom", "verify_phantom"],
-    "register": ["register", "register_sequence"],
+    "register": ["register", "register_sequence", "check_tunnels"],
     "segment": ["segment"],
     "track": ["track"],
     "migration": ["migration"],

@@ -153,6 +153,8 @@ void describe_models(Codec& codec, Models& models, bool required, const std::fil
              });
 }
 
+inline constexpr Range tunnel_diameter_mm{0.5, 30}, tunnel_bridge_mm{0, 20};
+
 /// What a line needs of its model; a bone that the tunnel names is the model's.
 void check_model_line(const JsonReader& reader, const ModelLine& tunnel,
                       const std::optional<guidance::Bone>& bone, std::vector<CaseModel>& models);
@@ -171,10 +173,10 @@ void describe_model_line(Codec& codec, Tunnel& tunnel, std::vector<CaseModel>& m
       },
       [&] { return std::optional<Json>(tunnel.line); });
   codec.number(
-      "diameter_mm", tunnel.diameter_mm, {0.5, 30},
+      "diameter_mm", tunnel.diameter_mm, tunnel_diameter_mm,
       "the tunnel is [compared with the bone](registration.md#tunnels-in-the-bone), for which the model "
       "needs a mask, a window or a surface");
-  codec.number_or_default("bridge_mm", tunnel.bridge_mm, {0, 20}, "bone that the wall should keep");
+  codec.number_or_default("bridge_mm", tunnel.bridge_mm, tunnel_bridge_mm, "bone that the wall should keep");
   codec.choice("enter_at", tunnel.enter_at, tunnel_end_words, "end of the line at which the drill enters");
   std::optional<guidance::Bone> bone;
   if constexpr (!std::is_const_v<Tunnel>)
