@@ -10,18 +10,23 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A cube of bone of 20 mm with a shell of 3 mm about marrow, its outer wall at x = 10 + `shift`; the grid
-/// ends at z = `top`.
-volume::Volume shelled_cube(double shift, int top) {
+/// How far a voxel is outside a cube of 20 mm whose walls at x are at 10 + `shift` from the middle.
+double outside_cube(const volume::Volume& ct, const Eigen::Vector3i& voxel, double shift) {
+  const Vector3d at = (ct.patient_from_voxel * voxel.cast<double>()).cwiseAbs() - Vector3d(shift, 0, 0);
+  return at.maxCoeff() - 10;
+}
+
+/// Such a cube of bone with a shell of 3 mm about marrow; the CT's edges are `blur_mm` wide, the grid ends at
+/// z = `top`.
+volume::Volume shelled_cube(double shift, int top, double blur_mm = 1) {
   volume::Volume ct;
   ct.size = {40, 40, 20 + top};
   ct.patient_from_voxel = Eigen::Affine3d(Eigen::Translation3d(-20, -20, -20));
   for (int z = 0; z < ct.size.z(); ++z)
     for (int y = 0; y < ct.size.y(); ++y)
       for (int x = 0; x < ct.size.x(); ++x) {
-        const Vector3d at = (ct.patient_from_voxel * Vector3d(x, y, z)).cwiseAbs() - Vector3d(shift, 0, 0);
-        const double outside = at.maxCoeff() - 10;
-        const double share = std::clamp(0.5 - outside, 0.0, 1.0);
+        const double outside = outside_cube(ct, {x, y, z}, shift);
+        const double share = std::clamp(0.5 - outside / blur_mm, 0.0, 1.0);
         ct.voxels.push_back(static_cast<float>(outside < -3.5 ? -80 : 50 + 900 * share));
       }
   return ct;
@@ -43,6 +48,20 @@ TEST(BoneSurface, TheCtPlacesTheEdgeOfAGrownMask) {
     for (float& value : mask.voxels) value = value < 50.5F ? 0 : 1;  // every voxel that holds bone
     const auto bone = bone_surface(ct, mask, std::nullopt);
     const auto found = bone->crossings({0, 0, 0}, {1, 0, 0}, 30);
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_NEAR(found[0].at_mm, 10 + shift, 0.12);
+  }
+}
+
+TEST(BoneSurface, AMaskThatIsGrownByAVoxelDoesNotThickenTheBone) {
+  for (const double shift : {-0.3, 0.0, 0.3}) {
+    const volume::Volume ct = shelled_cube(shift, 20, 1.6);
+    volume::Volume mask = ct;
+    std::size_t i = 0;
+    for (int z = 0; z < ct.size.z(); ++z)
+      for (int y = 0; y < ct.size.y(); ++y)
+        for (int x = 0; x < ct.size.x(); ++x) mask.voxels[i++] = outside_cube(ct, {x, y, z}, shift) < 1.01;
+    const auto found = bone_surface(ct, mask, std::nullopt)->crossings({0, 0, 0}, {1, 0, 0}, 30);
     ASSERT_EQ(found.size(), 1u);
     EXPECT_NEAR(found[0].at_mm, 10 + shift, 0.12);
   }
