@@ -364,9 +364,10 @@ def right_table(right):
 
 
 def tables(rows):
+    """{part: text} of the parts that have rows: the right cases, and the others."""
     rows = sorted(rows, key=lambda row: (KINDS.index(row["kind"]), row["number"]))
     right = [row for row in rows if row["kind"] == "right"]
-    lines = right_table(right) if right else []
+    lines = []
     wrong = [kind for kind in KINDS[1:-1] if any(row["kind"] == kind for row in rows)]
     if wrong:
         lines += ["| wrong | cases | refused | warned | accepted | codes |", "| --- | --- | --- | --- | --- | --- |"]
@@ -385,12 +386,12 @@ def tables(rows):
                   f"| {len(single)} cases | {count('refuse')} | {count('warn')} | {count('accept')} | {np.sqrt(np.mean(errors**2)):.2f} mm | "
                   f"{np.mean(errors):+.2f} mm | {np.median(sigmas):.2f} mm | {np.median(both):.3f} mm | "
                   f"{np.sum(abs(errors) < 1.96 * sigmas)} of {len(kept)} |"]
-    return "\n".join(lines)
+    parts = {"right": right_table(right) if right else [], "wrong": lines}
+    return {part: "\n".join(text).strip() for part, text in parts.items() if text}
 
 
-MARKS = {"surface": ("<!-- registration protocol, surface -->", "<!-- end of the registration protocol, surface -->"),
-         "knee": ("<!-- registration protocol -->", "<!-- end of the registration protocol -->"),
-         "head": ("<!-- registration protocol, head -->", "<!-- end of the registration protocol, head -->")}
+def marks_of(body, part):
+    return f"<!-- registration protocol, {body}, {part} -->", f"<!-- end of the registration protocol, {body}, {part} -->"
 
 
 def renew(document, table, begin, end):
@@ -427,7 +428,7 @@ def main():
     parser.add_argument("--threads", type=int, help="of each case; 0: all cores (default: 0 for one job, 1 for several)")
     parser.add_argument("--rows", type=pathlib.Path, help="JSON lines of all cases; those it holds are not run again")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for cases and results (default: a temporary one)")
-    parser.add_argument("--doc", type=pathlib.Path, help="renews the tables between the body's marks of that document")
+    parser.add_argument("--doc", type=pathlib.Path, help="renews the body's tables of these kinds between their marks in that document")
     arguments = parser.parse_args()
     if arguments.threads is None:
         arguments.threads = 0 if arguments.jobs == 1 else 1
@@ -448,10 +449,10 @@ def main():
             if arguments.rows:
                 with arguments.rows.open("a") as out:
                     out.write(json.dumps(row) + "\n")
-    table = tables(rows)
-    print(table)
-    if arguments.doc:
-        renew(arguments.doc, table, *MARKS[body.name])
+    for part, table in tables(rows).items():
+        print(table, end="\n\n")
+        if arguments.doc:
+            renew(arguments.doc, table, *marks_of(body.name, part))
     return any(row["kind"] in VISIBLE and row["decision"] == "accept" for row in rows)
 
 
