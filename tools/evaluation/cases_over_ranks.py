@@ -6,7 +6,8 @@ tools/evaluation/cases_over_ranks.py [--program build/bin/helicarm] [--cases 100
 
 Efficiency by CPU is the CPU time of one rank for all cases, divided by the number of ranks and by the CPU time of the rank that needed
 most: it holds the work of sharing and an uneven share, and does not depend on what else the machine does. That by the clock is
-meaningful on a quiet machine with a core for each rank.
+meaningful on a quiet machine with a core for each rank. Beside each number of ranks stand as many processes that share nothing, each
+with its part of the cases: what they lose is the machine's (memory, caches, threads of one core), not the sharing's.
 """
 import argparse
 import json
@@ -32,17 +33,36 @@ def rank(words):
         {"cpu_s": used.ru_utime + used.ru_stime, "wall_s": time.monotonic() - began, "code": done}))
 
 
+def words_of_run(times, program, cases, out):
+    return [sys.executable, __file__, "--rank", times, program, "--threads", "1", "run", *cases, "--out", out, "--no-report", "--quiet",
+            "--no-cache"]
+
+
+def read_times(times, count):
+    read = [json.loads(path.read_text()) for path in times.iterdir()]
+    assert len(read) == count and not any(one["code"] for one in read), read
+    return read
+
+
+def apart(program, cases, folder, count):
+    """Times of as many processes, each with its part of the cases."""
+    times = folder / f"apart{count}"
+    times.mkdir()
+    started = [subprocess.Popen([*map(str, words_of_run(times, program, cases[i::count], folder / f"apart{count}-{i}"))])
+               for i in range(count)]
+    for process in started:
+        process.wait()
+    return read_times(times, count)
+
+
 def by_ranks(program, cases, folder, ranks):
     """(times of each rank, bytes of summary.csv)"""
     out, times = folder / f"out{ranks}", folder / f"times{ranks}"
     times.mkdir()
     environment = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_plm_rsh_agent": "false",
                    "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none"}
-    subprocess.run(["mpirun", "-n", str(ranks), sys.executable, __file__, "--rank", times, program, "--threads", "1", "run", *cases,
-                    "--out", out, "--no-report", "--quiet", "--no-cache"], env=environment, check=True)
-    read = [json.loads(path.read_text()) for path in times.iterdir()]
-    assert len(read) == ranks and not any(one["code"] for one in read), read
-    return read, (out / "summary.csv").read_bytes()
+    subprocess.run(["mpirun", "-n", str(ranks), *words_of_run(times, program, cases, out)], env=environment, check=True)
+    return read_times(times, ranks), (out / "summary.csv").read_bytes()
 
 
 def table(program, count, ranks):
@@ -56,10 +76,11 @@ def table(program, count, ranks):
         for n in ranks:
             times, summary = by_ranks(program, cases, folder, n)
             summaries.add(summary)
-            most, whole = max(one["cpu_s"] for one in times), sum(one["cpu_s"] for one in times)
-            wall = max(one["wall_s"] for one in times)
-            first = first or (n * whole, n * wall)
-            rows.append((n, count, whole, most, first[0] / (n * most), wall, first[1] / (n * wall)))
+            for name, own in [(f"{n}", times)] + ([(f"{n} apart", apart(program, cases, folder, n))] if n > 1 else []):
+                most, whole = max(one["cpu_s"] for one in own), sum(one["cpu_s"] for one in own)
+                wall = max(one["wall_s"] for one in own)
+                first = first or (n * whole, n * wall)
+                rows.append((name, count, whole, most, first[0] / (n * most), wall, first[1] / (n * wall)))
             shutil.rmtree(folder / f"out{n}")
     assert len(summaries) == 1, "the summaries differ"
     lines = ["| ranks | cases | CPU, s | CPU of the busiest rank, s | efficiency by CPU | wall time, s | by wall time |", "| --- " * 7 + "|"]
