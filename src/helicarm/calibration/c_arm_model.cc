@@ -150,41 +150,39 @@ CArmModel c_arm_model(std::span<const HistoryEntry> entries, const Vector3d& nom
 
 namespace {
 
-/// Since the first of them; an entry without a date is of the first day.
-VectorXd years_of(std::span<const HistoryEntry> entries) {
+std::optional<std::chrono::sys_days> day_of(const HistoryEntry& entry) {
   using namespace std::chrono;
-  constexpr double days_a_year = 365.25;
-  std::vector<std::optional<sys_days>> days;
-  for (const HistoryEntry& entry : entries) {
-    int year_number = 0;
-    unsigned month_number = 0, day_number = 0;
-    const bool is_date =
-        std::sscanf(entry.date.c_str(), "%d-%u-%u", &year_number, &month_number, &day_number) == 3;
-    const year_month_day date{year(year_number), month(month_number), day(day_number)};
-    days.push_back(is_date && date.ok() ? std::optional(sys_days(date)) : std::nullopt);
-  }
-  std::optional<sys_days> first;
-  for (const auto& at : days)
-    if (at && (!first || *at < *first)) first = at;
-  VectorXd years = VectorXd::Zero(std::ssize(days));
-  for (std::size_t i = 0; i < days.size(); ++i)
-    if (days[i]) years[Index(i)] = double((*days[i] - *first).count()) / days_a_year;
-  return years;
+  int year_number = 0;
+  unsigned month_number = 0, day_number = 0;
+  if (std::sscanf(entry.date.c_str(), "%d-%u-%u", &year_number, &month_number, &day_number) != 3) return {};
+  const year_month_day date{year(year_number), month(month_number), day(day_number)};
+  return date.ok() ? std::optional(sys_days(date)) : std::nullopt;
 }
 
 }  // namespace
 
 std::optional<CArmDrift> c_arm_drift(const CArmModel& model) {
-  const VectorXd years = years_of(model.entries);
-  if (model.entries.empty() || years.maxCoeff() <= 0) return {};
-  MatrixXd covariance = covariance_between(model, model.entries, model.entries, true);
-  add_noise(covariance, model.entries);
+  constexpr double days_a_year = 365.25;
+  std::vector<HistoryEntry> dated;
+  std::vector<std::chrono::sys_days> days;
+  for (const HistoryEntry& entry : model.entries)
+    if (const auto day = day_of(entry)) {
+      dated.push_back(entry);
+      days.push_back(*day);
+    }
+  if (days.empty()) return {};
+  const auto [first, last] = std::ranges::minmax(days);
+  if (first == last) return {};
+  MatrixXd covariance = covariance_between(model, dated, dated, true);
+  add_noise(covariance, dated);
   MatrixXd by_year(covariance.rows(), 3);
-  for (Index i = 0; i < years.size(); ++i) by_year.middleRows<3>(3 * i) = years[i] * Matrix3d::Identity();
+  for (std::size_t i = 0; i < days.size(); ++i)
+    by_year.middleRows<3>(3 * Index(i)) =
+        double((days[i] - first).count()) / days_a_year * Matrix3d::Identity();
   const Eigen::LLT<MatrixXd> factor(covariance);
   const MatrixXd weighted = factor.solve(by_year);
   const Matrix3d of_drift = (by_year.transpose() * weighted).inverse();
-  return CArmDrift{of_drift * (weighted.transpose() * deviations(model, model.entries)),
+  return CArmDrift{of_drift * (weighted.transpose() * deviations(model, dated)),
                    of_drift.diagonal().cwiseSqrt()};
 }
 

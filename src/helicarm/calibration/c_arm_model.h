@@ -34,8 +34,8 @@ struct CArmDrift {
   Eigen::Vector3d mm_a_year, sigma;
 };
 
-/// By generalised least squares, beside sag and repeatability; nothing where all acquisitions were added on
-/// one day.
+/// By generalised least squares over the acquisitions that have a date, beside sag and repeatability; nothing
+/// where all of them were added on one day.
 std::optional<CArmDrift> c_arm_drift(const CArmModel& model);
 
 /// Joint prediction of acquisitions: three values each, in the entries' order, without their own errors.

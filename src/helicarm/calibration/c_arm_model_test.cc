@@ -154,6 +154,8 @@ TEST(CArmModel, DriftIsFoundBesideTheSag) {
       EXPECT_LT(found->sigma.x(), 2);
       for (HistoryEntry& entry : entries) entry.date = "2026-05-05";
       EXPECT_FALSE(c_arm_drift(c_arm_model(entries, arm_nominal_mm, unknown_arm)));
+      entries.front().date.clear();  // which is no other day
+      EXPECT_FALSE(c_arm_drift(c_arm_model(entries, arm_nominal_mm, unknown_arm)));
     }
   EXPECT_GE(inside, 13);
 }
