@@ -13,7 +13,9 @@
 namespace helicarm::sweep {
 namespace {
 
-constexpr double least_step_deg = 1e-3;
+// Of a step along the path: frames of a gantry that rests share a node, as shorter steps are all but rigid,
+// and their information would hide the frames'.
+constexpr double least_step_deg = 0.05;
 // Of the path's first value (mm, mm, rad) and rate per degree: far beyond any C-arm's flex.
 constexpr std::array first_sigma{100.0, 100.0, 0.5};
 constexpr std::array rate_sigma{5.0, 5.0, 0.05};
@@ -56,16 +58,30 @@ struct Problem {
   std::vector<CameraMatrix> about;  ///< (information + jitter's)^-1
   std::vector<CameraMatrix> on_path;
   std::vector<Jitter> jitter;
+  std::vector<std::size_t> node;  ///< of the chain, of each frame
   Chain chain;
   double log_determinant = 0;  ///< terms of the likelihood without residuals
 };
+
+/// Angle of the first frame of each node.
+std::vector<double> node_angles(const std::vector<PathObservation>& frames, std::vector<std::size_t>& node) {
+  std::vector<double> angles;
+  for (const PathObservation& frame : frames) {
+    if (angles.empty() || frame.angle_deg - angles.back() >= least_step_deg)
+      angles.push_back(frame.angle_deg);
+    node.push_back(angles.size() - 1);
+  }
+  return angles;
+}
 
 Problem problem_of(const std::vector<PathObservation>& frames, const PathPrior& prior,
                    const Stiffness& stiffness) {
   const CameraVector sigma = by_group(stiffness.jitter), bend = by_group(stiffness.bend);
   std::vector<CameraMatrix> about, on_path;
   std::vector<Jitter> jitters;
-  std::vector<ChainMatrix> diagonal(frames.size(), ChainMatrix::Zero()), next;
+  std::vector<std::size_t> node;
+  const std::vector<double> angles = node_angles(frames, node);
+  std::vector<ChainMatrix> diagonal(angles.size(), ChainMatrix::Zero()), next;
   double log_terms = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Jitter& jitter = jitters.emplace_back(jitter_of(frames[i], sigma));
@@ -75,15 +91,16 @@ Problem problem_of(const std::vector<PathObservation>& frames, const PathPrior& 
     const CameraMatrix reduced = jitter.information * about[i] * frames[i].information;
     on_path.emplace_back((reduced + reduced.transpose()) / 2);
     log_terms += jitter.log_determinant - sweep::log_determinant(both);
-    diagonal[i].topLeftCorner<camera_size, camera_size>() += on_path[i];
-    if (i == frames.size() / 2) diagonal[i].topLeftCorner<camera_size, camera_size>() += prior.information;
+    auto of_node = diagonal[node[i]].topLeftCorner<camera_size, camera_size>();
+    of_node += on_path[i];
+    if (i == frames.size() / 2) of_node += prior.information;
   }
   for (Eigen::Index k = 0; k < camera_size; ++k) {
     diagonal[0](k, k) += std::pow(first_sigma[std::size_t(k / 3)], -2);
     diagonal[0](camera_size + k, camera_size + k) += std::pow(rate_sigma[std::size_t(k / 3)], -2);
   }
-  for (std::size_t i = 0; i + 1 < frames.size(); ++i) {
-    const double h = std::max(least_step_deg, frames[i + 1].angle_deg - frames[i].angle_deg);
+  for (std::size_t i = 0; i + 1 < angles.size(); ++i) {
+    const double h = angles[i + 1] - angles[i];
     ChainMatrix& across = next.emplace_back(ChainMatrix::Zero());
     for (Eigen::Index k = 0; k < camera_size; ++k) {
       // Integrated random walk: covariance bend^2 [h^3/3 h^2/2; h^2/2 h] of the step.
@@ -102,8 +119,12 @@ Problem problem_of(const std::vector<PathObservation>& frames, const PathPrior& 
       log_terms += std::log(step.determinant());
     }
   }
-  Problem problem{std::move(about), std::move(on_path), std::move(jitters),
-                  Chain(std::move(diagonal), std::move(next)), 0};
+  Problem problem{std::move(about),
+                  std::move(on_path),
+                  std::move(jitters),
+                  std::move(node),
+                  Chain(std::move(diagonal), std::move(next)),
+                  0};
   problem.log_determinant = (log_terms - problem.chain.log_determinant()) / 2;
   return problem;
 }
@@ -114,15 +135,20 @@ Eigen::MatrixXd on_chain(const Eigen::MatrixXd& of_camera) {
   return right;
 }
 
-/// The path's values for observations with these values.
+/// The path's values at each frame, for observations with these values.
 std::vector<Eigen::MatrixXd> path_for(const Problem& problem, const std::vector<Eigen::MatrixXd>& values,
                                       const CameraVector* prior_gradient) {
-  std::vector<Eigen::MatrixXd> right;
+  std::vector<Eigen::MatrixXd> right(problem.node.back() + 1,
+                                     Eigen::MatrixXd::Zero(chain_size, values.front().cols()));
   for (std::size_t i = 0; i < values.size(); ++i) {
-    right.push_back(on_chain(problem.on_path[i] * values[i]));
-    if (prior_gradient && i == values.size() / 2) right[i].topRows<camera_size>() += *prior_gradient;
+    auto of_node = right[problem.node[i]].topRows<camera_size>();
+    of_node += problem.on_path[i] * values[i];
+    if (prior_gradient && i == values.size() / 2) of_node += *prior_gradient;
   }
-  return problem.chain.solve(std::move(right));
+  const auto solved = problem.chain.solve(std::move(right));
+  std::vector<Eigen::MatrixXd> path;
+  for (const std::size_t node : problem.node) path.push_back(solved[node]);
+  return path;
 }
 
 std::vector<Eigen::MatrixXd> values_of(const std::vector<PathObservation>& frames) {
@@ -212,17 +238,18 @@ SmoothPath smooth_path(const std::vector<PathObservation>& frames, const PathPri
     const PathObservation& frame = frames[i];
     PathPoint& point = smooth.points.emplace_back();
     point.path = path[i].topRows<camera_size>();
-    point.path_covariance = covariances[i].topLeftCorner<camera_size, camera_size>();
+    const ChainMatrix& covariance = covariances[problem.node[i]];
+    point.path_covariance = covariance.topLeftCorner<camera_size, camera_size>();
     // Given the path, the frame lies between it and its own value.
     const CameraMatrix& about = problem.about[i];
     const CameraMatrix to_path = about * problem.jitter[i].information;
     point.camera = about * frame.information * frame.value + to_path * point.path;
     point.camera_covariance = about + to_path * point.path_covariance * to_path.transpose();
     // The others' path: this frame's information taken from the node.
-    ChainMatrix without = covariances[i].inverse();
+    ChainMatrix without = covariance.inverse();
     without.topLeftCorner<camera_size, camera_size>() -= problem.on_path[i];
     const ChainMatrix of_others = without.inverse();
-    const ChainVector at = of_others * (covariances[i].inverse() * path[i].col(0) -
+    const ChainVector at = of_others * (covariance.inverse() * path[i].col(0) -
                                         on_chain(problem.on_path[i] * frame.value).col(0));
     const CameraVector off = frame.value - at.head<camera_size>();
     // Residual's information, the turn left free: (path's^-1 + on_path^-1)^-1 without an inverse of on_path.

@@ -19,8 +19,9 @@ struct Simulated {
   std::vector<CameraVector> cameras;
 };
 
-/// Cameras about a sinusoid, each measured with the same correlated errors.
-Simulated simulated(int count, double jitter_mm, double seed) {
+/// Cameras about a sinusoid, each measured with the same correlated errors; of a gantry that all but rests in
+/// the first frames.
+Simulated simulated(int count, double jitter_mm, double seed, int resting = 0) {
   RandomStream random{std::uint64_t(seed), 0};
   const auto normals = [&] {
     CameraVector values;
@@ -31,7 +32,8 @@ Simulated simulated(int count, double jitter_mm, double seed) {
   unit << 1, 1, 1, 1, 1, 1, 2e-3, 2e-3, 2e-3;
   Simulated made;
   for (int i = 0; i < count; ++i) {
-    const double angle = arc_deg * i / (count - 1), phase = angle * EIGEN_PI / 180;
+    const double angle = i < resting ? 1e-4 * i : arc_deg * (i - resting) / (count - resting - 1);
+    const double phase = angle * EIGEN_PI / 180;
     CameraVector camera = 2 * std::sin(phase) * unit + jitter_mm * unit.cwiseProduct(normals());
     CameraMatrix root = 0.3 * unit.asDiagonal().toDenseMatrix();
     root(3, 0) = 0.25;  // source and detector together
@@ -101,6 +103,24 @@ TEST(SmoothPath, IsNearerThanEachFrameAlone) {
     alone += (simulation.frames[i].value - simulation.cameras[i]).head<6>().squaredNorm();
   }
   EXPECT_LT(std::sqrt(smooth / alone), 0.5);
+}
+
+TEST(SmoothPath, AGantryThatRestsAtItsStartHasOnePath) {
+  constexpr int resting = 30, seeds = 8;
+  double inside = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const Simulated simulation = simulated(120, 0.1, seed, resting);
+    const Stiffness stiffness = choose_stiffness(simulation.frames, {});
+    EXPECT_NEAR(stiffness.jitter[0], 0.1, 0.06);
+    const SmoothPath path = smooth_path(simulation.frames, {}, stiffness);
+    inside += covered(simulation, path) / seeds;
+    for (std::size_t i = 0; i < resting; ++i) {
+      EXPECT_EQ(path.points[i].path, path.points.front().path);
+      EXPECT_LT(path.points[i].path_covariance(0, 0),
+                0.3 * simulation.frames.front().information.inverse()(0, 0));
+    }
+  }
+  EXPECT_GT(inside, 0.85);  // the resting frames of a run share their path's error
 }
 
 TEST(SmoothPath, AFreeTurnTakesNothingFromTheNeighbours) {
