@@ -118,6 +118,7 @@ Expected<FrameEstimate> estimate_frame(const Frame& frame, const xray::ImageFile
     estimate.primary_angle_deg = image.acquisition.primary_angle_deg;
     estimate.secondary_angle_deg = image.acquisition.secondary_angle_deg;
     estimate.source_detector_mm = image.acquisition.source_detector_mm;
+    estimate.logarithmic = image.acquisition.logarithmic;
     estimate.image = image.acquisition.instance_key;
     estimate.warnings = image.warnings;
     pipeline::RunOptions alone = options;

@@ -21,6 +21,7 @@ struct FrameEstimate {
   std::optional<double> pixel_mm;                                ///< on the detector, of a rectified pixel
   std::optional<double> primary_angle_deg, secondary_angle_deg;  ///< as the file states
   std::optional<double> source_detector_mm;                      ///< likewise
+  std::optional<bool> logarithmic;                               ///< whether the image is one, if it is known
   std::string image;                                             ///< digest of the pixels
   std::optional<rectification::DistortionMap> map;               ///< unless it is the identity
   std::optional<calibration::PlateMap> plate;                    ///< by its own plate

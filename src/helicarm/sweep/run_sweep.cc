@@ -330,6 +330,7 @@ Sweep swept(const SweepCase& the_case, const SweepOptions& options,
     return sweep;
   }
   if (is_one_run(the_case)) sweep.failure = unconfirmed(estimates, accepted);
+  if (!sweep.failure) sweep.failure = check_scale(sweep, estimates, the_case.base.calibrator);
   if (sweep.failure) {
     for (SweepFrame& frame : sweep.frames) frame.best.reset();
     return sweep;
@@ -342,6 +343,7 @@ Sweep swept(const SweepCase& the_case, const SweepOptions& options,
   if (!sweep.failure) sweep.acquisitions = acquisitions_of(estimates, the_case, sweep.frames);
   compare_angles(sweep);
   compare_distance(sweep, estimates);
+  note_scale(sweep, the_case.base.calibrator);
   warn_of_refused(sweep);
   warn_of_doubtful(sweep);
   return sweep;

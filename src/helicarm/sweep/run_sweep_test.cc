@@ -99,6 +99,26 @@ TEST(RunSweep, BallWhoseCoordinatesAreWrongIsNamed) {
   EXPECT_EQ(std::ranges::count(sweep.warnings, Reason::ball_displaced, &Warning::reason), 1);
 }
 
+TEST(RunSweep, ACalibratorOfAnotherSizeThanItsBallsShowIsWarnedOf) {
+  const TemporaryFolder folder;
+  DrawnRun run;
+  run.frames = 8;
+  run.write(folder.path());
+  const auto is_of_scale = [](const Warning& warning) { return warning.reason == Reason::scale_disagrees; };
+  const Sweep right = *run_sweep(*read_sweep_case(folder.path()));
+  EXPECT_TRUE(std::ranges::none_of(right.warnings, is_of_scale));
+  EXPECT_EQ(std::ranges::count(right.notes, Reason::scale_unverified, &Warning::reason), 1);
+  Json calibrator = *read_json(folder.path() / "calibrator.json");
+  for (Json& ball : calibrator["balls"])
+    for (Json& coordinate : ball["xyz_mm"]) coordinate = 1.2 * coordinate.get<double>();
+  ASSERT_TRUE(write_file(folder.path() / "calibrator.json", calibrator.dump()));
+  const Sweep wrong = *run_sweep(*read_sweep_case(folder.path()));
+  ASSERT_FALSE(wrong.failure) << wrong.failure->message;
+  const auto warned = std::ranges::find_if(wrong.warnings, is_of_scale);
+  ASSERT_NE(warned, wrong.warnings.end());
+  EXPECT_NEAR(warned->figures.at("file_over_true"), 1.2, 0.06);
+}
+
 TEST(RunSweep, FromAMotionOfThePhantomOnTheImagesAreRefused) {
   DrawnRun run;
   run.frames = 26;

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/pipeline/diagnosis/calibrator_checks.h"
 #include "helicarm/sweep/joint_estimate.h"
 
 namespace helicarm::sweep {
@@ -26,6 +27,31 @@ void compare_distance(Sweep& sweep, const std::vector<FrameEstimate>& estimates)
            found_mm, stated_mm),
        {},
        {{"found_mm", found_mm}, {"stated_mm", stated_mm}}});
+}
+
+std::optional<Failure> check_scale(Sweep& sweep, const std::vector<FrameEstimate>& estimates,
+                                   const phantom::Calibrator& calibrator) {
+  pipeline::DiameterEvidence diameters;
+  for (const FrameEstimate& at : estimates)
+    if (!at.failure) diameters.add(at.alone->view, at.fiducials.fiducials, calibrator, at.logarithmic);
+  auto disagreement = pipeline::scale_disagreement(diameters.scale(), calibrator);
+  if (!disagreement) return std::nullopt;
+  if (disagreement->is_certain) return std::move(disagreement->failure);
+  sweep.warnings.push_back(std::move(disagreement->failure));
+  return std::nullopt;
+}
+
+void note_scale(Sweep& sweep, const phantom::Calibrator& calibrator) {
+  if (calibrator.scale_sigma > 0 || !sweep.path || !(sweep.path->source_to_axis_mm > 0)) return;
+  const double per_cent_mm = 0.01 * sweep.path->source_to_axis_mm;
+  sweep.notes.push_back(
+      {Reason::scale_unverified,
+       fmt::format("images do not show the calibrator's absolute size: an error of 1 % of its file changes "
+                   "all lengths by 1 %, the source's distance from the axis by {:.1f} mm. Measure it and "
+                   "state scale_sigma, or compare that distance with a tape measure: {:.0f} mm",
+                   per_cent_mm, sweep.path->source_to_axis_mm),
+       {},
+       {{"mm_per_per_cent", per_cent_mm}}});
 }
 
 void compare_angles(Sweep& sweep) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "helicarm/phantom/calibrator.h"
@@ -12,6 +13,14 @@ namespace helicarm::sweep {
 
 /// Warns where the source distance that the images show with the stated pixel size is not the stated one.
 void compare_distance(Sweep& sweep, const std::vector<FrameEstimate>& estimates);
+
+/// Warns where the diameters of the balls' images contradict the calibrator's size; returns the refusal where
+/// they are certain to. By each accepted image alone.
+std::optional<Failure> check_scale(Sweep& sweep, const std::vector<FrameEstimate>& estimates,
+                                   const phantom::Calibrator& calibrator);
+
+/// Notes what an error of the calibrator's size, which the images do not show, does to the run.
+void note_scale(Sweep& sweep, const phantom::Calibrator& calibrator);
 
 /// Warns where the angles that the file states are not those of the images.
 void compare_angles(Sweep& sweep);

@@ -71,27 +71,6 @@ std::optional<Failure> check_labels(const CaseCalibration& calibration,
   return std::nullopt;
 }
 
-/// By the mean over all used fiducials of ln(measured / expected radius at the fiducial's distance).
-ScaleEvidence by_diameters(const calibration::CalibrationResult& calibration,
-                           const std::vector<LabelledView>& images, const phantom::Calibrator& calibrator) {
-  double sum = 0, sigmas = 0, count = 0;
-  for (std::size_t i = 0; i < calibration.views.size(); ++i)
-    for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
-      const fiducials::Fiducial& ball = calibration.fiducials[i][k];
-      if (ball.status != fiducials::FiducialStatus::used || !(ball.radius_px > 0)) continue;
-      const geometry::View& view = calibration.views[i].view;
-      const double expected = 0.5 * calibrator.balls[k].diameter_mm * view.intrinsics.fy /
-                              view.depth(calibrator.balls[k].centre_in_calibrator);
-      const DiameterError error =
-          diameter_error(ball.radius_px, images[i].xray_image->acquisition.logarithmic);
-      sum += std::log(ball.radius_px / (1 + error.bias) / expected);
-      sigmas += error.sigma;
-      ++count;
-    }
-  if (count == 0) return {};
-  return {sum / count, sigmas / count};
-}
-
 }  // namespace
 
 bool is_mirrored_without_statement(bool is_mirrored, const xray::XrayImage& xray_image,
@@ -108,6 +87,39 @@ DiameterError diameter_error(double radius_px, std::optional<bool> logarithmic) 
   return {-share * loss, std::hypot(of_diameter, loss / 2)};
 }
 
+void DiameterEvidence::add(const geometry::View& view, std::span<const fiducials::Fiducial> fiducials,
+                           const phantom::Calibrator& calibrator, std::optional<bool> logarithmic) {
+  for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
+    const fiducials::Fiducial& ball = fiducials[k];
+    if (ball.status != fiducials::FiducialStatus::used || !(ball.radius_px > 0)) continue;
+    const double expected = 0.5 * calibrator.balls[k].diameter_mm * view.intrinsics.fy /
+                            view.depth(calibrator.balls[k].centre_in_calibrator);
+    const DiameterError error = diameter_error(ball.radius_px, logarithmic);
+    sum_ += std::log(ball.radius_px / (1 + error.bias) / expected);
+    sigmas_ += error.sigma;
+    ++count_;
+  }
+}
+
+ScaleEvidence DiameterEvidence::scale() const {
+  if (count_ == 0) return {};
+  return {sum_ / count_, sigmas_ / count_};
+}
+
+std::optional<ScaleDisagreement> scale_disagreement(const ScaleEvidence& scale,
+                                                    const phantom::Calibrator& calibrator) {
+  const double sigma = std::hypot(scale.sigma, calibrator.scale_sigma);
+  if (!(scale.sigma > 0) || std::abs(scale.excess) <= warn_sigmas * sigma) return std::nullopt;
+  return ScaleDisagreement{
+      {Reason::scale_disagrees,
+       fmt::format("the fiducials' diameters imply that the calibrator is {:.1f} % {} than in its file "
+                   "(+-{:.1f} %): check coordinates, diameters and pixel size",
+                   100 * std::abs(scale.excess), scale.excess > 0 ? "smaller" : "larger", 100 * sigma),
+       {},
+       {{"file_over_true", 1 + scale.excess}, {"sigma", sigma}}},
+      std::abs(scale.excess) > refuse_sigmas * sigma};
+}
+
 ScaleEvidence combined(const ScaleEvidence& a, const ScaleEvidence& b) {
   if (!(a.sigma > 0)) return b;
   if (!(b.sigma > 0)) return a;
@@ -118,7 +130,11 @@ ScaleEvidence combined(const ScaleEvidence& a, const ScaleEvidence& b) {
 ScaleEvidence scale_evidence(const calibration::CalibrationResult& calibration,
                              const std::vector<LabelledView>& images, const phantom::Calibrator& calibrator) {
   if (calibration.joint_covariance.size() == 0) return {};  // `--method paper`: its circles' radii are rough
-  ScaleEvidence evidence = by_diameters(calibration, images, calibrator);
+  DiameterEvidence diameters;
+  for (std::size_t i = 0; i < calibration.views.size(); ++i)
+    diameters.add(calibration.views[i].view, calibration.fiducials[i], calibrator,
+                  images[i].xray_image->acquisition.logarithmic);
+  ScaleEvidence evidence = diameters.scale();
   for (std::size_t i = 0; i < images.size(); ++i)
     if (const auto& stated = images[i].xray_image->acquisition.source_patient_mm)
       evidence =
@@ -139,18 +155,10 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
                                     "different amounts in the views",
                                     assumed->name,
                                     {{"variance_scale", calibration.variance_scale}}});
-  const ScaleEvidence scale = scale_evidence(calibration, images, the_case.calibrator);
-  const double sigma = std::hypot(scale.sigma, the_case.calibrator.scale_sigma);
-  if (scale.sigma > 0 && std::abs(scale.excess) > warn_sigmas * sigma) {
-    Failure disagreement{
-        Reason::scale_disagrees,
-        fmt::format("the fiducials' diameters imply that the calibrator is {:.1f} % {} than in its file "
-                    "(+-{:.1f} %): check coordinates, diameters and pixel size",
-                    100 * std::abs(scale.excess), scale.excess > 0 ? "smaller" : "larger", 100 * sigma),
-        {},
-        {{"file_over_true", 1 + scale.excess}, {"sigma", sigma}}};
-    if (std::abs(scale.excess) > refuse_sigmas * sigma)
-      return tl::unexpected<Failure>(std::move(disagreement));
+  if (auto scale =
+          scale_disagreement(scale_evidence(calibration, images, the_case.calibrator), the_case.calibrator)) {
+    Failure& disagreement = scale->failure;
+    if (scale->is_certain) return tl::unexpected<Failure>(std::move(disagreement));
     if (calibration.found_tolerance_mm > 0)
       return tl::unexpected<Failure>(
           {Reason::calibrator_mismatch,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "helicarm/pipeline/calibrate_case.h"
@@ -23,6 +24,29 @@ struct DiameterError {
   double sigma = 0;
 };
 DiameterError diameter_error(double radius_px, std::optional<bool> logarithmic);
+
+/// Of balls' images in any number of views: the mean of ln(measured / expected radius at the ball's
+/// distance), over the fiducials in use.
+class DiameterEvidence {
+ public:
+  /// `fiducials`: one per ball of the calibrator.
+  void add(const geometry::View& view, std::span<const fiducials::Fiducial> fiducials,
+           const phantom::Calibrator& calibrator, std::optional<bool> logarithmic);
+  ScaleEvidence scale() const;
+
+ private:
+  double sum_ = 0, sigmas_ = 0, count_ = 0;
+};
+
+/// `scale_disagrees`; certain beyond ten sigma.
+struct ScaleDisagreement {
+  Failure failure;
+  bool is_certain;
+};
+
+/// Where the file's scale deviates from the evidence by three sigma of both.
+std::optional<ScaleDisagreement> scale_disagreement(const ScaleEvidence& scale,
+                                                    const phantom::Calibrator& calibrator);
 
 /// Of Distance Source to Patient as the distance of the calibrator from the source.
 inline constexpr double patient_distance_sigma_mm = 60;
