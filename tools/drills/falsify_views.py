@@ -3,6 +3,8 @@
 """Labels of simulated views of flat, symmetric and helical phantoms with 6 to 18 balls, and whether they can be decided.
 
   tools/drills/falsify_views.py                                    10,000 views of build/bin/shaped_views
+  tools/drills/falsify_views.py --coded                            of balls of two sizes: a helix of 24, a cylinder of 108; up
+                                                                   to a third hidden, one size misread in half of the views
   tools/drills/falsify_views.py --views 300 --seed 2 --list        fewer; lists what is not solved although decided
   tools/drills/falsify_views.py --doc docs/method.md               renews the table between the marks of that document
 
@@ -29,6 +31,7 @@ from label_evaluator import View, evaluated  # noqa: E402
 REQUIRED = 9.2
 NOT_EVALUATED = (None, "", math.nan)
 SHAPES = ("flat", "symmetric", "helical")
+CODED = ("helix of two sizes", "108-ball cylinder")
 
 
 def judged(job):
@@ -48,7 +51,7 @@ def decided_and_solved(rows):
     """Numbers of decided views, and of the solved ones among them; of each shape, the solved views that are not evaluated
     count as those that are."""
     decided = solved = 0
-    for shape in SHAPES:
+    for shape in SHAPES + CODED:
         own = [row for row in rows if row[1] == shape]
         evaluated_right = [row for row in own if is_solved(row) and row[3] is not None]
         share = sum(map(is_solved, own)) / max(1, len(evaluated_right))
@@ -73,6 +76,7 @@ def line_of(name, rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--views", type=int, default=10000)
+    parser.add_argument("--coded", action="store_true", help="phantoms of two sizes of balls")
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--every", type=int, default=1, metavar="N",
@@ -81,7 +85,8 @@ def main():
     parser.add_argument("--doc", type=Path)
     parser.add_argument("--program", default=str(Path(__file__).resolve().parents[2] / "build/bin/shaped_views"))
     options = parser.parse_args()
-    printed = subprocess.run([options.program, str(options.seed), "0", str(options.views)], check=True,
+    kind = ["coded"] if options.coded else []
+    printed = subprocess.run([options.program, str(options.seed), "0", str(options.views), *kind], check=True,
                              capture_output=True, text=True).stdout
     jobs = [(number, options.seed, line, options.every) for number, line in enumerate(printed.splitlines())]
     with ProcessPoolExecutor(options.jobs) as pool:
@@ -91,10 +96,12 @@ def main():
             print(number, shape, verdict, f"{over:.1f} over {rival}, {of_found:.1f}")
     lines = ["| phantom | views | wrong | solved | imitated | refused | evaluated | rival within 9.2 | decided | of these solved | |",
              "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
-             *(line_of(shape, [row for row in rows if row[1] == shape]) for shape in SHAPES), line_of("all", rows)]
+             *(line_of(shape, [row for row in rows if row[1] == shape]) for shape in (CODED if options.coded else SHAPES)),
+             line_of("all", rows)]
     print(*lines, sep="\n")
     if options.doc:
-        text, begin, end = options.doc.read_text(), "<!-- shaped-views -->", "<!-- /shaped-views -->"
+        text = options.doc.read_text()
+        begin, end = (f"<!-- {slash}{'coded' if options.coded else 'shaped'}-views -->" for slash in ("", "/"))
         options.doc.write_text(text.split(begin)[0] + begin + "\n" + "\n".join(lines) + "\n" + end + text.split(end)[1])
     decided, solved = decided_and_solved(rows)
     sys.exit(any(row[2] == "wrong" for row in rows) or solved < 0.99 * decided)

@@ -4,7 +4,8 @@
 The phantom is posed on all ordered triples of balls and on so many triples of candidates that a labelling of one
 fiducial less than the true one is missed with a probability of 0.01, in both handednesses unless it is known (P3P by
 Newton's method). Poses that further candidates support are matched and refitted (pose, focal length, principal point),
-and their log odds are those of docs/method.md (Evidence). S labellings are computed at once."""
+and their log odds are those of docs/method.md (Evidence). S labellings are computed at once. A screw of many balls is posed
+by what maps the screw onto itself instead (steps along it, and reversed), also reversed in depth and mirrored."""
 import itertools
 import json
 import math
@@ -12,6 +13,7 @@ import math
 import numpy as np
 
 LEAST, GATE_PX = 6, 15.0
+MOST_EXHAUSTIVE = 30  # balls
 RECTIFICATION_PX = 0.2  # sigma that the program assumes for any rectification
 LOG_2PI = math.log(2 * math.pi)
 
@@ -278,10 +280,44 @@ def all_poses(view, least, random):
         translation = there[:, 0] - np.einsum("sij,sj->si", rotation, corners[good][:, 0])
         poses = Poses(view, rotation, translation, np.full(len(rotation), sign))
         parts.append(poses[support(view, poses) >= least])
-    joined = parts[0][:]
-    for name in joined.__dict__:
-        setattr(joined, name, np.concatenate([getattr(part, name) for part in parts]))
-    return joined
+    return joined(parts)
+
+
+def screw_poses(view, true_pose):
+    """The true labels' pose after each congruence of the endless screw on which the balls lie, in the handednesses that are open;
+    mirrored poses are reversed in depth, which far from the source shows the same image."""
+    rotation, translation = true_pose.rotation[0], true_pose.translation[0]
+    n = len(view.balls)
+    angle = np.unwrap(np.arctan2(view.balls[:, 1] + view.centroid[1], view.balls[:, 0] + view.centroid[0]))
+    turn, step = (angle[-1] - angle[0]) / (n - 1), (view.balls[-1, 2] - view.balls[0, 2]) / (n - 1)
+    axis = np.array([-view.centroid[0], -view.centroid[1], 0])  # a place on the axis; balls are from their centroid
+    half = axis + np.array([np.cos(angle.mean()), np.sin(angle.mean()), 0])
+    moves = []
+    for k in range(1 - n, n):
+        c, s = np.cos(k * turn), np.sin(k * turn)
+        along = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        moves.append((along, axis + np.array([0, 0, k * step]) - along @ axis))
+        direction = half - axis
+        reverse = 2 * np.outer(direction, direction) - np.eye(3)  # a half turn about the middle ball's radius
+        moves.append((along @ reverse, axis + np.array([0, 0, k * step]) - along @ reverse @ axis))
+    parts = []
+    for sign in view.signs:
+        depth = np.eye(3) if sign == view.sign else np.diag([-1.0, 1.0, -1.0])
+        aside = np.array([sign * view.sign, 1, 1])
+        turned = np.array([depth @ rotation @ r for r, _ in moves])
+        centres = np.array([translation + rotation @ t for _, t in moves])
+        off = centres - translation
+        poses = Poses(view, turned, aside * translation + off @ depth.T, np.full(len(moves), sign))
+        poses.focal[:], poses.principal[:] = true_pose.focal, true_pose.principal
+        parts.append(poses)
+    return joined(parts)
+
+
+def joined(parts):
+    whole = parts[0][:]
+    for name in whole.__dict__:
+        setattr(whole, name, np.concatenate([getattr(part, name) for part in parts]))
+    return whole
 
 
 def support(view, poses):
@@ -302,14 +338,15 @@ def distinct(poses, labels):
     return poses[first], labels[first]
 
 
-def rivals(view, random):
+def rivals(view, random, true_pose):
     """Labellings with their fitted poses and log odds: a list of (labels (S, b), poses, odds (S,))."""
     least = max(LEAST - 1, int((view.truth >= 0).sum()) - 1)
-    poses = all_poses(view, max(LEAST - 1, least - 2), random)
+    poses = screw_poses(view, true_pose) if len(view.balls) > MOST_EXHAUSTIVE else all_poses(view, max(LEAST - 1, least - 2), random)
     if poses is None or not len(poses.sign):
         return []
     labels = nearest(view, poses, GATE_PX)
-    poses, labels = distinct(poses, labels)
+    keep = (labels >= 0).sum(1) >= LEAST - 1
+    poses, labels = distinct(poses[keep], labels[keep])
     for gate in (15, 10, 6, 3):
         poses = fit(view, poses, labels, 4, gate / 3)
         labels = nearest(view, poses, gate)
@@ -355,7 +392,7 @@ def evaluated(view, random):
     least, kind = truth, "chance"
     found = view.json.get("labelling")
     of_found = truth if found else math.nan
-    for labels, poses, odds in rivals(view, random):
+    for labels, poses, odds in rivals(view, random, pose):
         for k in np.argsort(-odds):
             if truth - odds[k] < least and contradicts(view, labels[k], poses.sign[k], excluded):
                 least, kind = truth - float(odds[k]), "other labels" if poses.sign[k] == view.sign else "mirrored"

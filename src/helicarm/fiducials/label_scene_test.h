@@ -58,7 +58,7 @@ inline SyntheticImage image_of(const phantom::Calibrator& calibrator,
   return view_image;
 }
 
-enum class Shape { flat, symmetric, helical };
+enum class Shape { flat, symmetric, helical, coded_helix, cylinder };
 
 /// Balls at random in a slab, in pairs (exact reflections or half turns), or on the conical helix.
 inline phantom::Calibrator shaped(Shape shape, int balls, RandomStream& random) {
@@ -102,6 +102,46 @@ inline ShapedView shaped_view(std::uint64_t seed, std::uint64_t number) {
       image_of(view.calibrator, {.hidden = hidden, .outliers = outliers, .noise_px = view.noise_px}, random);
   for (BallCandidate& candidate : view.image.candidates) candidate.own_sigma_px = view.noise_px;
   if (random.index(3) == 0) view.prior.mirrored = view.image.mirrored();
+  return view;
+}
+
+/// Balls of two sizes at random on a screw: 24 on two and a half turns, or 108 on the cylinder of 67 mm of
+/// the published phantom, where a step along is nearly a congruence.
+inline phantom::Calibrator coded(Shape shape, RandomStream& random) {
+  const bool is_cylinder = shape == Shape::cylinder;
+  const int balls = is_cylinder ? 108 : 24;
+  const double radius_mm = is_cylinder ? 67 : 55, turn_deg = is_cylinder ? 9 : 37.5,
+               step_mm = is_cylinder ? 1.308411215 : 120 / 23.0;
+  phantom::Calibrator calibrator{"coded", {}, {}};
+  for (int k = 0; k < balls; ++k) {
+    const double t = turn_deg * k * pi / 180;
+    const Eigen::Vector3d centre(radius_mm * std::cos(t), radius_mm * std::sin(t), step_mm * k);
+    calibrator.balls.push_back({fmt::format("B{}", k), centre, random.index(2) == 0 ? 3.2 : 2.0});
+  }
+  return calibrator;
+}
+
+/// Up to a third of the balls hidden, up to eight false candidates, centres with noise of 0.05 to 0.5 px; in
+/// half of the views one ball's size is read as the other. The handedness is known in one view of three.
+inline ShapedView coded_view(std::uint64_t seed, std::uint64_t number) {
+  RandomStream random(seed, 91, number);
+  const Shape shape = number % 2 == 0 ? Shape::coded_helix : Shape::cylinder;
+  ShapedView view{shape, coded(shape, random), nominal, 0.05 * std::pow(10, random.uniform()), {}};
+  const auto third = static_cast<std::uint32_t>(view.calibrator.balls.size() / 3);
+  const int hidden = static_cast<int>(random.index(third + 1)), outliers = static_cast<int>(random.index(9));
+  view.image =
+      image_of(view.calibrator, {.hidden = hidden, .outliers = outliers, .noise_px = view.noise_px}, random);
+  for (BallCandidate& candidate : view.image.candidates) candidate.own_sigma_px = view.noise_px;
+  if (random.index(3) == 0) view.prior.mirrored = view.image.mirrored();
+  if (random.index(2) == 0) {
+    const std::size_t i = random.index(static_cast<std::uint32_t>(view.image.detections.size()));
+    if (simulation::SyntheticDetection& seen = view.image.detections[i]; seen.ball >= 0) {
+      const bool is_large = view.calibrator.balls[std::size_t(seen.ball)].diameter_mm > 3;
+      seen.radius_px *= is_large ? 2.0 / 3.2 : 3.2 / 2.0;
+      seen.ball = -1;
+      view.image.candidates[i].radius_px = seen.radius_px;
+    }
+  }
   return view;
 }
 

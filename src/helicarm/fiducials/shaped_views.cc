@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints simulated views of flat, symmetric and helical phantoms, the truth and the labels found, one JSON
-// object per line, for tools/drills/falsify_views.py. Usage: shaped_views SEED FIRST END
+// Prints simulated views of flat, symmetric and helical phantoms, or of coded ones (balls of two sizes), the
+// truth and the labels found, one JSON object per line, for tools/drills/falsify_views.py. Usage:
+// shaped_views SEED FIRST END [coded]
 #include <cstdio>
 #include <cstdlib>
+#include <string_view>
 
 #include "helicarm/core/json.h"
 #include "helicarm/fiducials/label_scene_test.h"
@@ -15,7 +17,7 @@ using namespace helicarm::fiducials;
 Json vector(const auto& values) { return Json(std::vector<double>(values.begin(), values.end())); }
 
 Json json_of(const label_scene::ShapedView& view) {
-  constexpr std::array names{"flat", "symmetric", "helical"};
+  constexpr std::array names{"flat", "symmetric", "helical", "helix of two sizes", "108-ball cylinder"};
   const geometry::View& camera = view.image.view;
   Json json{{"shape", names[static_cast<std::size_t>(view.shape)]},
             {"visible", view.image.visible},
@@ -54,8 +56,10 @@ Json json_of(const label_scene::ShapedView& view) {
 }  // namespace
 
 int main(int count, char** arguments) {
-  if (count != 4) return 2;
+  const bool are_coded = count == 5 && std::string_view(arguments[4]) == "coded";
+  if (count != 4 && !are_coded) return 2;
   const auto number = [&](int i) { return std::strtoull(arguments[i], nullptr, 10); };
+  const auto view_of = are_coded ? label_scene::coded_view : label_scene::shaped_view;
   for (auto i = number(2); i < number(3); ++i)
-    std::printf("%s\n", json_of(label_scene::shaped_view(number(1), i)).dump().c_str());
+    std::printf("%s\n", json_of(view_of(number(1), i)).dump().c_str());
 }
