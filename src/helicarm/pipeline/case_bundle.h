@@ -21,8 +21,10 @@ inline constexpr std::array<std::string_view, 11> packed_keys{
     "picks",  "tunnels",    "poses_now", "tracker", "tool_lines"};
 inline constexpr std::array<std::string_view, 6> unpacked_keys{"models", "notes",       "markers",
                                                                "bodies", "calibration", "frame_rate_hz"};
-inline constexpr std::array<std::string_view, 9> packed_view_keys{
-    "name", "image", "frame", "plate_image", "map", "mirrored", "poses", "pixel_mm", "source_detector_mm"};
+inline constexpr std::array<std::string_view, 11> packed_view_keys{
+    "name",         "image", "frame",    "plate_image",        "map",
+    "mirrored",     "poses", "pixel_mm", "source_detector_mm", "primary_deg",
+    "secondary_deg"};
 /// Of cases of a run or of given cameras, which are not measured.
 inline constexpr std::array<std::string_view, 4> unpacked_view_keys{"camera", "calibration", "frames",
                                                                     "frame_offset"};

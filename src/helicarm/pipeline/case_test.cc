@@ -63,6 +63,17 @@ TEST_F(CaseFile, PixelSizeAndSourceDistanceOfAViewAreRead) {
   EXPECT_EQ(failure().reason, Reason::bad_value);
 }
 
+TEST_F(CaseFile, PositionerAnglesOfAViewAreStatedTogether) {
+  json_["views"][1].update({{"primary_deg", 90}, {"secondary_deg", 0}});
+  const auto read_back = read();
+  ASSERT_TRUE(read_back.has_value()) << read_back.error().message;
+  EXPECT_FALSE(read_back->views[0].primary_deg);
+  EXPECT_EQ(read_back->views[1].primary_deg, 90);
+  EXPECT_EQ(read_back->views[1].secondary_deg, 0);
+  json_["views"][1].erase("secondary_deg");
+  EXPECT_NE(failure().message.find("secondary_deg"), std::string::npos);
+}
+
 TEST_F(CaseFile, WrittenCaseReadsBackEqual) {
   json_["bones"] = {"L4", "pelvis"};
   for (Json& pick : json_["picks"]) pick.erase("moves_with");
