@@ -16,6 +16,7 @@ namespace {
 struct CArmAddArguments {
   std::filesystem::path record;
   std::vector<std::filesystem::path> cases;
+  std::optional<std::string> date;
 };
 
 struct CArmReportArguments {
@@ -36,19 +37,21 @@ pipeline::CArmAcquisitions acquisitions_of(const std::filesystem::path& from, Co
 
 CommandResult c_arm_add_command(const CArmAddArguments& arguments, Console& console) {
   return guarded([&] {
+    if (arguments.date) value_or_throw(calibration::check_acquisition_day(*arguments.date));
     value_or_throw(calibration::check_history_file(arguments.record));
     for (const std::filesystem::path& folder : arguments.cases)  // before anything is added
       if (!std::filesystem::exists(folder))
         throw BadInput(Reason::missing_file, fmt::format("{}: no such file or folder", folder.string()));
     Json added = Json::array();
     for (const std::filesystem::path& folder : arguments.cases) {
-      const auto growth = value_or_throw(guarded([&] {
-                                           return value_or_throw(pipeline::add_to_record(
-                                               arguments.record, acquisitions_of(folder, console)));
-                                         }).map_error([&](Failure failure) {
-        failure.message = fmt::format("{}: {}", folder.string(), failure.message);
-        return failure;
-      }));
+      const auto growth =
+          value_or_throw(guarded([&] {
+                           return value_or_throw(pipeline::add_to_record(
+                               arguments.record, acquisitions_of(folder, console), arguments.date));
+                         }).map_error([&](Failure failure) {
+            failure.message = fmt::format("{}: {}", folder.string(), failure.message);
+            return failure;
+          }));
       added.push_back({{"case", folder.string()}, {"earlier", growth.earlier}, {"added", growth.added}});
       if (!console.json)
         console.out << fmt::format("{}: {} acquisitions added to {}\n", folder.string(), growth.added,
@@ -119,6 +122,11 @@ void add_c_arm(CLI::App& app, Action& action) {
   add->add_option("CASE", added.cases,
                   "Folders that hold case.json (measured now), or results: result.json, sweep.json")
       ->required();
+
+  add->add_option(
+      "--date", added.date,
+      "Day on which they were acquired, like 2026-11-26 (default: today; images' dates are not read, "
+      "as a record names no patient's)");
 
   auto* report = command->add_subcommand(
       "report", "Sag, repeatability and every acquisition, as a page, a PDF to sign and a table");

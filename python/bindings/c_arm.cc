@@ -23,12 +23,13 @@ py::object check_c_arm(const std::filesystem::path& record, const std::filesyste
 }
 
 std::size_t add_to_c_arm(const std::filesystem::path& record, const std::filesystem::path& folder,
-                         unsigned threads) {
+                         const std::optional<std::string>& date, unsigned threads) {
   return value_or_raise(without_gil([&] {
     return guarded([&] {
+      if (date) value_or_throw(calibration::check_acquisition_day(*date));
       value_or_throw(calibration::check_history_file(record));
       const auto acquired = value_or_throw(pipeline::c_arm_acquisitions(folder, threads));
-      return value_or_throw(pipeline::add_to_record(record, acquired)).added;
+      return value_or_throw(pipeline::add_to_record(record, acquired, date)).added;
     });
   }));
 }
@@ -56,11 +57,11 @@ each acquisition estimate_mm, predicted_mm, sigma_mm (source distance, principal
 RefusedError, with c_arm_changed and the same figures in .result where the C-arm has changed.)");
   module.def(
       "add_to_c_arm", &add_to_c_arm, py::arg("record"), py::arg("folder"), py::kw_only(),
-      py::arg("threads") = 0u,
+      py::arg("date") = py::none(), py::arg("threads") = 0u,
       R"(Adds the acquisitions of a case to a C-arm's record, each once, as `helicarm c-arm add` does; returns how many.
 
-record: a file, made where there is none. folder: holds case.json; or a result.json or sweep.json. Raises InputError;
-RefusedError, with c_arm_changed where they lie beyond what the record predicts: nothing is added.)");
+record: a file, made where there is none. folder: holds case.json; or a result.json or sweep.json. date: of the
+acquisitions, like 2026-11-26 (default: today). Raises InputError; RefusedError, with c_arm_changed where they lie beyond what the record predicts: nothing is added.)");
   module.def(
       "c_arm_report", &c_arm_report, py::arg("record"), py::kw_only(), py::arg("out") = py::none(),
       R"(Sag and repeatability of a C-arm by its record, and each acquisition beside the prediction by all others.

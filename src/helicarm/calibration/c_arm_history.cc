@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <ctime>
 
 #include <Eigen/LU>
@@ -37,7 +38,7 @@ double variance(double first, double observed, double n) {
   return (prior_weight * first * first + observed) / (prior_weight + n);
 }
 
-std::string today() { return fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))); }
+std::string today_utc() { return fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))); }
 
 void check_information(const Matrix3d& information, const JsonReader& reader) {
   if (!(geometry::symmetric_eigen(information).values[0] > 0) ||
@@ -62,7 +63,9 @@ void describe_acquisition(Codec& codec, Entry& entry) {
   codec.number("secondary_deg", entry.secondary_deg, {-360, 360}, "likewise");
   codec.custom(
       "date", false, {{"type", "string"}},
-      "day on which it was added, UTC (`2026-11-26`); `null` in files of earlier versions",
+      "day of the acquisition as it was told, else on which it was added, UTC (`2026-11-26`); `null` in "
+      "files of "
+      "earlier versions",
       [&](JsonReader& reader) {
         if constexpr (!std::is_const_v<Entry>) entry.date = reader.optional_text("date").value_or("");
       },
@@ -101,7 +104,7 @@ void describe_acquisitions(Codec& codec, const char* key, bool required, Entries
 template <class Codec, class Run>
 void describe_run(Codec& codec, Run& run) {
   codec.text("run", run.run, "digest of its first image, so that each run is added only once", {0, 200});
-  codec.text("date", run.date, "day on which it was added, UTC", {0, 20});
+  codec.text("date", run.date, "its day, likewise", {0, 20});
   codec.integer("images", run.images, 1, 1000, "accepted");
   codec.number("arc_deg", run.arc_deg, {0, 3600}, "between the first and the last image");
   codec.number("radius_mm", run.radius_mm, {0, 1e4}, "from the isocentre to the farthest central ray");
@@ -273,22 +276,36 @@ std::size_t add_entries(CArmHistory& history, std::span<const HistoryEntry> entr
   return history.entries.size() - earlier;
 }
 
+std::optional<std::chrono::sys_days> day_of(const std::string& date) {
+  using namespace std::chrono;
+  int year_number = 0, read = 0;
+  unsigned month_number = 0, day_number = 0;
+  if (std::sscanf(date.c_str(), "%4d-%2u-%2u%n", &year_number, &month_number, &day_number, &read) != 3 ||
+      read != 10 || date.size() != 10)
+    return {};
+  const year_month_day of{year(year_number), month(month_number), day(day_number)};
+  return of.ok() ? std::optional(sys_days(of)) : std::nullopt;
+}
+
 Expected<HistoryGrowth> add_to_history(const std::filesystem::path& path,
                                        std::span<const HistoryEntry> entries,
-                                       const std::optional<RunIsocentre>& run) {
+                                       const std::optional<RunIsocentre>& run,
+                                       const std::optional<std::string>& date) {
   return guarded([&] {
+    const std::string day = date.value_or(today_utc());
+    value_or_throw(check_acquisition_day(day));
     value_or_throw(check_history_file(path));
     const FileLock lock = value_or_throw(FileLock::of(path));
     CArmHistory history = value_or_throw(history_at(lock.file()));
     const bool is_new = !std::filesystem::exists(lock.file());
     const Json before = to_json(history);
     std::vector<HistoryEntry> dated(entries.begin(), entries.end());
-    for (HistoryEntry& entry : dated) entry.date = today();
+    for (HistoryEntry& entry : dated) entry.date = day;
     HistoryGrowth growth{history.entries.size(), add_entries(history, dated), is_new};
     forget_old_maps(history);
     if (run && std::ranges::find(history.runs, run->run, &RunIsocentre::run) == history.runs.end()) {
       history.runs.push_back(*run);
-      history.runs.back().date = today();
+      history.runs.back().date = day;
     }
     if (history.entries.size() > most_entries)
       throw BadInput(Reason::cannot_write,
@@ -298,6 +315,12 @@ Expected<HistoryGrowth> add_to_history(const std::filesystem::path& path,
     if (is_new || after != before) value_or_throw(write_file(lock.file(), to_text(after) + "\n"));
     return growth;
   });
+}
+
+Expected<void> check_acquisition_day(const std::string& date) {
+  const std::string today = today_utc();
+  if (day_of(date) && date <= today) return {};
+  return fail(Reason::bad_value, fmt::format("date: \"{}\" is no day up to today, like {}", date, today));
 }
 
 Expected<void> check_history_file(const std::filesystem::path& path) {

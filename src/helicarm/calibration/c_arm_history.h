@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -30,9 +31,12 @@ struct HistoryEntry {
   Eigen::Matrix3d information;  ///< inverse covariance, 1 / mm^2
   std::optional<double> primary_deg = {},
                         secondary_deg = {};  ///< positioner angles, if the image states them
-  std::string date = {};                     ///< UTC, on which it was added: 2026-11-26
+  std::string date = {};  ///< of the acquisition if it was told, else of adding it: 2026-11-26
   std::optional<PlateMap> plate = {};
 };
+
+/// The day of a date like 2026-11-26; nothing of any other text.
+std::optional<std::chrono::sys_days> day_of(const std::string& date);
 
 /// Where the central rays of a run of images meet.
 struct RunIsocentre {

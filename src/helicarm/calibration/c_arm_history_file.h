@@ -12,10 +12,14 @@ struct HistoryGrowth {
   bool is_new = false;  ///< there was no file
 };
 /// Adds entries, and the isocentre of their run, to the file under its lock, to what other programs added
-/// meanwhile; creates it if needed. Refuses as `read_history` and `FileLock`.
+/// meanwhile; creates it if needed. `date`: of the acquisitions, like 2026-11-26; by default today. Refuses
+/// as `read_history` and `FileLock`, and bad_value a date that is none up to today.
 Expected<HistoryGrowth> add_to_history(const std::filesystem::path& path,
                                        std::span<const HistoryEntry> entries,
-                                       const std::optional<RunIsocentre>& run = {});
+                                       const std::optional<RunIsocentre>& run = {},
+                                       const std::optional<std::string>& date = {});
+/// Whether it is a day up to today (bad_value): ask before a measurement.
+Expected<void> check_acquisition_day(const std::string& date);
 /// Whether entries can be added to the file (cannot_write): ask before a measurement.
 Expected<void> check_history_file(const std::filesystem::path& path);
 

@@ -185,6 +185,16 @@ TEST(CArmHistoryFile, AdditionsAtTheSameTimeAreAllKept) {
   EXPECT_EQ(again->added, 0u);
 }
 
+TEST(CArmHistoryFile, AcquisitionsHaveTheDayThatIsTold) {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "arm.json";
+  const HistoryEntry entry{"a", "AP", {901, 2, 3}, Eigen::Matrix3d::Identity()};
+  ASSERT_TRUE(add_to_history(file, std::vector{entry}, {}, "2024-02-29"));
+  EXPECT_EQ(read_history(file)->entries.front().date, "2024-02-29");
+  for (const char* date : {"2023-02-29", "29.02.2024", "2024-2-29", "2024-02-29T10", "9999-01-01", ""})
+    EXPECT_EQ(add_to_history(file, std::vector{entry}, {}, date).error().reason, Reason::bad_value) << date;
+}
+
 TEST(CArmHistoryFile, ThatCannotBeWrittenIsRefusedBeforehand) {
   const TemporaryFolder temporary;
   EXPECT_EQ(check_history_file(temporary.path()).error().reason, Reason::cannot_write);

@@ -5,7 +5,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include <Eigen/Cholesky>
@@ -148,25 +147,12 @@ CArmModel c_arm_model(std::span<const HistoryEntry> entries, const Vector3d& nom
   return model;
 }
 
-namespace {
-
-std::optional<std::chrono::sys_days> day_of(const HistoryEntry& entry) {
-  using namespace std::chrono;
-  int year_number = 0;
-  unsigned month_number = 0, day_number = 0;
-  if (std::sscanf(entry.date.c_str(), "%d-%u-%u", &year_number, &month_number, &day_number) != 3) return {};
-  const year_month_day date{year(year_number), month(month_number), day(day_number)};
-  return date.ok() ? std::optional(sys_days(date)) : std::nullopt;
-}
-
-}  // namespace
-
 std::optional<CArmDrift> c_arm_drift(const CArmModel& model) {
   constexpr double days_a_year = 365.25;
   std::vector<HistoryEntry> dated;
   std::vector<std::chrono::sys_days> days;
   for (const HistoryEntry& entry : model.entries)
-    if (const auto day = day_of(entry)) {
+    if (const auto day = day_of(entry.date)) {
       dated.push_back(entry);
       days.push_back(*day);
     }

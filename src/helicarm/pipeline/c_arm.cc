@@ -126,14 +126,15 @@ std::vector<Warning> limits_of(const calibration::CArmCheck& check) {
 }
 
 Expected<calibration::HistoryGrowth> add_to_record(const std::filesystem::path& record,
-                                                   const CArmAcquisitions& acquired) {
+                                                   const CArmAcquisitions& acquired,
+                                                   const std::optional<std::string>& date) {
   return guarded([&] {
     const calibration::CArmHistory earlier = value_or_throw(calibration::history_at(record));
     if (holds_others(earlier, acquired.entries)) {
       const auto check = value_or_throw(check_against_record(acquired.entries, earlier, record.string()));
       if (const auto change = c_arm_change(check)) throw BadInput(*change);
     }
-    return value_or_throw(calibration::add_to_history(record, acquired.entries, acquired.run));
+    return value_or_throw(calibration::add_to_history(record, acquired.entries, acquired.run, date));
   });
 }
 

@@ -39,9 +39,10 @@ std::vector<Warning> limits_of(const calibration::CArmCheck& check);
 
 /// Adds acquisitions to a record, which is made where there is none. Fails with c_arm_changed, and adds
 /// nothing, where they lie beyond what the record predicts and its tolerances; else as
-/// `calibration::add_to_history`.
+/// `calibration::add_to_history`. `date`: of the acquisitions, like 2026-11-26; by default today.
 Expected<calibration::HistoryGrowth> add_to_record(const std::filesystem::path& record,
-                                                   const CArmAcquisitions& acquired);
+                                                   const CArmAcquisitions& acquired,
+                                                   const std::optional<std::string>& date = {});
 
 /// Adds a measurement's acquisitions to the record that it was made with; none where the measurement found
 /// the C-arm changed.

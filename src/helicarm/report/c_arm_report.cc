@@ -34,7 +34,7 @@ Cell angle_cell(const std::optional<double>& angle) { return {fixed(angle, 1)}; 
 std::vector<ColumnOf<AcquisitionCheck>> columns() {
   std::vector<ColumnOf<AcquisitionCheck>> all{
       {{"view", "name in its case"}, [](const AcquisitionCheck& a) { return Cell{a.entry.view}; }},
-      {{"date", "on which it was added, UTC"},
+      {{"date", "of the acquisition as told by add --date, else of adding it, UTC"},
        [](const AcquisitionCheck& a) { return Cell{a.entry.date.empty() ? "–" : a.entry.date}; }},
       {{"primary deg", "positioner's primary angle", true},
        [](const AcquisitionCheck& a) { return angle_cell(a.entry.primary_deg); }},
@@ -193,7 +193,8 @@ Table c_arm_map_table(const CArmMaps& maps) {
   return without_empty_columns(table_of<LeftOutMap>(
       "Distortion",
       {{{"View", "Its name"}, [](const LeftOutMap& m) { return Cell{m.entry.view}; }},
-       {{"Date", "On which it was added, UTC"}, [](const LeftOutMap& m) { return Cell{m.entry.date}; }},
+       {{"Date", "Of the acquisition as told by add --date, else of adding it, UTC"},
+        [](const LeftOutMap& m) { return Cell{m.entry.date}; }},
        {{"Primary, degrees", "Positioner angle", true},
         [](const LeftOutMap& m) { return angle_cell(m.entry.primary_deg); }},
        {{"Secondary, degrees", "Positioner angle", true},
@@ -253,7 +254,8 @@ std::string map_csv(const CArmMaps& maps) {
 std::vector<ColumnOf<calibration::RunIsocentre>> run_columns() {
   using calibration::RunIsocentre;
   return {
-      {{"date", "on which it was added, UTC"}, [](const RunIsocentre& r) { return Cell{r.date}; }},
+      {{"date", "of the acquisition as told by add --date, else of adding it, UTC"},
+       [](const RunIsocentre& r) { return Cell{r.date}; }},
       {{"images", "accepted", true}, [](const RunIsocentre& r) { return Cell{fmt::format("{}", r.images)}; }},
       {{"arc deg", "between the first and the last image", true},
        [](const RunIsocentre& r) { return Cell{fixed(r.arc_deg, 1)}; }},
