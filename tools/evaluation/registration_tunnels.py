@@ -8,7 +8,7 @@
 The images are those of an operation (`simulate --kind tunnels`): an image intensifier with plate, 3 mm balls at both ends of a femoral
 and a tibial tunnel, tracker with noise, tool. The knee is the modelled one of tools/evaluation/bone_ct.py (four knees in turn), rendered from its
 CT; the balls' places in the CT are known from truth.json and are the plan's ends, a 3D Slicer line for each bone. The registered
-CT is blurred and has noise, each bone has a mask and starts from the true pose, displaced within 10 mm and turned within 10 degrees.
+CT is blurred and has noise, its size is exact (`scale_sigma` 0), each bone has a mask and starts from the true pose, displaced within 10 mm and turned within 10 degrees.
 The CT does not hold the balls. `run` locates the picked balls and registers both bones.
 
 Every end's error against the truth in the calibrator's frame and in the tool's (after tracker, bone and tool readings), the rms that
@@ -88,7 +88,7 @@ class Operations:
             plan = line_of(f"planned_{bone}", [placed(np.linalg.inv(pose), ends[name]) for name in names])
             (case / f"{bone}.mrk.json").write_text(json.dumps(plan, indent=1))
             start = moved(pose, placed(pose, CENTRES[bone]), within(rng, 10), within(rng, np.radians(10)))
-            given["models"].append({"name": bone, "volume": "ct.nrrd", "mask": f"{bone}.nrrd", "moves_with": bone,
+            given["models"].append({"name": bone, "volume": "ct.nrrd", "mask": f"{bone}.nrrd", "moves_with": bone, "scale_sigma": 0,
                                     "start": {"world_from_model": start.tolist()}, "plan": f"{bone}.mrk.json"})
         (case / "case.json").write_text(json.dumps(given, indent=1))
         return truth
