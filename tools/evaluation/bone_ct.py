@@ -42,7 +42,8 @@ def united(*distances):
 
 
 class Knee:
-    """Hounsfield units `hu`, masks `femur`, `tibia`, grown by a voxel, and `femur_itself`, `tibia_itself`; arrays (S, P, L)."""
+    """Hounsfield units `hu`, masks `femur`, `tibia`, grown by a voxel, and `femur_itself`, `tibia_itself`, and `femur_shape`,
+    an implicit function of the femur, negative inside; arrays (S, P, L)."""
 
     def __init__(self, seed):
         rng = np.random.default_rng([seed, 22])
@@ -58,7 +59,7 @@ class Knee:
         for distance in (femur, tibia, fibula):
             self.fill(distance, texture)
         self.femur, self.tibia = femur < VOXEL_MM, (tibia < VOXEL_MM) & (femur > 0)
-        self.femur_itself, self.tibia_itself = femur < 0, tibia < 0
+        self.femur_itself, self.tibia_itself, self.femur_shape = femur < 0, tibia < 0, femur
         self.noise = rng.standard_normal(SIZE[::-1]).astype(np.float32)
 
     def scanned(self):
