@@ -270,9 +270,12 @@ void set_best(SweepFrame& frame, const Joint& joint, std::size_t i, const Camera
   frame.off_path_sigma = chi2_excess(point.off_path_chi2, path_dof(joint));
   frame.flex = path_beside(point, joint.observations[i].turn);
   frame.own = point.camera;
-  constexpr double noticeable = 4;
-  if (*frame.off_path_sigma > noticeable && frame.decision == Decision::accept)
-    frame.decision = Decision::warn;
+  // The noise by all frames says what residuals are usual; of a hundred frames, some alone look inconsistent.
+  constexpr double noticeable = 4, inconsistent = 3;
+  const bool is_doubtful =
+      *frame.off_path_sigma > noticeable ||
+      (frame.best->dof > 0 && chi2_excess(frame.best->chi2, frame.best->dof) > inconsistent);
+  frame.decision = is_doubtful ? Decision::warn : Decision::accept;
 }
 
 /// Nearest point to the central rays, source to the middle of the detector.
