@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whole-process times and peak memory of measurements of simulated images: a table.
 
-  tools/evaluation/timing.py                       all tasks (about a quarter of an hour on two cores, most of it simulation)
+  tools/evaluation/timing.py                       all tasks (about ten minutes on two cores, most of it simulation)
   tools/evaluation/timing.py --images 50           runs of 50 images alone
+  tools/evaluation/timing.py --enlarged 10         a pair of images with ten times the pixels along each side alone
   tools/evaluation/timing.py --readme README.md    renews the table between the tasks marks of that document
 
 CPU seconds are user and system time of the program and hardly depend on other work of the machine; wall seconds do. Each is
@@ -46,7 +47,7 @@ def row(task, commands, repeat):
 
 
 def enlarge(case, factor):
-    """The case's images with as many times the pixels along each side, of the same object."""
+    """Gives the case's images so many times the pixels along each side; what they show stays."""
     import cv2
     import numpy
     import pydicom
@@ -57,6 +58,14 @@ def enlarge(case, factor):
         image.PixelData = numpy.ascontiguousarray(pixels).tobytes()
         image.ImagerPixelSpacing = [float(step) / factor for step in image.ImagerPixelSpacing]
         image.save_as(file)
+    return pixels.shape[0]
+
+
+def enlarged_pair(helicarm, folder, a):
+    cost([helicarm, "simulate", folder / "large", "--seed", a.seed, "--quiet"])
+    side = enlarge(folder / "large", a.enlarged)
+    yield row(f"two images of {side} x {side} pixels, plate of 48 dots: `run --no-report`",
+              [[helicarm, "run", folder / "large", "--out", folder / "out", "--quiet", "--no-cache", "--no-report"]], 1)
 
 
 def pairs(helicarm, folder, a):
@@ -69,31 +78,31 @@ def pairs(helicarm, folder, a):
     cost(run("dense", "--no-cache")[0])
     holes = min(view["rectification"]["dots_found"] for view in json.loads((folder / "out" / "result.json").read_text())["views"])
     yield row(f"two images, perforated plate, {holes} holes and more found: `run`", run("dense", "--no-cache"), a.repeat)
-    enlarge(folder / "pair", 10)
-    yield row("two images of 10,240 x 10,240 pixels, plate of 48 dots: `run --no-report`", run("pair", "--no-cache", "--no-report"), 1)
 
 
 def runs(helicarm, folder, a):
     for images in a.images:
         case = folder / f"run-{images}"
-        size = 1024 if images < 1000 else 512
-        cost([helicarm, "simulate", case, "--kind", "flat", "--run", images, "--size", size, "--seed", a.seed, "--quiet"])
-        yield row(f"run of {images} images of {size} x {size}, flat panel, knee: `sweep`", [[helicarm, "sweep", case, "--out", folder / "out", "--quiet"]], 1)
+        cost([helicarm, "simulate", case, "--kind", "flat", "--run", images, "--seed", a.seed, "--quiet"])
+        yield row(f"run of {images} images, flat panel, knee: `sweep`", [[helicarm, "sweep", case, "--out", folder / "out", "--quiet"]], 1)
         for file in case.glob("*.dcm"):
             file.unlink()
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--images", type=int, nargs="+", help="sizes of the runs (default: 50 100 400 1000), and runs alone")
+    parser.add_argument("--images", type=int, nargs="+", help="sizes of the runs (default: 50 100 400), and runs alone")
+    parser.add_argument("--enlarged", type=int, metavar="FACTOR")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--readme", type=Path)
     parser.add_argument("--helicarm", default=str(ROOT / "build/bin/helicarm"))
     options = parser.parse_args()
-    alone, options.images = options.images is not None, options.images or [50, 100, 400, 1000]
+    alone, options.images = options.images is not None, options.images or [50, 100, 400]
     print(*HEAD, sep="\n")
     with tempfile.TemporaryDirectory() as made:
+        if options.enlarged:
+            return list(enlarged_pair(options.helicarm, Path(made), options))
         lines = [] if alone else list(pairs(options.helicarm, Path(made), options))
         lines += runs(options.helicarm, Path(made), options)
     if options.readme:
