@@ -44,7 +44,8 @@ void pose_frames(const SequenceData& work, const BodyPlan& plan, Estimated& at, 
     };
     if (at.shape.poses[f]) last = at.shape.poses[f];
     frame.reason = Reason::marker_lost;
-    if (sighted() < 3 || !last) continue;
+    if (work.refused[f]) frame.reason = work.refused[f];
+    if (work.refused[f] || sighted() < 3 || !last) continue;
     bool is_dropped = false;
     for (int round = 0; round < 2; ++round) {
       const auto fit = fit_pose(*last, seen, std::nullopt, {.loose_mm = body.deviation_mm});

@@ -10,6 +10,7 @@
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/track/marker_image.h"
+#include "helicarm/track/repeated_images.h"
 #include "helicarm/track/sequence_images.h"
 #include "helicarm/track/sighted_point.h"
 #include "helicarm/track/view_map.h"
@@ -50,6 +51,7 @@ class FirstFrames {
             std::vector<SequenceView>(the_case.views.begin(), the_case.views.end()), frames))),
         frames_(frames),
         first_(value_or_throw(images_.at(frames.first))) {
+    check_views_differ(names_of_views(the_case), frames.first, RepeatedImages().among(frames.first, first_));
     std::vector<Sight> middles;
     for (std::size_t k = 0; k < 2; ++k) {
       const auto& pixels = first_[k].pixels;

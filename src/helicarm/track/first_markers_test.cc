@@ -158,6 +158,32 @@ TEST_F(FirstMarkers, MarkerThatLeavesTheDistortionMapIsHiddenThere) {
   EXPECT_EQ(followed->markers[5][4].status, MarkerStatus::lost);  // of no body, for too short a time
 }
 
+TEST_F(FirstMarkers, RepeatedImageShowsNoMarker) {
+  draw();
+  complete_picks(given_, range_);
+  fs::copy_file(folder_ / "B_03.png", folder_ / "B_04.png", fs::copy_options::overwrite_existing);
+  const auto followed = run_track(given_, range_, {}, {});
+  ASSERT_TRUE(followed) << followed.error().message;
+  for (std::size_t f = 0; f < std::size_t(frames_); ++f) {
+    EXPECT_TRUE(followed->images[f][0]) << f;
+    EXPECT_EQ(followed->images[f][1].has_value(), f != 3) << f;
+  }
+  ASSERT_FALSE(followed->warnings.empty());
+  EXPECT_EQ(followed->warnings[0].reason, Reason::cameras_not_in_step);
+}
+
+TEST_F(FirstMarkers, SameImageInBothViewsIsRefused) {
+  draw();
+  fs::copy_file(folder_ / "A_01.png", folder_ / "B_01.png", fs::copy_options::overwrite_existing);
+  try {
+    complete_picks(given_, range_);
+    ADD_FAILURE();
+  } catch (const BadInput& bad) {
+    EXPECT_EQ(bad.failure().reason, Reason::views_too_close);
+    EXPECT_EQ(bad.failure().message, "frame 1: A and B are the same image");
+  }
+}
+
 TEST_F(FirstMarkers, PickInOneViewWithoutAPartnerIsSaid) {
   draw({2});
   given_.markers = {"J1", "J2"};

@@ -13,6 +13,7 @@
 #include "helicarm/track/body_series.h"
 #include "helicarm/track/growing_table.h"
 #include "helicarm/track/image_keys.h"
+#include "helicarm/track/repeated_images.h"
 #include "helicarm/track/rows.h"
 #include "helicarm/track/sequence_images.h"
 #include "helicarm/xray/digest.h"
@@ -122,6 +123,18 @@ TrackedBody body_of(const Registration& model) {
   return body;
 }
 
+/// A frame with an image that is not of its moment.
+RegisteredFrame refused_frame(const std::vector<std::string>& models, const std::vector<std::string>& views,
+                              int frame, const RepeatedImage& repeated) {
+  RegisteredFrame made{frame, {}};
+  for (const std::string& model : models) {
+    Registration& refused = made.models.emplace_back();
+    refused.name = model;
+    refused.failure = Failure{repeated.reason(), repeated_text(views, frame, repeated), views[repeated.view]};
+  }
+  return made;
+}
+
 /// Rows of the frames so far; those of the whole sequence replace them at its end.
 struct ModelTables {
   GrowingTable frames, poses, bodies;
@@ -203,6 +216,7 @@ Expected<ModelSequence> follow_models(const pipeline::Case& the_case,
       tables.emplace(*follow.out, identity);
     }
     sequence.registered.reserve(sequence.frames.size());
+    RepeatedImages repeated;
     // The next frame's images are read while this one's are registered.
     std::future<Expected<std::vector<xray::XrayImage>>> ahead;
     for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
@@ -219,9 +233,15 @@ Expected<ModelSequence> follow_models(const pipeline::Case& the_case,
         kept.resize(i);
         if (follow.on_note) follow.on_note(changed);
       }
-      if (i < kept.size()) {
-        follower.take(kept[i]);
-        sequence.registered.push_back(std::move(kept[i]));
+      const auto of_others = repeated.among(sequence.frames[i], now);
+      std::optional<RegisteredFrame> known;
+      if (i < kept.size())
+        known = std::move(kept[i]);
+      else if (!of_others.empty())
+        known = refused_frame(sequence.names, view_names, sequence.frames[i], of_others.front());
+      if (known) {
+        follower.take(*known);
+        sequence.registered.push_back(*std::move(known));
       } else {
         sequence.registered.push_back(value_or_throw(follower.next(sequence.frames[i], now)));
       }

@@ -66,6 +66,8 @@ SequenceData data_of(const TrackCase& the_case, const std::vector<FrameSights>& 
     sequence.frames.push_back(frame.frame);
     sequence.repaired += frame.repaired;
     work.times.push_back(frame.frame);
+    const auto lacking = too_many_repeated(frame.repeated, work.views);
+    work.refused.push_back(lacking ? std::optional(lacking->reason()) : std::nullopt);
     auto& images = sequence.images.emplace_back();
     auto& of = work.sights.emplace_back(work.markers, std::vector<std::optional<Sight>>(work.views));
     for (std::size_t m = 0; m < work.markers; ++m)
@@ -222,6 +224,14 @@ void warn_of_lost_markers(const SequenceData& work, Sequence& sequence) {
   }
 }
 
+void warn_of_repeated_images(const TrackCase& the_case, const std::vector<FrameSights>& sights,
+                             Sequence& sequence) {
+  std::vector<std::vector<RepeatedImage>> of_frames;
+  for (const FrameSights& frame : sights) of_frames.push_back(frame.repeated);
+  for (Warning& warning : warnings_of_repeated(names_of_views(the_case), sequence.frames, of_frames))
+    sequence.warnings.push_back(std::move(warning));
+}
+
 /// In a view that does not show them there.
 void warn_of_places_outside_maps(const SequenceData& work, Sequence& sequence) {
   for (std::size_t k = 0; k < work.views; ++k) {
@@ -307,6 +317,7 @@ Sequence estimate_sequence(const TrackCase& the_case, const std::vector<FrameSig
   Sequence sequence;
   sequence.warnings = the_case.warnings;
   SequenceData work = data_of(the_case, sights, sequence);
+  warn_of_repeated_images(the_case, sights, sequence);
   repair_exchanges(work, sequence);
   correct_delays(work, sequence);
   warn_of_delays(work, sequence);

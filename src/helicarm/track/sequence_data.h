@@ -19,6 +19,7 @@ struct SequenceData {
   std::vector<geometry::View> cameras;
   std::vector<std::vector<std::vector<std::optional<Sight>>>> sights;  // [frame][marker][view]
   std::vector<std::vector<std::optional<SightedPoint>>> points;        // [frame][marker], of two views
+  std::vector<std::optional<Reason>> refused = {};                     // [frame], of all bodies
 
   std::vector<Sight> seen(std::size_t f, std::size_t m) const {
     std::vector<Sight> made;

@@ -338,6 +338,28 @@ TEST(Sequence, SwapInOneViewIsRepaired) {
   EXPECT_EQ(warning->view, "B");
 }
 
+TEST(Sequence, FrameWithoutAnImageOfItsMomentHasNoPose) {
+  const TrackCase the_case = two_bodies();
+  auto sights = drawn(the_case, none);
+  for (const std::size_t f : {std::size_t(19), std::size_t(20)}) {
+    sights[f].repeated = {{1, sights[18].frame, 1}};
+    for (auto& of : sights[f].of) of[1].reset();
+  }
+  const Sequence sequence = estimate_sequence(the_case, sights);
+  const BodySequence& jaw = sequence.bodies[0];
+  EXPECT_EQ(jaw.frames[20].decision, PoseDecision::refuse);
+  EXPECT_EQ(jaw.frames[20].reason, Reason::cameras_not_in_step);
+  EXPECT_FALSE(jaw.frames[20].pose);
+  EXPECT_EQ(jaw.frames[21].decision, PoseDecision::accept);
+  EXPECT_EQ(jaw.smoothed[20].decision, PoseDecision::warn);
+  EXPECT_EQ(sequence.markers[20][1].status, MarkerStatus::one_view);
+  EXPECT_LT(farthest(sequence, none), 0.3);
+  const Warning* warning = warning_of(sequence, Reason::cameras_not_in_step);
+  ASSERT_TRUE(warning);
+  EXPECT_TRUE(warning->message.starts_with("frame 20: the image of B is that of its frame 19 again"))
+      << warning->message;
+}
+
 TEST(Sequence, DiscThatIsNotTheMarkersIsNotItsPlace) {
   const TrackCase the_case = two_bodies();
   auto sights = drawn(the_case, none);

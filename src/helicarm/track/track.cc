@@ -13,6 +13,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/track/growing_table.h"
 #include "helicarm/track/image_keys.h"
+#include "helicarm/track/repeated_images.h"
 #include "helicarm/track/rows.h"
 #include "helicarm/track/sequence_images.h"
 #include "helicarm/xray/digest.h"
@@ -102,12 +103,6 @@ void warn_of_corrections(const TrackCase& the_case, Sequence& sequence) {
                          frame.frame, the_case.markers[pick.marker], pick.uv_raw.x(), pick.uv_raw.y()),
              the_case.views[pick.view].images.name,
              {{"frame", double(frame.frame)}}});
-}
-
-std::vector<std::string> names_of_views(const TrackCase& the_case) {
-  std::vector<std::string> names;
-  for (const TrackView& view : the_case.views) names.push_back(view.images.name);
-  return names;
 }
 
 /// Rows of the frames so far; those of the whole sequence replace them at its end.
@@ -214,6 +209,8 @@ Expected<Sequence> run_track(const TrackCase& the_case, const case_registration:
     };
     ImageKeys now_keys = keys_of(first);
     keep_unchanged(0, now_keys);
+    RepeatedImages repeated;
+    check_views_differ(names_of_views(the_case), numbers.front(), repeated.among(numbers.front(), first));
     Tracker tracker = value_or_throw(Tracker::begin(the_case, numbers.front(), first));
     std::optional<GrowingTables> tables;
     if (options.out) {
@@ -231,16 +228,21 @@ Expected<Sequence> run_track(const TrackCase& the_case, const case_registration:
     // The next frame's images are read while this one's are searched.
     std::future<Expected<std::vector<xray::XrayImage>>> ahead;
     for (std::size_t i = 1; i < numbers.size(); ++i) {
-      const auto now = value_or_throw(ahead.valid() ? ahead.get() : images.at(numbers[i]));
+      auto now = value_or_throw(ahead.valid() ? ahead.get() : images.at(numbers[i]));
       if (i + 1 < numbers.size())
         ahead = std::async(std::launch::async, [&images, next = numbers[i + 1]] { return images.at(next); });
       now_keys = keys_of(now);
       keep_unchanged(i, now_keys);
+      auto of_others = repeated.among(numbers[i], now);
+      for (const RepeatedImage& each : of_others) now[each.view].pixels = {};
       if (i < kept.size()) {
         sights.push_back(kept[i]);
       } else {
         sights.push_back(tracker.look(numbers[i], now));
       }
+      for (const RepeatedImage& each : of_others)
+        for (auto& of : sights.back().of) of[each.view].reset();
+      sights.back().repeated = std::move(of_others);
       tracker.absorb(sights.back());
       done();
     }

@@ -213,6 +213,12 @@ void read_bodies(TrackCase& read, const std::vector<pipeline::CaseBody>& bodies,
 
 }  // namespace
 
+std::vector<std::string> names_of_views(const TrackCase& the_case) {
+  std::vector<std::string> names;
+  for (const TrackView& view : the_case.views) names.push_back(view.images.name);
+  return names;
+}
+
 void check_butterworth(const TrackCase& the_case, int step) {
   if (!the_case.butterworth) return;
   const Butterworth& filter = *the_case.butterworth;

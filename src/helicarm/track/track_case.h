@@ -59,6 +59,8 @@ struct TrackCase {
   double point_sigma_px = 0.3;  ///< of `points`, per axis, before their ray gaps show it
 };
 
+std::vector<std::string> names_of_views(const TrackCase& the_case);
+
 /// A file of XMALab's 2-D points instead of the case's picks. As XMALab writes it by default: counting from
 /// 0, y downwards, raw (distorted) pixels.
 struct PointsFile {

@@ -37,6 +37,10 @@ Tracker::Snapshot Tracker::snapshot(const FrameSights& sights) const {
     TrackedBody& body = now.bodies.emplace_back();
     body.reason = Reason::marker_lost;
     body.markers = state.determining;
+    if (const auto lacking = too_many_repeated(sights.repeated, cameras_.size())) {
+      body.reason = lacking->reason();
+      continue;
+    }
     if (state.poses == 0 || state.determining < 3) continue;
     body.decision = PoseDecision::accept;
     body.reason = std::nullopt;

@@ -7,6 +7,7 @@
 #include "helicarm/track/assign.h"
 #include "helicarm/track/body_pose.h"
 #include "helicarm/track/contrast_model.h"
+#include "helicarm/track/repeated_images.h"
 #include "helicarm/track/sighted_point.h"
 #include "helicarm/track/track_case.h"
 #include "helicarm/track/tracked.h"
@@ -18,6 +19,7 @@ struct FrameSights {
   int frame = 0;
   std::vector<std::vector<std::optional<MarkerImage>>> of;  ///< [marker][view]
   int repaired = 0;  ///< markers whose disc by motion alone was another's by the bodies' geometry
+  std::vector<RepeatedImage> repeated = {};  ///< images that are none of this frame
 };
 
 /// Farthest from a pick at which its disc is sought, less a radius.
@@ -37,7 +39,7 @@ class Tracker {
   const std::vector<Warning>& warnings() const { return warnings_; }
 
   /// The markers in the images of the frame after the last one absorbed; those that the case corrects there
-  /// are where it says.
+  /// are where it says. A view whose image has no pixels shows none.
   FrameSights look(int frame, const std::vector<xray::XrayImage>& images) const;
   void absorb(const FrameSights& sights);
 

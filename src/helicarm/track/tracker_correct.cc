@@ -42,6 +42,7 @@ void Tracker::correct(FrameSights& sights, const std::vector<xray::XrayImage>& i
   for (const MarkerPick& pick : given_->corrections) {
     if (pick.frame != sights.frame) continue;
     const std::size_t k = pick.view;
+    if (images[k].pixels.empty()) continue;
     auto& image = sights.of[pick.marker][k];
     image = disc_at(images[k], given_->views[k], appearance_[k], pick.uv_raw,
                     radius_px(k, markers_[pick.marker].place));

@@ -53,6 +53,7 @@ void Tracker::seek_evidence(FrameSights& sights, const std::vector<ExpectedMarke
     for (std::size_t m = 0; m < count; ++m) at[m] = narrowed(expected[m], m, sights);
     const FrameSights before = sights;
     parallel_for(cameras_.size(), 0, [&](std::size_t k) {
+      if (images[k].pixels.empty()) return;
       struct Where {
         Eigen::Vector2d uv;
         Eigen::Matrix2d covariance;

@@ -19,6 +19,7 @@ std::vector<std::vector<Candidate>> Tracker::search(const std::vector<xray::Xray
                                                     std::optional<double> reach_px) const {
   std::vector<std::vector<Candidate>> discs(cameras_.size());
   parallel_for(cameras_.size(), 0, [&](std::size_t k) {
+    if (images[k].pixels.empty()) return;
     std::vector<SearchWindow> windows;
     for (const ExpectedMarker& marker : markers) {
       if (!(cameras_[k].depth(marker.place) > 1)) continue;
