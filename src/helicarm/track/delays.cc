@@ -13,53 +13,11 @@
 namespace helicarm::track {
 namespace {
 
-constexpr double median_of_chi2 = 0.4549;  // one degree of freedom
-
 /// The delay of each view against the first by the ray gaps of moving markers.
 std::vector<ViewDelay> delays_of(const SequenceData& work) {
-  constexpr double cut = 4, floor_mm = 0.005, least_information = 400;  // 0.05 frames
-  constexpr int rounds = 5;
   std::vector<ViewDelay> delays(work.views);
-  for (std::size_t k = 1; k < work.views; ++k) {
-    struct Gap {
-      double gap, speed, variance;
-    };
-    std::vector<Gap> gaps;
-    for (std::size_t f = 0; f < work.frames; ++f)
-      for (std::size_t m = 0; m < work.markers; ++m) {
-        const auto &first = work.sights[f][m][0], &other = work.sights[f][m][k];
-        const auto velocity = velocity_at(work, f, m);
-        if (!first || !other || !velocity || !work.points[f][m]) continue;
-        const geometry::Ray from = geometry::ray_through(*first->view, first->uv),
-                            to = geometry::ray_through(*other->view, other->uv);
-        const Eigen::Vector3d across = from.direction.cross(to.direction);
-        if (across.norm() < 1e-3) continue;
-        const Eigen::Vector3d normal = across.normalized();
-        double variance = floor_mm * floor_mm;
-        for (const auto* sight : {&*first, &*other})
-          variance += std::pow(
-              sight->sigma_px * sight->view->depth(work.points[f][m]->place) / sight->view->intrinsics.fy, 2);
-        gaps.push_back({(to.origin - from.origin).dot(normal), velocity->dot(normal), variance});
-      }
-    double delay = 0, information = 0, scale = 1;
-    for (int round = 0; round < rounds; ++round) {
-      std::vector<double> ratios;
-      for (const Gap& gap : gaps) ratios.push_back(std::pow(gap.gap - delay * gap.speed, 2) / gap.variance);
-      if (ratios.size() < 10) break;
-      scale = std::max(1.0, median(std::move(ratios)) / median_of_chi2);
-      double sum = 0;
-      information = 0;
-      for (const Gap& gap : gaps) {
-        const double left = gap.gap - delay * gap.speed;
-        if (round > 0 && left * left > cut * cut * scale * gap.variance) continue;
-        information += gap.speed * gap.speed / gap.variance;
-        sum += gap.gap * gap.speed / gap.variance;
-      }
-      if (information > 0) delay = sum / information;
-    }
-    information /= scale;
-    if (information > least_information) delays[k] = {delay, 1 / std::sqrt(information), true};
-  }
+  for (std::size_t k = 1; k < work.views; ++k)
+    if (const ViewDelay delay = delay_of(ray_gaps(work, k)).delay; delay.is_known) delays[k] = delay;
   return delays;
 }
 
@@ -93,6 +51,52 @@ void take_out_delays(SequenceData& work, const std::vector<ViewDelay>& delays) {
 }
 
 }  // namespace
+
+std::vector<RayGap> ray_gaps(const SequenceData& work, std::size_t view) {
+  constexpr double floor_mm = 0.005;
+  std::vector<RayGap> gaps;
+  for (std::size_t f = 0; f < work.frames; ++f)
+    for (std::size_t m = 0; m < work.markers; ++m) {
+      const auto &first = work.sights[f][m][0], &other = work.sights[f][m][view];
+      const auto velocity = velocity_at(work, f, m);
+      if (!first || !other || !velocity || !work.points[f][m]) continue;
+      const geometry::Ray from = geometry::ray_through(*first->view, first->uv),
+                          to = geometry::ray_through(*other->view, other->uv);
+      const Eigen::Vector3d across = from.direction.cross(to.direction);
+      if (across.norm() < 1e-3) continue;
+      const Eigen::Vector3d normal = across.normalized();
+      double variance = floor_mm * floor_mm;
+      for (const auto* sight : {&*first, &*other})
+        variance += std::pow(
+            sight->sigma_px * sight->view->depth(work.points[f][m]->place) / sight->view->intrinsics.fy, 2);
+      gaps.push_back({f, m, (to.origin - from.origin).dot(normal), velocity->dot(normal), variance});
+    }
+  return gaps;
+}
+
+GapDelay delay_of(std::span<const RayGap> gaps) {
+  constexpr double cut = 4, least_information = 400;  // 0.05 frames
+  constexpr int rounds = 5;
+  double delay = 0, information = 0, scale = 1;
+  for (int round = 0; round < rounds; ++round) {
+    std::vector<double> ratios;
+    for (const RayGap& gap : gaps) ratios.push_back(std::pow(gap.gap - delay * gap.speed, 2) / gap.variance);
+    if (ratios.size() < 10) break;
+    scale = std::max(1.0, median(std::move(ratios)) / median_of_chi2);
+    double sum = 0;
+    information = 0;
+    for (const RayGap& gap : gaps) {
+      const double left = gap.gap - delay * gap.speed;
+      if (round > 0 && left * left > cut * cut * scale * gap.variance) continue;
+      information += gap.speed * gap.speed / gap.variance;
+      sum += gap.gap * gap.speed / gap.variance;
+    }
+    if (information > 0) delay = sum / information;
+  }
+  information /= scale;
+  if (!(information > 0)) return {};
+  return {{delay, 1 / std::sqrt(information), information > least_information}, scale};
+}
 
 void correct_delays(SequenceData& work, Sequence& sequence) {
   const auto as_seen = work.sights;

@@ -14,6 +14,7 @@
 #include "helicarm/track/body_series.h"
 #include "helicarm/track/camera_errors.h"
 #include "helicarm/track/delays.h"
+#include "helicarm/track/dropped_frames.h"
 #include "helicarm/track/exchanges.h"
 #include "helicarm/track/image_errors.h"
 #include "helicarm/track/view_map.h"
@@ -318,6 +319,7 @@ Sequence estimate_sequence(const TrackCase& the_case, const std::vector<FrameSig
   sequence.warnings = the_case.warnings;
   SequenceData work = data_of(the_case, sights, sequence);
   warn_of_repeated_images(the_case, sights, sequence);
+  repair_dropped_frames(work, sequence);
   repair_exchanges(work, sequence);
   correct_delays(work, sequence);
   warn_of_delays(work, sequence);

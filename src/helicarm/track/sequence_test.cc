@@ -360,6 +360,39 @@ TEST(Sequence, FrameWithoutAnImageOfItsMomentHasNoPose) {
       << warning->message;
 }
 
+/// The second view's images from a frame on are those of later frames; earlier ones for negative numbers.
+std::vector<FrameSights> with_dropped(const std::vector<FrameSights>& sights, std::size_t from, int dropped) {
+  auto made = sights;
+  for (std::size_t f = from; f < sights.size(); ++f)
+    for (std::size_t m = 0; m < sights[f].of.size(); ++m) {
+      const int moment = int(f) + dropped;
+      made[f].of[m][1] = moment < int(sights.size()) ? sights[std::size_t(moment)].of[m][1] : std::nullopt;
+    }
+  return made;
+}
+
+TEST(Sequence, FrameThatOneCameraDroppedIsNamedAndTakenIntoAccount) {
+  const TrackCase the_case = two_bodies();
+  for (const int dropped : {1, -2}) {
+    const Sequence sequence = estimate_sequence(the_case, with_dropped(drawn(the_case, none), 21, dropped));
+    const Warning* warning = warning_of(sequence, Reason::cameras_not_in_step);
+    ASSERT_TRUE(warning) << dropped;
+    EXPECT_EQ(warning->view, "B");
+    EXPECT_NEAR(warning->figures.at("frame"), 22, 1) << warning->message;
+    EXPECT_NEAR(warning->figures.at("jump_frames"), dropped, 0.2) << warning->message;
+    EXPECT_NE(warning->message.find(dropped > 0 ? "B dropped a frame" : "A dropped a frame"),
+              std::string::npos)
+        << warning->message;
+    EXPECT_LT(farthest(sequence, none), 0.5) << dropped;
+    EXPECT_LT(std::abs(sequence.delays[1].frames), 0.1) << dropped;
+  }
+}
+
+TEST(Sequence, FilmsInStepHaveNoDroppedFrame) {
+  const TrackCase the_case = two_bodies();
+  EXPECT_FALSE(warning_of(estimate_sequence(the_case, drawn(the_case, none)), Reason::cameras_not_in_step));
+}
+
 TEST(Sequence, DiscThatIsNotTheMarkersIsNotItsPlace) {
   const TrackCase the_case = two_bodies();
   auto sights = drawn(the_case, none);
