@@ -7,7 +7,7 @@
 
 #include "helicarm/core/statistics.h"
 #include "helicarm/geometry/absolute_pose.h"
-#include "helicarm/geometry/ray.h"
+#include "helicarm/track/exchanged_views.h"
 #include "helicarm/track/sighted_point.h"
 #include "helicarm/track/view_map.h"
 #include "helicarm/track/xmalab_points.h"
@@ -29,28 +29,19 @@ Eigen::Vector2d raw_point(Eigen::Vector2d at, const TrackView& view, const Point
   return at;
 }
 
-/// Median of what the rays of each marker and frame miss each other by, against the first view.
-std::optional<double> median_gap_mm(const TrackCase& read) {
-  std::vector<double> gaps;
-  const std::size_t views = read.views.size();
-  const auto ray = [&](std::size_t view, const Eigen::Vector2d& raw) {
-    return geometry::ray_through(read.views[view].camera, rectified_in(read.views[view], raw).value());
-  };
-  for (const auto& frame : read.points)
-    for (std::size_t i = 0; i < frame.size(); i += views)
-      for (std::size_t k = 1; k < views; ++k)
-        if (frame[i] && frame[i + k])
-          gaps.push_back(geometry::gap_between(ray(0, *frame[i]), ray(k, *frame[i + k])));
-  if (gaps.empty()) return std::nullopt;
-  return median(std::move(gaps));
-}
-
 void check_points_meet(const TrackCase& read, const std::string& origin) {
   constexpr double most_mm = 2;
-  const auto gap = median_gap_mm(read);
+  const auto gap = median_gap_mm(read.views, read.points);
   if (!gap)
     throw BadInput(Reason::not_seen,
                    fmt::format("{}: no marker has a point in two views of a frame", origin));
+  if (const auto exchanged = exchanged_views(read.views, read.points))
+    throw BadInput({Reason::residual_too_large,
+                    fmt::format("{}: {}: they have each other's columns: correct the header, or exchange the "
+                                "cameras of the case",
+                                origin, exchanged_text(read.views, *exchanged)),
+                    {},
+                    {{"gap_mm", exchanged->gap_mm}, {"exchanged_mm", exchanged->exchanged_mm}}});
   if (*gap > most_mm)
     throw BadInput(
         {Reason::residual_too_large,

@@ -108,6 +108,7 @@ class Tracker {
   std::vector<MarkerPick> drop_weak_first(const std::vector<xray::XrayImage>& images);
   void learn_appearance(const std::vector<xray::XrayImage>& images);
   void find_first(int frame, const std::vector<xray::XrayImage>& images);
+  void check_cameras() const;
   void check_rays();
   void seek_first(const std::vector<xray::XrayImage>& images);
   void warn_of_unseen();

@@ -6,11 +6,26 @@
 
 #include "helicarm/geometry/ray.h"
 #include "helicarm/geometry/triangulation.h"
+#include "helicarm/track/exchanged_views.h"
 #include "helicarm/track/tracker.h"
 
 namespace helicarm::track {
 
+/// Of all markers of the first frame at once: exchanged cameras need not leave large gaps.
+void Tracker::check_cameras() const {
+  ViewPoints points;
+  for (const auto& of : first_.of)
+    for (const auto& image : of) points.push_back(image ? std::optional(image->uv_raw) : std::nullopt);
+  if (const auto exchanged = exchanged_views(given_->views, {points}))
+    throw BadInput({Reason::residual_too_large,
+                    fmt::format("frame {}: {}: they have each other's images, or cameras: correct the case",
+                                first_.frame, exchanged_text(given_->views, *exchanged)),
+                    {},
+                    {{"gap_mm", exchanged->gap_mm}, {"exchanged_mm", exchanged->exchanged_mm}}});
+}
+
 void Tracker::check_rays() {
+  check_cameras();
   constexpr double largest_gap_mm = 1, largest_gap_px = 4;
   const auto gap_of = [&](std::size_t first, std::size_t second, std::size_t k) -> std::optional<double> {
     const auto &a = first_.of[first][0], &b = first_.of[second][k];
