@@ -97,11 +97,15 @@ std::string code_field(const Registration& result) {
 }  // namespace
 
 Expected<FrameRange> frame_range_from(const std::string& text) {
-  static const std::regex form(R"((\d{1,6})-(\d{1,6})(?::(\d{1,6}))?)");
+  static const std::regex form(R"((\d+)-(\d+)(?::(\d+))?)");
   std::smatch match;
   if (!std::regex_match(text, match, form))
     return fail(Reason::bad_value,
                 fmt::format("frames: \"{}\" is neither A-B nor A-B:STEP, such as 1-100 or 1-100:2", text));
+  constexpr std::ptrdiff_t most_digits = 6;
+  constexpr int most = 999999;
+  if (std::max({match.length(1), match.length(2), match.length(3)}) > most_digits)
+    return fail(Reason::bad_value, fmt::format("frames: \"{}\": a number is over the limit, {}", text, most));
   const FrameRange range{std::stoi(match[1]), std::stoi(match[2]),
                          match[3].matched ? std::stoi(match[3]) : 1};
   if (range.first > range.last || range.step < 1)

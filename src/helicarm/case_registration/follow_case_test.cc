@@ -22,6 +22,12 @@ TEST(FrameRange, RefusesWhatIsNoRange) {
   }
 }
 
+TEST(FrameRange, NumberOverTheLimitIsNamedAsSuch) {
+  const auto range = frame_range_from("1-100000000");
+  ASSERT_FALSE(range);
+  EXPECT_EQ(range.error().message, "frames: \"1-100000000\": a number is over the limit, 999999");
+}
+
 RegisteredFrame two_models() {
   RegisteredFrame frame{4, {}};
   for (const char* name : {"femur", "tibia, left"}) {

@@ -291,6 +291,22 @@ std::vector<Joint> joints_of(const TrackCase& the_case, const std::vector<BodySe
   return joints;
 }
 
+/// Of a marker in the first view's first frame by its picks, px; nothing without picks that meet.
+std::optional<double> expected_diameter_px(const SequenceData& work) {
+  for (const MarkerPick& first : work.the_case.picks)
+    for (const MarkerPick& other : work.the_case.picks) {
+      if (first.marker != other.marker || first.view != 0 || other.view == 0) continue;
+      std::vector<Sight> sights;
+      for (const MarkerPick& pick : {first, other})
+        if (const auto uv = rectified_in(work.the_case.views[pick.view], pick.uv_raw))
+          sights.push_back({&work.cameras[pick.view], *uv, 1});
+      const auto met = sights.size() == 2 ? sighted_point(sights) : std::nullopt;
+      const double depth = met ? work.cameras[0].depth(met->place) : 0;
+      if (depth > 0) return work.the_case.diameter_mm * std::abs(work.cameras[0].intrinsics.fy) / depth;
+    }
+  return std::nullopt;
+}
+
 /// Where no body has a pose in any frame, or without bodies most places are lost.
 std::optional<Failure> nothing_followed(const SequenceData& work, const Sequence& sequence) {
   constexpr double most_lost = 0.5;
@@ -302,12 +318,15 @@ std::optional<Failure> nothing_followed(const SequenceData& work, const Sequence
     return std::ranges::any_of(body.frames, [](const TrackedBody& frame) { return frame.pose.has_value(); });
   });
   if (!no_pose || (sequence.bodies.empty() && share <= most_lost)) return std::nullopt;
+  const auto px = expected_diameter_px(work);
   return Failure{
       Reason::marker_lost,
       fmt::format(
-          "{:.0f} % of the places are lost{}: is \"diameter_mm\" that of the markers, the camera of each "
-          "view its own, and \"frame_offset\" right? The warnings name each marker",
-          100 * share, sequence.bodies.empty() ? "" : ", and no body has a pose"),
+          "{:.0f} % of the places are lost{}: is \"diameter_mm\" that of the markers{}, were the cameras "
+          "imported in their unit (cm, mm), is the camera of each view its own, and \"frame_offset\" right? "
+          "The warnings name each marker",
+          100 * share, sequence.bodies.empty() ? "" : ", and no body has a pose",
+          px ? fmt::format(" ({:.0f} px wide by it and the cameras)", *px) : ""),
       {},
       {{"lost_share", share}}};
 }

@@ -124,7 +124,7 @@ void Tracker::find_first(int frame, const std::vector<xray::XrayImage>& images) 
     throw BadInput(
         Reason::not_seen,
         fmt::format("frame {}: no marker is found at its picks in two views: check the picks, which "
-                    "are raw pixels, and \"diameter_mm\"",
+                    "are raw pixels, \"diameter_mm\", and the unit (cm, mm) of the cameras",
                     frame));
 }
 
