@@ -215,6 +215,16 @@ class Frames(unittest.TestCase):
         self.assertNotIn("inverted", done.stderr)
         self.assertAlmostEqual(float(self.table("registration.csv")[1]["m14"]), shift_at(1)[0], delta=0.3)
 
+    def test_frame_with_an_image_of_another_is_refused(self):
+        for frame in range(3):
+            (self.root / f"again_{frame}.png").write_bytes((self.root / f"B_{min(frame, 1):02d}.png").read_bytes())
+        views = [self.case["views"][0], dict(self.case["views"][1], image="again_{frame}.png")]
+        done = self.register(dict(self.case, views=views), "--frames", "0-2", "--search-mm", 4, "--search-deg", 4)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("cameras_not_in_step: B: 2 of 6 registrations are refused, the first in frame 2: "
+                      "frame 2: the image of B is that of its frame 1 again", done.stderr)
+        self.assertEqual([row["frame"] for row in self.table("registration.csv") if row["decision"] == "refuse"], ["2", "2"])
+
     def test_images_of_other_sizes_are_named_before_the_work(self):
         for frame in range(3):
             data = (self.root / f"B_{frame:02d}.png").read_bytes()
