@@ -81,12 +81,28 @@ class Migration(unittest.TestCase):
     def test_segments_may_be_named_on_the_command_line(self):
         plain = exam(self.root / "plain.csv", segments=False)
         self.assertIn("--segment", self.migrate(plain, plain).stderr)
-        done = self.migrate(plain, plain, "--segment", "bone=tibia0,tibia1,tibia2,tibia3", "--segment", "tray=tray0,tray1,tray2",
+        later = exam(self.root / "later.csv", seed=3, segments=False, sigma=0.01)
+        done = self.migrate(plain, later, "--segment", "bone=tibia0,tibia1,tibia2,tibia3", "--segment", "tray=tray0,tray1,tray2",
                             "--reference", "tray")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("bone against tray", done.stdout)
         self.assertIn("tibia9", self.migrate(plain, plain, "--segment", "a=tibia0,tibia1,tibia9", "--segment",
                                              "b=tray0,tray1,tray2").stderr)
+
+    def test_the_same_examination_twice_is_refused(self):
+        copy = self.root / "one-year.csv"
+        copy.write_bytes(self.first.read_bytes())
+        self.assertIn("first.csv and one-year.csv are the same examination", self.migrate(self.first, copy).stderr)
+        second = exam(self.root / "second.csv", seed=3, sigma=0.01)
+        done = self.migrate(self.first, second, "--double", self.first, copy)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("double examination first.csv and one-year.csv: first.csv and", done.stderr)
+
+    def test_a_double_examination_counts_once(self):
+        second = exam(self.root / "second.csv", seed=3, sigma=0.01)
+        done = self.migrate(self.first, second, *2 * ["--double", self.first, second])
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("the same pair as first.csv and second.csv", done.stderr)
 
     def test_a_refusal_is_written(self):
         (self.out).mkdir()

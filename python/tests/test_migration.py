@@ -31,9 +31,11 @@ def test_migration_is_the_shift_of_the_second_segment(tmp_path):
 
 
 def test_segments_may_be_given_and_are_checked(tmp_path):
-    first = exam(tmp_path / "a.csv")
-    answer = helicarm.migration(first, first, segments={"a": ["bone0", "bone1", "bone2"], "b": ["tray0", "tray1", "tray2"]},
+    first, second = exam(tmp_path / "a.csv"), exam(tmp_path / "b.csv", seed=1)
+    answer = helicarm.migration(first, second, segments={"a": ["bone0", "bone1", "bone2"], "b": ["tray0", "tray1", "tray2"]},
                                 reference="b", by_name=True)
     assert answer["reference"] == "b"
     with pytest.raises(helicarm.InputError, match="cup"):
-        helicarm.migration(first, first, reference="cup")
+        helicarm.migration(first, second, reference="cup")
+    with pytest.raises(helicarm.InputError, match="same examination"):
+        helicarm.migration(first, first)

@@ -20,6 +20,7 @@ constexpr double degrees = 180 / EIGEN_PI;
 constexpr double reach_mm = 1.5;  // of a marker from its place in the segment: farther ones are not it
 constexpr double line_mm =
     0.5;  // of markers about their common line: below, the turn about it is not determined
+constexpr double same_place_mm = 1e-3;  // a tenth of what radiostereometry resolves, above a file's rounding
 
 std::vector<Marker> markers_of(const Exam& exam, const Segment& segment) {
   std::vector<Marker> markers;
@@ -198,6 +199,22 @@ void require_own_markers(const std::vector<Matched>& all) {
                           all[k].segment.name, all[i].segment.name, marker));
 }
 
+/// A second measurement differs in every digit that counts: the same places are the same file, or a copy.
+void require_two_examinations(const Exam& first, const Exam& second, const std::vector<Matched>& all) {
+  double largest_mm = 0;
+  for (const Matched& each : all)
+    for (std::size_t n = 0; n < each.first.size(); ++n)
+      largest_mm =
+          std::max(largest_mm, (each.second[n].place - each.first[n].place).lpNorm<Eigen::Infinity>());
+  if (largest_mm > same_place_mm) return;
+  throw BadInput({Reason::bad_value,
+                  fmt::format("{} and {} are the same examination: no coordinate of a marker differs by more "
+                              "than {:g} mm",
+                              first.name, second.name, same_place_mm),
+                  {},
+                  {{"largest_mm", largest_mm}, {"limit", same_place_mm}}});
+}
+
 /// The errors that the residuals show, where the examinations state none, or larger ones.
 void take_errors(Migration& migration, std::vector<Matched>& all) {
   bool is_stated = true;
@@ -307,6 +324,7 @@ Expected<Migration> migrate(const Exam& first, const Exam& second, const Migrati
     for (const Segment& segment : segments_of(first, options))
       all.push_back(matched_segment(first, second, segment, options.matching, migration.warnings));
     require_own_markers(all);
+    require_two_examinations(first, second, all);
     take_errors(migration, all);
     for (std::size_t i = 1; i < all.size(); ++i)
       migration.bodies.push_back(migration_of(all, i, options.axes));

@@ -61,10 +61,11 @@ struct Migration {
 
 /// Migration of every segment against the reference between two examinations. Markers correspond by geometry
 /// or by name; their errors are taken as independent. Warnings: body_ill_conditioned (condition number over
-/// the guideline's limit), marker_lost, marker_loose. Fails with bad_value for unknown names,
-/// too_few_fiducials and ambiguous_labels as `match_by_geometry`, body_ill_conditioned for markers on a line,
-/// and residual_too_large where the mean error of rigid-body fitting exceeds the guideline's limit and no
-/// single loose marker explains it.
+/// the guideline's limit), marker_lost, marker_loose. Fails with bad_value for unknown names and
+/// for the same examination twice (no coordinate differs by more than 0.001 mm), too_few_fiducials and
+/// ambiguous_labels as `match_by_geometry`, body_ill_conditioned for markers on a line, and
+/// residual_too_large where the mean error of rigid-body fitting exceeds the guideline's limit and no single
+/// loose marker explains it.
 Expected<Migration> migrate(const Exam& first, const Exam& second, const MigrationOptions& options);
 
 /// 97.5 % quantile of Student's t.

@@ -162,6 +162,7 @@ TEST(Migration, AHighConditionNumberIsWarnedOf) {
   Exam first = exam_of("m", {}, {}, {}), second = exam_of("m", {}, {}, {});
   for (std::size_t i = 5; i < 9; ++i)
     for (Exam* exam : {&first, &second}) exam->markers[i].place *= 0.2;
+  for (Marker& marker : second.markers) marker.place.x() += 1;
   const auto made = migrate(first, second, {});
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_GT(made->segments[1].condition_per_m, 120);
@@ -185,6 +186,15 @@ TEST(Migration, ResidualsBeyondTheStatedErrorsWidenThem) {
   ASSERT_TRUE(stated && widened);
   EXPECT_EQ(widened->warnings.at(0).reason, Reason::residual_too_large);
   EXPECT_NEAR(std::sqrt(widened->bodies[0].covariance(3, 3) / stated->bodies[0].covariance(3, 3)), 1, 0.4);
+}
+
+TEST(Migration, TheSameExaminationTwiceIsRefused) {
+  const Exam first = exam_of("a", {}, {}, {}), again = exam_of("copy", {}, {}, {});
+  const auto refused = migrate(first, again, {});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::bad_value);
+  EXPECT_NE(refused.error().message.find("a and copy are the same examination"), std::string::npos);
+  EXPECT_TRUE(migrate(first, later_exam({}), {}));
 }
 
 TEST(Migration, SegmentsAndReferenceAreChecked) {

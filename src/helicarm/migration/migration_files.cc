@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/migration/migration_files.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -194,6 +195,21 @@ std::string precision_table(const std::vector<Precision>& precisions) {
       rows));
 }
 
+bool are_equal(const NamedMigration& a, const NamedMigration& b) {
+  return std::ranges::equal(
+      a.migration.bodies, b.migration.bodies, {},
+      [](const BodyMigration& body) { return body.motion.matrix(); },
+      [](const BodyMigration& body) { return body.motion.matrix(); });
+}
+
+/// A pair that is given twice would make the precision look better than it is.
+void require_new_pair(const NamedMigration& pair, const std::vector<NamedMigration>& earlier) {
+  for (const NamedMigration& other : earlier)
+    if (are_equal(pair, other))
+      throw BadInput(Reason::bad_value, fmt::format("the same pair as {} and {}: give each pair once",
+                                                    other.first, other.second));
+}
+
 }  // namespace
 
 Expected<Eigen::Matrix3d> read_axes(const std::filesystem::path& path) {
@@ -229,7 +245,11 @@ Expected<MigrationAnswer> answer(const MigrationRequest& request) {
     };
     MigrationAnswer migration_answer{between(request.first, request.second), {}, {}, options.axes};
     for (const auto& [first, second] : request.doubles) {
-      auto one = guarded([&] { return between(first, second); });
+      auto one = guarded([&] {
+        NamedMigration pair = between(first, second);
+        require_new_pair(pair, migration_answer.doubles);
+        return pair;
+      });
       if (!one) {
         one.error().message = fmt::format("double examination {} and {}: {}", first.filename().string(),
                                           second.filename().string(), one.error().message);
