@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -29,8 +30,9 @@ struct Solution {
   double condition = 0;
 };
 
-std::vector<fiducials::Fiducial> points_from(const CsvTable& table) {
+std::vector<fiducials::Fiducial> points_from(const CsvTable& table, const std::string& origin) {
   std::vector<fiducials::Fiducial> points;
+  std::set<std::string> labels;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const auto number = [&](const char* column) { return table.number(row, column); };
     fiducials::Fiducial point{table.text(row, "label"), {number("x_mm"), number("y_mm"), number("z_mm")}};
@@ -38,8 +40,11 @@ std::vector<fiducials::Fiducial> points_from(const CsvTable& table) {
     point.uv = {number("u_px"), number("v_px")};
     point.sigma_px = table.has("sigma_px") ? number("sigma_px") : 1;
     if (!(point.sigma_px > 0))
-      throw BadInput(Reason::bad_value,
-                     fmt::format("row {}: sigma_px: {} must be positive", row + 1, point.sigma_px));
+      throw BadInput(Reason::bad_value, fmt::format("{}: row {}: sigma_px: {} must be positive", origin,
+                                                    row + 1, point.sigma_px));
+    if (!labels.insert(point.label).second)
+      throw BadInput(Reason::name_clash,
+                     fmt::format("{}: row {}: label: \"{}\" is given twice", origin, row + 1, point.label));
     points.push_back(point);
   }
   return points;
@@ -130,18 +135,29 @@ std::vector<Warning> warnings_of(const Solution& solution, double rms_px,
   return warnings;
 }
 
+double distance_to_source(const Solution& solution, const std::vector<geometry::PointPair>& pairs) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const geometry::PointPair& pair : pairs) sum += pair.point_in_world;
+  return (solution.view.source_in_world() - sum / double(pairs.size())).norm();
+}
+
 }  // namespace
 
 CommandResult solve_command(const SolveArguments& arguments, Console& console) {
   const auto table =
       read_csv(arguments.points, {"label", "x_mm", "y_mm", "z_mm", "u_px", "v_px"}, {"sigma_px"});
   if (!table) return tl::unexpected<Failure>(table.error());
-  const auto points = guarded([&] { return points_from(*table); });
+  const std::string origin = arguments.points.filename().string();
+  const auto points = guarded([&] { return points_from(*table, origin); });
   if (!points) return tl::unexpected<Failure>(points.error());
   std::vector<geometry::PointPair> pairs;
   for (const fiducials::Fiducial& point : *points) pairs.push_back({point.centre_in_calibrator, point.uv});
   const auto solution = solve(arguments.method, *points, pairs, table->has("sigma_px"));
   if (!solution) return tl::unexpected<Failure>(solution.error());
+  const auto in_mm =
+      exchange::check_source_distance(distance_to_source(*solution, pairs), "the points' middle", origin,
+                                      "give x_mm, y_mm and z_mm in mm; they look like cm or m");
+  if (!in_mm) return in_mm;
   const double rms_px = geometry::reprojection_rms(solution->view, pairs);
   const auto warnings = warnings_of(*solution, rms_px, *points);
   print_warnings(warnings, console);

@@ -20,14 +20,14 @@ namespace fs = std::filesystem;
 const geometry::View view{{-6000, 6000, 512, 500, 0},
                           {geometry::rotation_from_euler(0.3, -0.2, 1), {5, -8, 800}}};
 
-std::string table_of(int n, bool flat, const std::string& sigma = "") {
+std::string table_of(int n, bool flat, const std::string& sigma = "", double unit_mm = 1) {
   std::string text = "label,x_mm,y_mm,z_mm,u_px,v_px" + std::string(sigma.empty() ? "" : ",sigma_px") + "\n";
   for (int k = 0; k < n; ++k) {
     const double t = 0.5 + 1.57 * k;
     const Eigen::Vector3d p(50 * std::cos(t), 50 * std::sin(t), flat ? 0 : 4 * t);
     const Eigen::Vector2d uv = view.project(p);
-    text += fmt::format("P{},{},{},{},{},{}{}\n", k, p.x(), p.y(), p.z(), uv.x(), uv.y(),
-                        sigma.empty() ? "" : "," + sigma);
+    text += fmt::format("P{},{},{},{},{},{}{}\n", k, p.x() / unit_mm, p.y() / unit_mm, p.z() / unit_mm,
+                        uv.x(), uv.y(), sigma.empty() ? "" : "," + sigma);
   }
   return text;
 }
@@ -89,6 +89,24 @@ TEST(SolveCommand, BadInputIsNamedInTheMessage) {
   EXPECT_EQ(reason_of(table_of(8, false, "nan"), "ml"), Reason::not_finite);
   EXPECT_EQ(reason_of(table_of(8, false), "guess"), Reason::usage);
   EXPECT_EQ(reason_of("label,x_mm\n", "ml"), Reason::bad_value);
+}
+
+TEST(SolveCommand, ALabelTwiceIsRefused) {
+  const std::string twice = table_of(12, false) + "P3,1,2,3,4,5\n";
+  const auto refused = solve_text(twice, "ml").result;
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::name_clash);
+  EXPECT_NE(refused.error().message.find("row 13: label: \"P3\""), std::string::npos);
+}
+
+TEST(SolveCommand, LengthsThatAreNotInMillimetresAreRefused) {
+  for (const char* method : {"dlt", "homogeneous", "ml"})
+    for (const double unit_mm : {10.0, 1000.0}) {
+      const auto refused = solve_text(table_of(12, false, "", unit_mm), method).result;
+      ASSERT_FALSE(refused) << method << unit_mm;
+      EXPECT_EQ(refused.error().reason, Reason::usage) << refused.error().message;
+      EXPECT_NE(refused.error().message.find("in mm"), std::string::npos);
+    }
 }
 
 }  // namespace

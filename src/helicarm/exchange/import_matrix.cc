@@ -251,19 +251,13 @@ void to_mm(ImportedMatrix& camera, std::optional<double> mm_per_unit, const std:
   camera.view.camera_from_world.translation *= mm_per_unit.value_or(1);
   if (!camera.view.camera_from_world.translation.allFinite())
     throw BadInput(Reason::not_finite, fmt::format("{}: the translation is not finite in mm", origin));
-  // C-arms' sources are farther from what they show; in cm or m they seem to be nearer.
-  constexpr double least_mm = 200;
+  if (mm_per_unit || camera.in_mm) return;
   const double distance = camera.view.source_in_world().norm();
-  if (mm_per_unit || camera.in_mm || distance >= least_mm) return;
-  throw BadInput(
-      {Reason::usage,
-       fmt::format(
-           "{}: states no unit of length, and in mm the source lies {:.3g} mm from the world's origin "
-           "(at least {:g} mm are taken for granted): state the unit, helicarm import --unit cm ({:.4g} "
-           "mm), m or mm, and use its output",
-           origin, distance, least_mm, 10 * distance),
-       {},
-       {{"distance_mm", distance}, {"limit", least_mm}}});
+  value_or_throw(check_source_distance(
+      distance, "the world's origin", origin,
+      fmt::format("no unit of length is stated: state it, helicarm import --unit cm ({:.4g} mm), m or mm, "
+                  "and use its output",
+                  10 * distance)));
 }
 
 /// What is unusual in a camera that can be right.
@@ -342,6 +336,18 @@ Cameras cameras_of_folder(const std::filesystem::path& folder, const ImportOptio
 }
 
 }  // namespace
+
+Expected<void> check_source_distance(double distance_mm, const std::string& from, const std::string& origin,
+                                     const std::string& advice) {
+  constexpr double least_mm = 200;
+  if (distance_mm >= least_mm) return {};
+  return tl::unexpected<Failure>(
+      {Reason::usage,
+       fmt::format("{}: in mm the source lies {:.3g} mm from {} (at least {:g} mm are taken for granted): {}",
+                   origin, distance_mm, from, least_mm, advice),
+       {},
+       {{"distance_mm", distance_mm}, {"limit", least_mm}}});
+}
 
 Eigen::Matrix3d xmalab_from_pixels(int image_height) {
   Eigen::Matrix3d pixels;

@@ -62,6 +62,11 @@ Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, const 
 /// Whether the object has a key that names a camera matrix, as the files of `import_matrix` have.
 bool holds_camera(const Json& json);
 
+/// `usage`, with the advice, below 200 mm: a C-arm's source is farther from what it shows, and lengths in cm
+/// or m make it seem nearer.
+Expected<void> check_source_distance(double distance_mm, const std::string& from, const std::string& origin,
+                                     const std::string& advice);
+
 /// ambiguous_handedness: fx and fy differ in sign.
 std::optional<Warning> mirrored_or_upwards(const geometry::Intrinsics& intrinsics);
 
