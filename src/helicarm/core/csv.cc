@@ -157,7 +157,8 @@ Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_
   }
   for (const char* column : required)
     if (!table.has(column))
-      return fail(Reason::bad_value, fmt::format("{}: the column \"{}\" is missing", table.origin_, column));
+      return fail(Reason::bad_value, fmt::format("{}: the column \"{}\" is missing (given: {})",
+                                                 table.origin_, column, fmt::join(table.columns_, ", ")));
   const auto known = [&](const std::string& column) {
     const auto same = [&](const char* name) { return column == name; };
     return std::any_of(required.begin(), required.end(), same) ||
@@ -165,8 +166,10 @@ Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_
   };
   for (const std::string& column : table.columns_)
     if (!known(column))
-      return fail(Reason::unknown_key,
-                  fmt::format("{}: the column \"{}\" is unknown; remove it", table.origin_, column));
+      return fail(
+          Reason::unknown_key,
+          fmt::format("{}: the column \"{}\" is unknown; remove it (known: {}{}{})", table.origin_, column,
+                      fmt::join(required, ", "), optional.size() > 0 ? ", " : "", fmt::join(optional, ", ")));
   return table;
 }
 

@@ -40,6 +40,13 @@ TEST(ReadCsv, MissingAndUnknownColumnsAreNamed) {
   EXPECT_EQ(table_of("u_px,v_px,w\n1,2,3\n").error().reason, Reason::unknown_key);
 }
 
+TEST(ReadCsv, MessagesOfColumnsListTheOthers) {
+  EXPECT_NE(table_of("u_px,v\n1,2\n").error().message.find("\"v_px\" is missing (given: u_px, v)"),
+            std::string::npos);
+  EXPECT_NE(table_of("u_px,v_px,w\n1,2,3\n").error().message.find("(known: u_px, v_px, sigma_px)"),
+            std::string::npos);
+}
+
 TEST(ReadCsv, RowOfDifferentLengthIsRefused) { EXPECT_FALSE(table_of("u_px,v_px\n1,2,3\n").has_value()); }
 
 TEST(ReadCsv, ControlCharactersAreRefused) {

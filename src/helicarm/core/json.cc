@@ -32,6 +32,34 @@ std::string shorten(const Json& value) {
   return text;
 }
 
+/// Insertions, deletions, changes and exchanges of neighbours that make one word of the other.
+std::size_t edits_between(std::string_view a, std::string_view b) {
+  std::vector<std::vector<std::size_t>> edits(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i)
+    for (std::size_t k = 0; k <= b.size(); ++k) {
+      if (i == 0 || k == 0) {
+        edits[i][k] = i + k;
+        continue;
+      }
+      edits[i][k] = std::min(
+          {edits[i - 1][k] + 1, edits[i][k - 1] + 1, edits[i - 1][k - 1] + (a[i - 1] == b[k - 1] ? 0 : 1)});
+      if (i > 1 && k > 1 && a[i - 1] == b[k - 2] && a[i - 2] == b[k - 1])
+        edits[i][k] = std::min(edits[i][k], edits[i - 2][k - 2] + 1);
+    }
+  return edits[a.size()][b.size()];
+}
+
+/// What to say of a key that may be a misspelt `key`; nothing where none is like it.
+std::string misspelling_of(std::string_view key, const Json& object, const std::vector<std::string>& known) {
+  constexpr std::size_t shortest = 5, longest = 100;  // of short names, others may be as near
+  if (key.size() < shortest) return {};
+  for (const auto& [name, value] : object.items())
+    if (name.size() <= longest && std::ranges::find(known, name) == known.end() &&
+        edits_between(key, name) <= std::min<std::size_t>(2, key.size() / 4))
+      return fmt::format(" (there is {}: misspelt?)", shorten(name));
+  return {};
+}
+
 /// SAX pass without building values: bounds nesting and keys before memory grows with them.
 class StructureCheck : public nlohmann::json_sax<Json> {
  public:
@@ -72,13 +100,21 @@ class StructureCheck : public nlohmann::json_sax<Json> {
       return refuse(Reason::bad_json,
                     fmt::format("not UTF-8 at {}: the file has another encoding (Latin-1?), save it as UTF-8",
                                 place(position)));
-    return refuse(Reason::bad_json, fmt::format("not valid JSON at {}", place(position)));
+    return refuse(Reason::bad_json,
+                  fmt::format("not valid JSON at {}{}", place(position), comma_before(position)));
   }
 
  private:
   bool refuse(Reason reason, const std::string& problem) {
     failure_ = {reason, fmt::format("{}: {}", origin_, problem), {}, {}};
     return false;
+  }
+  /// What to say of a comma behind the last entry, where that is the fault at the byte, counted from 1.
+  std::string comma_before(std::size_t byte) const {
+    if (byte < 2 || byte > text_.size() || (text_[byte - 1] != '}' && text_[byte - 1] != ']')) return {};
+    const std::size_t before = text_.find_last_not_of(" \t\r\n", byte - 2);
+    if (before == text_.npos || text_[before] != ',') return {};
+    return fmt::format(": remove the comma before \"{}\"", text_[byte - 1]);
   }
   /// Line and column of a byte, counted from 1.
   std::string place(std::size_t byte) const {
@@ -127,7 +163,8 @@ JsonReader::JsonReader(const Json& value, std::string where) : value_(&value), w
 }
 
 void JsonReader::refuse(Reason reason, const char* key, const std::string& problem) const {
-  throw BadInput(reason, fmt::format("{}: \"{}\": {}", where_, key, problem));
+  throw BadInput(reason, fmt::format("{}: \"{}\": {}{}", where_, key, problem,
+                                     value_->contains(key) ? "" : misspelling_of(key, *value_, asked_)));
 }
 
 bool JsonReader::has(const char* key) const {

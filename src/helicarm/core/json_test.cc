@@ -2,6 +2,7 @@
 #include "helicarm/core/json.h"
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace helicarm {
@@ -101,6 +102,26 @@ TEST(JsonReader, MissingKeySaysWhatToWrite) {
             "a.json: \"views\": is missing: write \"views\": [{...}, ...]");
 }
 
+TEST(JsonReader, AMisspeltKeyIsNamedBesideTheMissingOne) {
+  const Json json = {{"u_pxx", 1}, {"imgae", "a.png"}, {"diameter_m", 2}, {"imagine", 3}};
+  const auto message = [&](auto read) {
+    JsonReader reader(json, "a.json");
+    return guarded([&] { read(reader); }).error().message;
+  };
+  EXPECT_EQ(message([](JsonReader& r) { r.text("image"); }),
+            "a.json: \"image\": is missing: write \"image\": \"...\" (there is \"imgae\": misspelt?)");
+  EXPECT_THAT(message([](JsonReader& r) {
+                r.number("diameter_mm", {1, 100});
+              }),
+              testing::HasSubstr("(there is \"diameter_m\": misspelt?)"));
+  EXPECT_THAT(message([](JsonReader& r) { r.text("u_px"); }), testing::Not(testing::HasSubstr("misspelt")));
+  EXPECT_THAT(message([](JsonReader& r) {
+                r.number("diameter_m", {1, 100});
+                r.number("diameter_mm", {1, 100});
+              }),
+              testing::Not(testing::HasSubstr("misspelt")));
+}
+
 TEST(JsonReader, UnreadKeyIsUnknown) {
   const Failure failure = failure_of(R"({"size": 4, "sise": 5})", [](JsonReader& r) {
     r.number("size", {0, 9});
@@ -146,6 +167,14 @@ TEST(ParseJson, SyntaxErrorIsGivenByLineAndColumn) {
   const auto failure = parse_json("{\n  \"a\": 1,\n  \"b\" 2\n}", "case.json").error();
   EXPECT_EQ(failure.reason, Reason::bad_json);
   EXPECT_EQ(failure.message, "case.json: not valid JSON at line 3, column 7");
+}
+
+TEST(ParseJson, ACommaBehindTheLastEntryIsNamed) {
+  const auto message = [](const char* text) { return parse_json(text, "case.json").error().message; };
+  EXPECT_EQ(message("{\n  \"a\": [1, 2],\n}"),
+            "case.json: not valid JSON at line 3, column 1: remove the comma before \"}\"");
+  EXPECT_EQ(message("[1, ]"), "case.json: not valid JSON at line 1, column 5: remove the comma before \"]\"");
+  EXPECT_EQ(message("[,]"), "case.json: not valid JSON at line 1, column 2");
 }
 
 TEST(ParseJson, OtherEncodingsAreNamed) {
