@@ -81,7 +81,18 @@ class OwnFiles(SimulatedCase):
         picks.write_text("name,view,u_px,v_px\nentry,OBL,250,240\n")
         done = run("pick", case, "--csv", picks)
         self.assertEqual(done.returncode, 2)
+        self.assertIn("wrong.csv: row 1", done.stderr)
         self.assertIn("OBL", done.stderr)
+        self.assertEqual((case / "case.json").read_bytes(), before)
+
+    def test_pick_outside_the_image_leaves_the_case_alone(self):
+        case = self.made("outside")
+        before = (case / "case.json").read_bytes()
+        picks = self.root / "outside.csv"
+        picks.write_text("name,view,u_px,v_px\nentry,AP,250,240\nentry,LAT,250,1240\n")
+        done = run("pick", case, "--csv", picks)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("outside.csv: row 2: 250, 1240 lies outside the image of 512 x 512", done.stderr)
         self.assertEqual((case / "case.json").read_bytes(), before)
 
     def test_bundle_is_the_same_each_time_and_holds_no_name(self):

@@ -50,8 +50,12 @@ void add_from(const fs::path& csv, const PickArguments& arguments, Console& cons
   const FileLock lock = value_or_throw(FileLock::of(pipeline::case_file(arguments.folder)));
   const fs::path& file = lock.file();
   const CsvTable table = value_or_throw(read_csv(csv, {"name", "view", "u_px", "v_px"}, {"sigma_px"}));
-  const pipeline::PickedCase picked = value_or_throw(pipeline::with_picks(
-      value_or_throw(read_json(file)), table, pipeline::folder_of_case(arguments.folder)));
+  const std::string origin = csv.filename().string();
+  const fs::path folder = pipeline::folder_of_case(arguments.folder);
+  const pipeline::PickedCase picked =
+      value_or_throw(pipeline::with_picks(value_or_throw(read_json(file)), table, origin, folder));
+  value_or_throw(pipeline::check_in_images(
+      table, origin, value_or_throw(pipeline::case_from_json(picked.json, "case.json", folder))));
   value_or_throw(write_file(file, to_text(picked.json) + "\n"));
   if (console.json)
     console.out << to_text(

@@ -5,6 +5,10 @@
 #include <set>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "helicarm/pipeline/view_image.h"
+#include "helicarm/rectification/distortion_map.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -27,20 +31,33 @@ Json new_pick(const Json& picks, const std::string& name, const std::string& vie
   return pick;
 }
 
+/// Refuses a row of a view that the case does not have.
+void check_view(const Case& the_case, const std::string& view, const std::string& where) {
+  std::vector<std::string> names;
+  for (const CaseView& each : the_case.views) names.push_back(each.name);
+  if (std::ranges::count(names, view) == 0)
+    throw BadInput(Reason::bad_value, fmt::format("{}: view: \"{}\" is not a view of the case (views: {})",
+                                                  where, view, fmt::join(names, ", ")));
+}
+
 }  // namespace
 
-Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::filesystem::path& folder) {
+Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::string& origin,
+                                const std::filesystem::path& folder) {
   return guarded([&] {
-    value_or_throw(case_from_json(json, "case.json", folder));
-    if (table.rows() == 0) throw BadInput(Reason::bad_value, "picks: the table has no rows");
+    const Case the_case = value_or_throw(case_from_json(json, "case.json", folder));
+    if (table.rows() == 0)
+      throw BadInput(Reason::bad_value, fmt::format("{}: the table has no rows", origin));
     PickedCase picked{std::move(json)};
     Json& picks = picks_of(picked.json);
     std::set<std::pair<std::string, std::string>> rows;
     for (std::size_t row = 0; row < table.rows(); ++row) {
       const std::string &name = table.text(row, "name"), &view = table.text(row, "view");
+      const std::string where = fmt::format("{}: row {}", origin, row + 1);
+      check_view(the_case, view, where);
       if (!rows.emplace(name, view).second)
         throw BadInput(Reason::name_clash,
-                       fmt::format("picks: row {}: \"{}\" is given twice in \"{}\"", row + 1, name, view));
+                       fmt::format("{}: \"{}\" is given twice in \"{}\"", where, name, view));
       auto pick = std::find_if(picks.begin(), picks.end(), [&](const Json& other) {
         return is_named(other, name) && other.value("view", Json()) == Json(view);
       });
@@ -55,6 +72,26 @@ Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::fil
     }
     value_or_throw(case_from_json(picked.json, "case.json", folder));
     return picked;
+  });
+}
+
+Expected<void> check_in_images(const CsvTable& table, const std::string& origin, const Case& the_case) {
+  return guarded([&] {
+    for (const CaseView& view : the_case.views) {
+      std::optional<xray::XrayImage> image;
+      for (std::size_t row = 0; row < table.rows(); ++row) {
+        if (table.text(row, "view") != view.name) continue;
+        if (!image) image = value_or_throw(image_of(view));
+        const Eigen::Vector2d uv(table.number(row, "u_px"), table.number(row, "v_px"));
+        const int width = image->pixels.width(), height = image->pixels.height();
+        if (!rectification::identity_map(width, height, {}).shows(uv))
+          throw BadInput({Reason::bad_value,
+                          fmt::format("{}: row {}: {:g}, {:g} lies outside the image of {} x {} pixels",
+                                      origin, row + 1, uv.x(), uv.y(), width, height),
+                          view.name,
+                          {}});
+      }
+    }
   });
 }
 

@@ -22,7 +22,8 @@ class CasePicks : public testing::Test {
   Expected<PickedCase> picked(const std::string& rows) {
     const auto path = folder_.path() / "picks.csv";
     EXPECT_TRUE(write_file(path, "name,view,u_px,v_px,sigma_px\n" + rows));
-    return with_picks(json_, *read_csv(path, {"name", "view", "u_px", "v_px"}, {"sigma_px"}), folder_.path());
+    return with_picks(json_, *read_csv(path, {"name", "view", "u_px", "v_px"}, {"sigma_px"}), "picks.csv",
+                      folder_.path());
   }
 
   TemporaryFolder folder_;
@@ -65,7 +66,9 @@ TEST_F(CasePicks, WithoutAnEndOfTheCasesTunnelAreRefused) {
 }
 
 TEST_F(CasePicks, OfAnUnknownViewAreRefused) {
-  EXPECT_EQ(picked("entry,OBL,1,2,\n").error().reason, Reason::bad_value);
+  const Failure refusal = picked("entry,AP,1,2,\nentry,OBL,1,2,\n").error();
+  EXPECT_EQ(refusal.reason, Reason::bad_value);
+  EXPECT_EQ(refusal.message, "picks.csv: row 2: view: \"OBL\" is not a view of the case (views: AP, LAT)");
 }
 
 TEST_F(CasePicks, GivenTwiceAreRefused) {
