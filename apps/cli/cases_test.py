@@ -95,6 +95,33 @@ class OwnFiles(SimulatedCase):
         self.assertIn("outside.csv: row 2: 250, 1240 lies outside the image of 512 x 512", done.stderr)
         self.assertEqual((case / "case.json").read_bytes(), before)
 
+    def test_an_image_is_not_taken_for_a_case(self):
+        done = run("run", self.images[0])
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("is an image, not a case", done.stderr)
+        self.assertIn("helicarm new", done.stderr)
+
+    def test_a_result_is_not_taken_for_a_case(self):
+        out = self.root / "result"
+        self.assertEqual(run("run", self.root / "case", "--out", out, "--no-report", "--quiet").returncode, 0)
+        done = run("run", out)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("holds a result", done.stderr)
+
+    def test_new_says_what_it_takes_in_place_of_a_folder(self):
+        done = run("new", self.root / "case", "--calibrator", "udcsc", "--out", self.root / "of-folder")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("name its images", done.stderr)
+
+    def test_a_message_names_its_file_once(self):
+        notes = self.root / "notes.txt"
+        notes.write_text("no image")
+        for file in (notes, self.root / "none.dcm"):
+            for words in (["detect", file], ["rectify", file, "--plate", "plate48", "--out", self.root / "map"]):
+                done = run(*words)
+                self.assertEqual(done.returncode, 2)
+                self.assertEqual(done.stderr.count(file.name), 1, done.stderr)
+
     def test_bundle_is_the_same_each_time_and_holds_no_name(self):
         case = self.root / "doe"
         shutil.copytree(self.root / "case", case)

@@ -7,6 +7,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/case_description.h"
+#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -212,11 +213,32 @@ Expected<Case> case_from_json(const Json& json, const std::string& origin, const
   });
 }
 
+namespace {
+
+/// With what the path is instead of a case: an image, or a folder with a result or with images.
+Failure instead_of_case(Failure failure, const fs::path& path, const fs::path& file) {
+  const bool is_folder = fs::is_directory(path);
+  if (!is_folder && failure.reason != Reason::missing_file && xray::count_frames(file))
+    return {Reason::unsupported,
+            fmt::format("{}: is an image, not a case: make a case of the images of all views with "
+                        "`helicarm new`",
+                        path.string()),
+            {},
+            {}};
+  if (is_folder && failure.reason == Reason::missing_file)
+    failure.message += fs::is_regular_file(path / "result.json")
+                           ? ": the folder holds a result (result.json), give that of its case"
+                           : "; `helicarm new` makes a case of images";
+  return failure;
+}
+
+}  // namespace
+
 Expected<Case> read_case(const fs::path& path, Purpose purpose) {
   const fs::path file = case_file(path);
-  return read_json(file).and_then([&](const Json& json) {
-    return case_from_json(json, file.filename().string(), folder_of_case(path), purpose);
-  });
+  const auto json = read_json(file);
+  if (!json) return tl::unexpected<Failure>(instead_of_case(json.error(), path, file));
+  return case_from_json(*json, file.filename().string(), folder_of_case(path), purpose);
 }
 
 }  // namespace helicarm::pipeline

@@ -203,6 +203,10 @@ NewImage new_image_from(const std::string& word) {
 
 Expected<InspectedImage> inspect_image(const NewImage& image) {
   return guarded([&] {
+    if (fs::is_directory(image.file))
+      throw BadInput(
+          Reason::missing_file,
+          fmt::format("{}: is a folder: name its images, each as [VIEW=]FILE[:FRAME]", image.file.string()));
     if (!image.frame)
       if (const int frames = value_or_throw(xray::count_frames(image.file)); frames > 1)
         throw BadInput({Reason::usage,
