@@ -13,6 +13,7 @@
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
 #include "helicarm/phantom_calibration/diameter_scale.h"
+#include "helicarm/pipeline/diagnosis/displaced_balls.h"
 #include "helicarm/pipeline/result.h"
 
 namespace helicarm::phantom_calibration {
@@ -200,25 +201,12 @@ bool is_swapped(const phantom::CalibratorBall& ball, const phantom::Calibrator& 
   return seen >= 2;
 }
 
-/// Whether it is missing: in two views or more its place is in the image and free of any other dot that could
-/// hide it or be it.
+/// Whether it is missing: in two views or more its place is in the image and free.
 bool is_missing(const phantom::CalibratorBall& ball, const std::vector<pipeline::RectifiedView>& detected,
                 const std::vector<geometry::View>& views, const std::vector<std::size_t>& view_of_case) {
-  constexpr double reach = 2;  // radii
   int empty = 0;
-  for (std::size_t v = 0; v < views.size(); ++v) {
-    const pipeline::RectifiedView& image = detected[view_of_case[v]];
-    const Eigen::Vector2d raw =
-        image.rectification.map.raw_from_rectified(views[v].project(ball.centre_in_calibrator));
-    const double radius_px =
-        ball.diameter_mm / 2 * views[v].intrinsics.fy / views[v].depth(ball.centre_in_calibrator);
-    const auto is_near = [&](const detection::Dot& dot) {
-      return (dot.centre_px - raw).norm() < reach * std::max(radius_px, dot.radius_px);
-    };
-    if (!image.rectification.map.shows(raw)) continue;
-    empty += std::ranges::none_of(fiducials::ball_candidates(image.dots, image.rectification), is_near) &&
-             std::ranges::none_of(image.rectification.plate_dots, is_near);
-  }
+  for (std::size_t v = 0; v < views.size(); ++v)
+    empty += pipeline::is_absent(ball, detected[view_of_case[v]], views[v]);
   return empty >= 2;
 }
 

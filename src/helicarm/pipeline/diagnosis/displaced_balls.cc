@@ -6,7 +6,10 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include "helicarm/detection/find_dots.h"
+#include "helicarm/fiducials/candidates.h"
 #include "helicarm/geometry/triangulation.h"
 
 namespace helicarm::pipeline {
@@ -112,7 +115,53 @@ std::vector<Warning> exchanged_balls(const CaseCalibration& calibration,
   return warnings;
 }
 
+/// Whether the ball's place is in the image, and no centre of a plate's dot or of these within `reach` radii.
+bool is_free(const phantom::CalibratorBall& ball, const RectifiedView& image, const geometry::View& view,
+             const std::vector<detection::Dot>& dots, double reach) {
+  const rectification::Rectification& rectification = image.rectification;
+  const Eigen::Vector2d raw = rectification.map.raw_from_rectified(view.project(ball.centre_in_calibrator));
+  const double radius_px = ball.diameter_mm / 2 * view.intrinsics.fy / view.depth(ball.centre_in_calibrator);
+  const auto is_near = [&](const detection::Dot& dot) {
+    return (dot.centre_px - raw).norm() < reach * std::max(radius_px, dot.radius_px);
+  };
+  return rectification.map.shows(raw) && std::ranges::none_of(dots, is_near) &&
+         std::ranges::none_of(rectification.plate_dots, is_near);
+}
+
+/// Whether nothing known covers the fiducial's place in two views, or in the only one, and in one of them no
+/// disc lies there: in another an unlabelled one may, as where a coordinate along its rays is wrong.
+bool is_in_no_view(const CaseCalibration& calibration, const std::vector<LabelledView>& images,
+                   const phantom::CalibratorBall& ball, std::size_t k) {
+  constexpr double reach = 1.5;  // radii: discs that touch look like one, within a radius of each
+  std::size_t uncovered = 0, empty = 0;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (calibration.fiducials[i][k].status != fiducials::FiducialStatus::not_found) continue;
+    const geometry::View& view = calibration.views[i].view;
+    const auto dots = fiducials::ball_candidates(images[i].dots, images[i].rectification);
+    uncovered +=
+        is_free(ball, images[i], view, detection::dots_except(dots, images[i].fiducials.false_blobs), reach);
+    empty += is_free(ball, images[i], view, dots, reach);
+  }
+  return empty > 0 && uncovered >= std::min<std::size_t>(2, images.size());
+}
+
+Warning of_absent(const std::vector<std::string>& labels) {
+  const bool is_one = labels.size() == 1;
+  return {
+      Reason::not_seen,
+      fmt::format("fiducial{} {} {} found in no view, although nothing covers the place where the "
+                  "calibrator's file has {}: lost, or wrong coordinates. Compare the file with the "
+                  "calibrator, or measure it with `helicarm phantom measure`",
+                  is_one ? "" : "s", fmt::join(labels, ", "), is_one ? "is" : "are", is_one ? "it" : "them"),
+      {},
+      {{"balls", double(labels.size())}}};
+}
+
 }  // namespace
+
+bool is_absent(const phantom::CalibratorBall& ball, const RectifiedView& image, const geometry::View& view) {
+  return is_free(ball, image, view, fiducials::ball_candidates(image.dots, image.rectification), 2);
+}
 
 std::vector<Warning> displaced_balls(const CaseCalibration& calibration,
                                      const std::vector<LabelledView>& images,
@@ -124,10 +173,14 @@ std::vector<Warning> displaced_balls(const CaseCalibration& calibration,
         }))
       unused.push_back(k);
   std::vector<Warning> warnings = exchanged_balls(calibration, images, calibrator, unused);
+  std::vector<std::string> absent;
   for (const std::size_t k : unused) {
     const phantom::CalibratorBall& ball = calibrator.balls[k];
     const auto seen = displaced_ball(calibration, images, ball);
-    if (!seen) continue;
+    if (!seen) {
+      if (is_in_no_view(calibration, images, ball, k)) absent.push_back(ball.label);
+      continue;
+    }
     const double off = (seen->place - ball.centre_in_calibrator).norm();
     warnings.push_back(
         {Reason::ball_displaced,
@@ -140,6 +193,7 @@ std::vector<Warning> displaced_balls(const CaseCalibration& calibration,
           {"y_mm", seen->place.y()},
           {"z_mm", seen->place.z()}}});
   }
+  if (!absent.empty()) warnings.push_back(of_absent(absent));
   return warnings;
 }
 

@@ -19,6 +19,7 @@ class UnlabelledBalls : public testing::Test {
       calibration.fiducials.push_back({{"P3", calibrator.balls[0].centre_in_calibrator},
                                        {"P4", calibrator.balls[1].centre_in_calibrator}});
       LabelledView image;
+      image.dots.dark.emplace();
       image.rectification.map = rectification::identity_map(1024, 1024, {});
       images.push_back(image);
     }
@@ -61,6 +62,43 @@ TEST_F(UnlabelledBalls, OneBallOfAnotherDiameterIsNoExchange) {
   show(calibrator.balls[1].centre_in_calibrator, 4);
   for (const Warning& warning : displaced_balls(calibration, images, calibrator))
     EXPECT_EQ(warning.message.find("exchanged"), std::string::npos) << warning.message;
+}
+
+TEST_F(UnlabelledBalls, BallsThatNoViewShowsAreNamedTogether) {
+  const auto warnings = displaced_balls(calibration, images, calibrator);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].reason, Reason::not_seen);
+  EXPECT_EQ(warnings[0].message.find("fiducials P3, P4 are found in no view"), 0u) << warnings[0].message;
+}
+
+TEST_F(UnlabelledBalls, ABallThatOneViewMayHideIsNotMissed) {
+  detection::Dot plate_dot;
+  plate_dot.centre_px = calibration.views[0].view.project(calibrator.balls[0].centre_in_calibrator);
+  plate_dot.radius_px = 8;
+  images[0].rectification.plate_dots.push_back(plate_dot);
+  calibration.fiducials[1][1].status = fiducials::FiducialStatus::outside;
+  EXPECT_TRUE(displaced_balls(calibration, images, calibrator).empty());
+}
+
+TEST_F(UnlabelledBalls, OneViewMayShowABallOfWhichACoordinateAlongItsRaysIsWrong) {
+  Eigen::Vector3d elsewhere = calibrator.balls[0].centre_in_calibrator;
+  elsewhere.z() = -30;
+  show(elsewhere, 3);
+  for (LabelledView& image : images) image.dots.dark = image.fiducials.false_blobs;
+  calibration.fiducials[1][1].status = fiducials::FiducialStatus::outside;
+  const auto warnings = displaced_balls(calibration, images, calibrator);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].message.find("fiducial P3 is found in no view"), 0u) << warnings[0].message;
+}
+
+TEST_F(UnlabelledBalls, OfASingleViewItsFreePlaceSuffices) {
+  images.pop_back();
+  calibration.views.pop_back();
+  calibration.fiducials.pop_back();
+  calibration.fiducials[0][1].status = fiducials::FiducialStatus::occluded;
+  const auto warnings = displaced_balls(calibration, images, calibrator);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].message.find("fiducial P3 is found in no view"), 0u) << warnings[0].message;
 }
 
 }  // namespace
