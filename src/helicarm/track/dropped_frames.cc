@@ -179,6 +179,8 @@ void repair_dropped_frames(SequenceData& work, Sequence& sequence) {
       const std::size_t begin = parts[i].first_frame,
                         end = i + 1 < parts.size() ? parts[i + 1].first_frame : work.frames;
       const bool is_whole = std::abs(all - frames) < whole_within;
+      if (!is_whole)
+        for (std::size_t f = begin; f < end; ++f) work.refused[f] = Reason::cameras_not_in_step;
       if (is_whole && frames != 0) {
         move_images(work, k, begin, end, std::lround(frames / step));
         is_moved = true;
@@ -191,7 +193,7 @@ void repair_dropped_frames(SequenceData& work, Sequence& sequence) {
                sequence.frames[begin], name, std::abs(jump), jump > 0 ? "later" : "earlier", sigma,
                jump > 0 ? name : first, jump > 0 ? first : name,
                is_whole ? "they are taken for those of the frames that they show"
-                        : "the frames from there on are wrong by that"),
+                        : "the frames from there on have no pose"),
            name,
            {{"frame", double(sequence.frames[begin])}, {"jump_frames", jump}, {"sigma_frames", sigma}}});
     }

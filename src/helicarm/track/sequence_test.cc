@@ -388,6 +388,18 @@ TEST(Sequence, FrameThatOneCameraDroppedIsNamedAndTakenIntoAccount) {
   }
 }
 
+TEST(Sequence, AfterAFrameDroppedBetweenThoseThatAreFollowedNoBodyHasAPose) {
+  const TrackCase the_case = two_bodies();
+  const auto all = with_dropped(drawn(the_case, none), 20, 1);
+  std::vector<FrameSights> every_second;
+  for (std::size_t f = 0; f < all.size(); f += 2) every_second.push_back(all[f]);
+  const Sequence sequence = estimate_sequence(the_case, every_second);
+  ASSERT_TRUE(warning_of(sequence, Reason::cameras_not_in_step));
+  EXPECT_EQ(sequence.bodies[0].frames[5].decision, PoseDecision::accept);
+  EXPECT_EQ(sequence.bodies[0].frames[15].reason, Reason::cameras_not_in_step);
+  EXPECT_FALSE(sequence.bodies[0].frames[15].pose);
+}
+
 TEST(Sequence, FilmsInStepHaveNoDroppedFrame) {
   const TrackCase the_case = two_bodies();
   EXPECT_FALSE(warning_of(estimate_sequence(the_case, drawn(the_case, none)), Reason::cameras_not_in_step));
