@@ -250,6 +250,22 @@ class CommandLine(SimulatedCase):
             self.assertEqual(done.returncode, 0)
             self.assertIn(f"Example:\n  helicarm {command}", done.stdout)
 
+    def test_a_misspelt_command_of_a_group_is_named(self):
+        for words, said in ((["rn"], '"rn" is not a command; helicarm --help lists'),
+                            (["c-arm", "chek"], '"chek" is not a command; helicarm c-arm --help lists'),
+                            (["--threads", "1", "c-arm", "--quiet", "chek"], '"chek" is not a command'),
+                            (["tracker"], "no command is given; helicarm tracker --help lists"),
+                            (["phantom", "verfy"], '"verfy" is none of: show, check, export, design, measure, verify'),
+                            (["schema", "cases"], '"cases" is none of: calibrator, case')):
+            done = run(*words)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(said, done.stderr)
+            self.assertEqual(json.loads(run(*words, "--json").stdout)["failure"]["code"], "usage")
+
+    def test_help_of_a_group_needs_no_command(self):
+        for words in (["c-arm", "--help"], ["c-arm", "--quiet", "--help"], ["tracker", "-h"], ["--version"]):
+            self.assertEqual(run(*words).returncode, 0, words)
+
     def test_run_that_cannot_write_its_overlays_leaves_nothing(self):
         out = self.root / "blocked"
         (out / "LAT_overlay.png/in the way").mkdir(parents=True)

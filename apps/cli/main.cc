@@ -107,6 +107,31 @@ bool is_answered_as_module(const CLI::App& app, std::vector<std::string>& words,
   return false;
 }
 
+/// Throws CLI::ParseError for a word that is no command, of the program or of a group of commands.
+void check_commands(const CLI::App& app, std::span<const std::string> words) {
+  const CLI::App* group = &app;
+  std::string path = "helicarm";
+  const auto wish = std::ranges::find_if(
+      words, [](const std::string& word) { return word == "--help" || word == "-h" || word == "--version"; });
+  const bool is_answered = wish != words.end();
+  words = words.first(std::size_t(wish - words.begin()));
+  for (words = from_command(app, words); !words.empty(); words = from_command(app, words.subspan(1))) {
+    const std::string& word = words.front();
+    const auto commands = group->get_subcommands([](const CLI::App*) { return true; });
+    if (commands.empty() || word.starts_with('-')) return;
+    const auto command = std::ranges::find(commands, word, &CLI::App::get_name);
+    if (command == commands.end())
+      throw CLI::ParseError(fmt::format("\"{}\" is not a command; {} --help lists the commands",
+                                        without_control_characters(word), path),
+                            CLI::ExitCodes::ExtrasError);
+    group = *command;
+    path += " " + word;
+  }
+  if (!is_answered && group != &app && !group->get_subcommands([](const CLI::App*) { return true; }).empty())
+    throw CLI::ParseError(fmt::format("no command is given; {} --help lists the commands", path),
+                          CLI::ExitCodes::RequiredError);
+}
+
 int run(int argc, char** argv) {
   Console console{std::cout, std::cerr};
   Action action;
@@ -116,12 +141,7 @@ int run(int argc, char** argv) {
   std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
   if (is_answered_as_module(app, words, console)) return 0;
   try {
-    const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
-    if (!words.empty() && !words[0].starts_with('-') &&
-        std::ranges::none_of(commands, [&](const CLI::App* c) { return c->get_name() == words[0]; }))
-      throw CLI::ParseError(fmt::format("\"{}\" is not a command; helicarm --help lists the commands",
-                                        without_control_characters(words[0])),
-                            CLI::ExitCodes::ExtrasError);
+    check_commands(app, words);
     if (words.empty()) {
       console.progress << app.help();
       return exit_code(Reason::usage);

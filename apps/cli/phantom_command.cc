@@ -25,10 +25,12 @@
 #include "helicarm/phantom_calibration/verify_phantom.h"
 #include "helicarm/sweep/sweep_case.h"
 #include "named_files.h"
+#include "one_of.h"
 #include "phantom_check_command.h"
 
 namespace helicarm::cli {
 
+/// In the order of the words of the command line.
 enum class PhantomAction { show, check, export_files, design, measure, verify };
 
 /// `helicarm phantom show|check|export [NAME_OR_FILE] [--plate] [--stl FILE] [--svg FILE]`. With --json,
@@ -339,22 +341,19 @@ void add_phantom(CLI::App& app, Action& action) {
       "my-phantom\n"
       "  helicarm phantom verify two-views --history my-phantom/history.json");
   auto& a = arguments_of(command, action, phantom_command);
+  const std::vector<std::string> action_words{"show", "check", "export", "design", "measure", "verify"};
   command
-      ->add_option(
-          "ACTION", a.action,
+      ->add_option_function<std::string>(
+          "ACTION",
+          [&a, action_words](const std::string& word) {
+            a.action = PhantomAction(std::ranges::find(action_words, word) - action_words.begin());
+          },
           "show, check, export: a calibrator or plate\n"
           "design: a calibrator for a knee's dimensions\n"
           "measure: ball coordinates as built, from a case of three views or more (6 to 10 advised, 10 to "
           "30 degrees apart)\n"
           "verify: whether the balls are still at the file's positions, from a case of two views or more")
-      ->transform(CLI::CheckedTransformer(
-                      std::map<std::string, PhantomAction>{{"show", PhantomAction::show},
-                                                           {"check", PhantomAction::check},
-                                                           {"export", PhantomAction::export_files},
-                                                           {"design", PhantomAction::design},
-                                                           {"measure", PhantomAction::measure},
-                                                           {"verify", PhantomAction::verify}})
-                      .description("{show, check, export, design, measure, verify}"))
+      ->check(one_of(action_words))
       ->type_name("WORD")
       ->required();
   command->add_option(
