@@ -153,10 +153,15 @@ def _(case):
     pick["uv"] = case.ball(case.views()[1], "P6")
 
 
+def matrices(poses):
+    for value in poses.values():
+        yield from matrices(value) if isinstance(value, dict) else [value]
+
+
 @attack("the tracker's poses in metres", "tunnels")
 def _(case):
     for poses in [v["poses"] for v in case.json["views"]] + [case.json["poses_now"]]:
-        for pose in poses.values():
+        for pose in matrices(poses):
             for row in pose[:3]:
                 row[3] /= 1000
 
