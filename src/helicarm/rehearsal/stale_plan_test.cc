@@ -24,7 +24,8 @@ constexpr int most_attempts = 25;
 bool is_timing_failure(const Failure& failure) {
   return failure.reason == Reason::stale_pose || failure.reason == Reason::stale_state ||
          failure.reason == Reason::robot_stopped || failure.reason == Reason::robot_locked ||
-         failure.reason == Reason::order_not_confirmed;
+         failure.reason == Reason::order_not_confirmed ||
+         failure.reason == Reason::uncertain;  // a stalled tracker leaves few poses to average
 }
 
 /// An operation over sockets whose robot is registered.
