@@ -52,14 +52,14 @@ Simulated simulated(int count, double jitter_mm, double seed, int resting = 0) {
   return made;
 }
 
-double covered(const Simulated& simulation, const SmoothPath& path) {
+double covered(const Simulated& simulation, const SmoothPath& path, std::size_t first = 0) {
   constexpr double limit = 7.815;  // chi2 of 3 degrees of freedom, 95 %
   double inside = 0;
-  for (std::size_t i = 0; i < path.points.size(); ++i) {
+  for (std::size_t i = first; i < path.points.size(); ++i) {
     const Eigen::Vector3d off = (path.points[i].camera - simulation.cameras[i]).head<3>();
     inside += off.dot(path.points[i].camera_covariance.topLeftCorner<3, 3>().ldlt().solve(off)) < limit;
   }
-  return inside / double(path.points.size());
+  return inside / double(path.points.size() - first);
 }
 
 TEST(SmoothPath, JitterOfTheFramesIsFoundAndItsRegionsHold) {
@@ -107,20 +107,20 @@ TEST(SmoothPath, IsNearerThanEachFrameAlone) {
 
 TEST(SmoothPath, AGantryThatRestsAtItsStartHasOnePath) {
   constexpr int resting = 30, seeds = 8;
-  double inside = 0;
+  double moving = 0;
   for (int seed = 1; seed <= seeds; ++seed) {
     const Simulated simulation = simulated(120, 0.1, seed, resting);
     const Stiffness stiffness = choose_stiffness(simulation.frames, {});
     EXPECT_NEAR(stiffness.jitter[0], 0.1, 0.06);
     const SmoothPath path = smooth_path(simulation.frames, {}, stiffness);
-    inside += covered(simulation, path) / seeds;
+    moving += covered(simulation, path, resting) / seeds;
     for (std::size_t i = 0; i < resting; ++i) {
       EXPECT_EQ(path.points[i].path, path.points.front().path);
       EXPECT_LT(path.points[i].path_covariance(0, 0),
                 0.3 * simulation.frames.front().information.inverse()(0, 0));
     }
   }
-  EXPECT_GT(inside, 0.85);  // the resting frames of a run share their path's error
+  EXPECT_GT(moving, 0.9);  // the resting frames share their path's error, all inside or all outside
 }
 
 TEST(SmoothPath, AFreeTurnTakesNothingFromTheNeighbours) {
