@@ -41,7 +41,7 @@ std::optional<std::chrono::sys_days> day_of(const std::string& date);
 /// Where the central rays of a run of images meet.
 struct RunIsocentre {
   std::string run;                                     ///< digest of the first image that it tells of
-  std::string date = {};                               ///< UTC, on which it was added
+  std::string date = {};                               ///< as HistoryEntry's
   int images = 0;                                      ///< accepted
   double arc_deg = 0;                                  ///< between the first and the last
   double radius_mm = 0;                                ///< to the farthest central ray
