@@ -86,8 +86,7 @@ CommandResult detect_command(const DetectArguments& arguments, Console& console)
     const std::vector<std::filesystem::path> files = image_files(arguments.images);
     std::vector<Detected> all;
     for (std::size_t i = 0; i < files.size(); ++i) {
-      const xray::XrayImage image =
-          value_or_throw(xray::read_xray_image(files[i], files[i].filename().string(), arguments.frame));
+      const xray::XrayImage image = value_or_throw(xray::read_xray_image(files[i], arguments.frame));
       print_warnings(image.warnings, console);
       all.push_back({files[i].string(), detection::find_marks(image, kind), image.warnings});
       if (files.size() > 1 && !console.quiet)

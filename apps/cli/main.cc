@@ -30,16 +30,9 @@ namespace {
 
 constexpr int internal_error = 1;
 
-/// Whether the message begins with the file, or with a path to it, so that it need not be named before.
-bool begins_with_file(const std::string& message, const std::string& file) {
-  const std::string first = message.substr(0, message.find(": "));
-  return file.empty() || first == file || first.ends_with("/" + file);
-}
-
 int report(const Failure& failure, const Console& console, std::ostream& errors) {
   const int exit = exit_code(failure.reason);
-  const std::string view =
-      begins_with_file(failure.message, failure.view) ? std::string{} : failure.view + ": ";
+  const std::string view = failure.view.empty() ? std::string{} : failure.view + ": ";
   errors << fmt::format("helicarm: {}: {}{}\n", code(failure.reason), view,
                         without_control_characters(failure.message));
   if (console.json && !console.answered)

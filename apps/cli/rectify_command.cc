@@ -77,8 +77,7 @@ void write_field(const RectifyArguments& arguments, const rectification::Distort
 
 xray::XrayImage read(const std::filesystem::path& image, const RectifyArguments& arguments,
                      Console& console) {
-  xray::XrayImage read =
-      value_or_throw(xray::read_xray_image(image, image.filename().string(), arguments.frame));
+  xray::XrayImage read = value_or_throw(xray::read_xray_image(image, arguments.frame));
   print_warnings(read.warnings, console);
   return read;
 }

@@ -267,4 +267,10 @@ Expected<XrayImage> read_xray_image(const fs::path& path, const std::string& vie
   return named(guarded([&] { return read_by_content(path, frame); }), view_name);
 }
 
+Expected<XrayImage> read_xray_image(const fs::path& path, std::optional<int> frame) {
+  Expected<XrayImage> read = read_xray_image(path, path.filename().string(), frame);
+  if (!read) read.error().view.clear();
+  return read;
+}
+
 }  // namespace helicarm::xray

@@ -24,6 +24,9 @@ inline constexpr std::uintmax_t max_image_file_bytes = 256u << 20;
 Expected<XrayImage> read_xray_image(const std::filesystem::path& path, const std::string& view_name,
                                     std::optional<int> frame);
 
+/// An image that is no view of a case: named by its file. Failures name the file in their message alone.
+Expected<XrayImage> read_xray_image(const std::filesystem::path& path, std::optional<int> frame);
+
 /// Frames or pages of an image file; fails as `read_xray_image`.
 Expected<int> count_frames(const std::filesystem::path& path);
 
