@@ -274,6 +274,18 @@ class CommandLine(SimulatedCase):
         self.assertIn("cannot_write", done.stderr)
         self.assertEqual([path.name for path in out.iterdir()], ["LAT_overlay.png"])
 
+    def test_out_that_cannot_be_written_is_refused_before_the_work(self):
+        file = self.root / "a-file"
+        file.write_text("mine")
+        for words in (["run", self.root / "case"], ["register", self.root / "case"], ["sweep", self.root / "case"],
+                      ["track", self.root / "case", "--frames", "1-2"], ["migration", "none.csv", "none.csv"],
+                      ["segment", "none.nrrd", "--seed", "a=1,2,3"], ["phantom", "measure", self.root / "case"]):
+            done = run(*words, "--out", file / "below")
+            self.assertEqual(done.returncode, 2, words)
+            self.assertIn("cannot_write", done.stderr, words)
+            self.assertIn("a-file: is not a folder", done.stderr, words)
+        self.assertEqual(file.read_text(), "mine")
+
     def test_file_name_that_is_not_utf8_is_refused(self):
         done = run("detect", b"\xff.dcm".decode(errors="surrogateescape"), "--json")
         self.assertEqual(done.returncode, 2, done.stderr)

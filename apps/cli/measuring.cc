@@ -8,6 +8,7 @@
 #include "findings.h"
 #include "helicarm/calibration/c_arm_history_file.h"
 #include "helicarm/case_registration/dicom_measurements.h"
+#include "helicarm/core/files.h"
 #include "helicarm/pipeline/c_arm.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/map_cache.h"
@@ -117,6 +118,7 @@ Expected<Measurement> measured_case(const RunArguments& arguments, Console& cons
 
 Expected<Measurement> run_and_write(const RunArguments& arguments, Console& console) {
   return guarded([&] {
+    value_or_throw(check_can_write(arguments.out));
     report::forget_results(arguments.out);
     if (arguments.history && arguments.extends_history)
       value_or_throw(calibration::check_history_file(*arguments.history));

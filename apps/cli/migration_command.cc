@@ -63,6 +63,7 @@ std::string migration_text(const Json& json) {
 /// fails with its reason; unusable input leaves none.
 CommandResult migration_command(const MigrationArguments& arguments, Console& console) {
   return guarded([&] {
+    value_or_throw(check_can_write(arguments.out));
     migration::forget_migration(arguments.out);
     migration::MigrationRequest request{arguments.first,
                                         arguments.second,

@@ -255,6 +255,7 @@ void measure(const PhantomArguments& arguments, Console& console) {
   if (!arguments.out) throw BadInput(Reason::usage, "phantom measure: --out DIR is required");
   const std::filesystem::path& out = *arguments.out;
   refuse_own_calibrator(arguments.name_or_file, out);
+  value_or_throw(check_can_write(out));
   forget_files(out, {"calibrator.json", "result.json", "report.html"});
   const phantom_calibration::PhantomResult result = measured(arguments, console);
   print_warnings(result.warnings, console);

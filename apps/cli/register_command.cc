@@ -166,6 +166,7 @@ namespace {
 CaseRow registered(const RegisterArguments& arguments, Console& console) {
   const RunArguments& run = arguments.run;
   name_replaced_frames(arguments, console);
+  value_or_throw(check_can_write(run.out));
   if (!arguments.resume) report::forget_registration(run.out);
   const case_registration::RegisterOptions options = value_or_throw(options_of(run, console));
   case_registration::Progress progress;

@@ -83,6 +83,7 @@ std::string segment_text(const Json& json) {
 CommandResult segment_command(const SegmentArguments& arguments, Console& console) {
   return guarded([&] {
     const segmentation::SegmentRequest request = request_of(arguments);
+    value_or_throw(check_can_write(arguments.out));
     segmentation::forget_segmentation(arguments.out, request);
     pipeline::Progress progress;
     if (!console.quiet)

@@ -235,6 +235,7 @@ CommandResult study_command(const StudyArguments& arguments, Console& console) {
     const study::Ranks ranks;
     if (ranks.leads())
       forget_files(out, {arguments.name + ".csv", arguments.name + ".json", arguments.name + ".svg"});
+    value_or_throw(check_can_write(out));
     only(arguments, study.options);
     std::error_code error;
     if (std::filesystem::create_directories(out, error); error)

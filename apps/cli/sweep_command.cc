@@ -8,6 +8,7 @@
 
 #include "command_line.h"
 #include "findings.h"
+#include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/sweep/sweep.h"
 #include "progress_line.h"
@@ -73,6 +74,7 @@ std::optional<sweep::CheckOptions> check_options(const SweepArguments& arguments
 Expected<sweep::Sweep> swept(const SweepArguments& arguments, const std::filesystem::path& folder,
                              const std::filesystem::path& out, Console& console) {
   return guarded([&] {
+    value_or_throw(check_can_write(out));
     sweep::forget_sweep(out);
     sweep::SweepOptions options;
     if (!arguments.path.empty()) options.path = value_or_throw(sweep::path_kind(arguments.path));

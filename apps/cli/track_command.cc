@@ -65,6 +65,7 @@ std::string summary_of(const track::Sequence& sequence, const track::TrackCase& 
 Expected<track::Sequence> tracked(const TrackArguments& arguments, const std::filesystem::path& folder,
                                   const std::filesystem::path& out, Console& console) {
   return guarded([&] {
+    value_or_throw(check_can_write(out));
     if (!arguments.resume) track::forget_track(out);
     const auto range = value_or_throw(case_registration::frame_range_from(arguments.frames));
     const auto refuse = [&](const Failure& failure) {

@@ -5,6 +5,7 @@
 #include "arrays.h"
 #include "helicarm/case_registration/dicom_measurements.h"
 #include "helicarm/case_registration/register_case.h"
+#include "helicarm/core/files.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/registration/follow.h"
@@ -159,6 +160,7 @@ py::object register_sequence(const std::filesystem::path& folder, const Frames& 
     const py::gil_scoped_acquire acquire;
     if (!progress.is_none()) progress(share);
   };
+  if (out) value_or_raise(check_can_write(*out));
   if (out && !resume) report::forget_registration(*out);
   const auto sequence = value_or_raise(without_gil([&] {
     return pipeline::read_case(folder, pipeline::Purpose::registration)

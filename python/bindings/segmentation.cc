@@ -2,6 +2,7 @@
 #include <map>
 
 #include "arrays.h"
+#include "helicarm/core/files.h"
 #include "helicarm/segmentation/segment_files.h"
 #include "helicarm/volume/declared.h"
 #include "module.h"
@@ -39,6 +40,7 @@ py::object segment_ct(const std::filesystem::path& ct, const py::dict& seeds, co
   if (voxel_mm) request.voxel_mm = row_of<3>(*voxel_mm, "voxel_mm");
   const RunHooks hooks = run_hooks(progress);
   const pipeline::Progress steps{hooks.on_stage, hooks.on_view};
+  if (out) value_or_raise(check_can_write(*out));
   Json json;
   auto made = value_or_raise(without_gil([&] {
     if (out) segmentation::forget_segmentation(*out, request);

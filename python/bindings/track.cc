@@ -7,6 +7,7 @@
 #include "arrays.h"
 #include "checks.h"
 #include "helicarm/calibration/calibrated_view.h"
+#include "helicarm/core/files.h"
 #include "helicarm/exchange/import_matrix.h"
 #include "module.h"
 #include "signals.h"
@@ -44,6 +45,7 @@ std::unique_ptr<Tracked> tracked(const std::filesystem::path& folder, const std:
   return value_or_raise(without_gil([&] {
     return guarded([&] {
       if (picks && points) throw BadInput(Reason::usage, "picks and points: only one of them");
+      if (out) value_or_throw(check_can_write(*out));
       if (out && !resume) track::forget_track(*out);
       const auto range = value_or_throw(case_registration::frame_range_from(frames));
       auto made = std::make_unique<Tracked>();
@@ -118,7 +120,10 @@ std::unique_ptr<Tracked> tracked_images(
   const RunHooks hooks = run_hooks(py::none());
   value_or_raise(without_gil([&] {
     return guarded([&] {
-      if (out) track::forget_track(*out);
+      if (out) {
+        value_or_throw(check_can_write(*out));
+        track::forget_track(*out);
+      }
       made->sequence = value_or_throw(track::run_track(the_case, range, {.out = out}, [&](int done) {
         hooks.on_view();
         if (progress.is_none()) return;

@@ -192,6 +192,16 @@ Expected<std::string> read_file(const fs::path& path, std::uintmax_t max_bytes) 
   return bytes;
 }
 
+Expected<void> check_can_write(const fs::path& folder) {
+  std::error_code ignored;
+  fs::path there = folder.empty() ? fs::path(".") : fs::absolute(folder, ignored);
+  while (!fs::exists(there, ignored) && there != there.parent_path()) there = there.parent_path();
+  if (!fs::is_directory(there, ignored))
+    return fail(Reason::cannot_write, fmt::format("{}: is not a folder", there.string()));
+  if (::access(there.c_str(), W_OK | X_OK) != 0) return tl::unexpected<Failure>(cannot_write(there, errno));
+  return {};
+}
+
 Expected<void> write_file(const fs::path& path, std::string_view bytes) {
   return make_folder(folder_of(path)).and_then([&] { return write_file_in_folder(path, bytes); });
 }

@@ -13,6 +13,10 @@ namespace helicarm {
 /// Whole content of a regular file of at most `max_bytes` bytes.
 Expected<std::string> read_file(const std::filesystem::path& path, std::uintmax_t max_bytes);
 
+/// Fails (cannot_write) where no file could be written below `folder`, which need not exist: before work
+/// whose result would be lost.
+Expected<void> check_can_write(const std::filesystem::path& folder);
+
 /// Replaces `path` atomically: temporary file, fsync, rename, fsync of the folder.
 Expected<void> write_file(const std::filesystem::path& path, std::string_view bytes);
 

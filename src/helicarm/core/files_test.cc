@@ -80,6 +80,19 @@ TEST_F(Files, FolderThatCannotBeCreatedNamesTheCause) {
   EXPECT_NE(result.error().message.find("Not a directory"), std::string::npos) << result.error().message;
 }
 
+TEST_F(Files, WritingIsCheckedWithoutMakingAFolder) {
+  EXPECT_TRUE(check_can_write(folder_ / "new/deeper"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "new"));
+  EXPECT_TRUE(check_can_write({}));
+  ASSERT_TRUE(write_file(folder_ / "file", "x"));
+  for (const auto& path : {folder_ / "file", folder_ / "file/below"}) {
+    const auto refused = check_can_write(path);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().reason, Reason::cannot_write);
+    EXPECT_EQ(refused.error().message, (folder_ / "file").string() + ": is not a folder");
+  }
+}
+
 TEST_F(Files, PathsOfWindowsAreNamed) {
   for (const char* name : {"C:\\data\\AP.dcm", "c:/data/AP.dcm", "\\\\server\\AP.dcm"}) {
     const auto refused = path_inside(folder_, name);
