@@ -7,6 +7,7 @@
 
 #include "command_line.h"
 #include "findings.h"
+#include "helicarm/core/files.h"
 #include "helicarm/pipeline/c_arm.h"
 #include "helicarm/report/c_arm_report.h"
 
@@ -63,13 +64,14 @@ CommandResult c_arm_add_command(const CArmAddArguments& arguments, Console& cons
 
 CommandResult c_arm_report_command(const CArmReportArguments& arguments, Console& console) {
   return guarded([&] {
-    const calibration::CArmModel model = value_or_throw(pipeline::model_of_record(
-        value_or_throw(calibration::read_history(arguments.record)), arguments.record.string()));
-    value_or_throw(report::write_c_arm_report(model, arguments.out));
+    value_or_throw(check_can_write(arguments.out));
+    const report::CArmFindings findings = report::c_arm_findings(value_or_throw(pipeline::model_of_record(
+        value_or_throw(calibration::read_history(arguments.record)), arguments.record.string())));
+    value_or_throw(report::write_c_arm_report(findings, arguments.out));
     if (console.json)
-      console.out << to_text(report::to_json(model)) << '\n';
+      console.out << to_text(report::to_json(findings)) << '\n';
     else
-      console.out << report::c_arm_text(model) << fmt::format("  written to {}\n", arguments.out.string());
+      console.out << report::c_arm_text(findings) << fmt::format("  written to {}\n", arguments.out.string());
   });
 }
 

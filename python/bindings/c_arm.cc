@@ -36,12 +36,15 @@ std::size_t add_to_c_arm(const std::filesystem::path& record, const std::filesys
 
 py::object c_arm_report(const std::filesystem::path& record,
                         const std::optional<std::filesystem::path>& out) {
-  const calibration::CArmModel model =
-      value_or_raise(calibration::read_history(record).and_then([&](const calibration::CArmHistory& history) {
-        return pipeline::model_of_record(history, record.string());
-      }));
-  if (out) value_or_raise(report::write_c_arm_report(model, *out));
-  return python_from(report::to_json(model));
+  const report::CArmFindings findings = value_or_raise(without_gil([&] {
+    return guarded([&] {
+      auto found = report::c_arm_findings(value_or_throw(
+          pipeline::model_of_record(value_or_throw(calibration::read_history(record)), record.string())));
+      if (out) value_or_throw(report::write_c_arm_report(found, *out));
+      return found;
+    });
+  }));
+  return python_from(report::to_json(findings));
 }
 
 }  // namespace

@@ -133,8 +133,10 @@ std::string migrations_table(const std::string& title, const std::vector<Row>& r
                                          row.migration->width_of_95 * sigma_of_six(*row.body)[at])};
                        }});
   columns.push_back(
-      {{"MTPM, mm", "Maximum total point motion ± standard deviation", true}, [](const Row& row) {
-         return report::Cell{fmt::format("{:.3f} ± {:.3f}", row.body->mtpm_mm, row.body->mtpm_sigma_mm)};
+      {{"MTPM, mm", "Maximum total point motion, with half the width of its 95 % interval", true},
+       [](const Row& row) {
+         return report::Cell{fmt::format("{:.3f} ± {:.3f}", row.body->mtpm_mm,
+                                         row.migration->width_of_95 * row.body->mtpm_sigma_mm)};
        }});
   return html_of(report::table_of<Row>(title, columns, rows));
 }
