@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -30,8 +32,14 @@
 
 namespace helicarm::cli {
 
-/// In the order of the words of the command line.
 enum class PhantomAction { show, check, export_files, design, measure, verify };
+constexpr std::array<std::pair<std::string_view, PhantomAction>, 6> actions{
+    {{"show", PhantomAction::show},
+     {"check", PhantomAction::check},
+     {"export", PhantomAction::export_files},
+     {"design", PhantomAction::design},
+     {"measure", PhantomAction::measure},
+     {"verify", PhantomAction::verify}}};
 
 /// `helicarm phantom show|check|export [NAME_OR_FILE] [--plate] [--stl FILE] [--svg FILE]`. With --json,
 /// `design --knee D1,D2` proposes a calibrator for a knee; with --svg and --file as `export`. With --json,
@@ -342,19 +350,20 @@ void add_phantom(CLI::App& app, Action& action) {
       "my-phantom\n"
       "  helicarm phantom verify two-views --history my-phantom/history.json");
   auto& a = arguments_of(command, action, phantom_command);
-  const std::vector<std::string> action_words{"show", "check", "export", "design", "measure", "verify"};
+  std::vector<std::string> words;
+  for (const auto& [word, of] : actions) words.emplace_back(word);
   command
       ->add_option_function<std::string>(
           "ACTION",
-          [&a, action_words](const std::string& word) {
-            a.action = PhantomAction(std::ranges::find(action_words, word) - action_words.begin());
+          [&a](const std::string& word) {
+            a.action = std::ranges::find(actions, word, [](const auto& one) { return one.first; })->second;
           },
           "show, check, export: a calibrator or plate\n"
           "design: a calibrator for a knee's dimensions\n"
           "measure: ball coordinates as built, from a case of three views or more (6 to 10 advised, 10 to "
           "30 degrees apart)\n"
           "verify: whether the balls are still at the file's positions, from a case of two views or more")
-      ->check(one_of(action_words))
+      ->check(one_of(words))
       ->type_name("WORD")
       ->required();
   command->add_option(
