@@ -4,7 +4,6 @@ its library. Judges of peers.py."""
 import atexit
 import functools
 import json
-import os
 import pathlib
 import shutil
 import socket
@@ -14,14 +13,7 @@ import tempfile
 import numpy as np
 
 import helicarm
-
-PROGRAM = os.environ.get("HELICARM_PROGRAM")
-
-
-def run(*command):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, errors="replace")
-    assert done.returncode == 0, (command, done.stdout, done.stderr)
-    return done.stdout + done.stderr
+from peer_values import PROGRAM, run
 
 
 def measured(folder, seed, **options):

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import helicarm
-import peers
+from pydicom_peers import ct_datasets
+from vtk_peers import vtk_meshes
 from test_arrays import TETRAHEDRON, refused
 
 TO_LPS = np.diag([-1, -1, 1, 1.0])
@@ -140,7 +141,7 @@ def test_other_images_of_nibabel_need_an_orientation(nibabel):
 @pytest.fixture
 def series():
     pydicom = pytest.importorskip("pydicom", reason="pydicom is not installed")
-    return lambda n: peers.ct_datasets(pydicom, np.random.default_rng(n), n)
+    return lambda n: ct_datasets(pydicom, np.random.default_rng(n), n)
 
 
 def test_a_tilted_series_keeps_its_shear(series):
@@ -174,7 +175,7 @@ def test_a_dataset_is_an_image(case):
 
 def test_a_space_of_poly_data_is_honoured():
     vtk = pytest.importorskip("vtk", reason="VTK is not installed")
-    _, mesh = peers.vtk_meshes(np.random.default_rng(1), 0)
+    _, mesh = vtk_meshes(np.random.default_rng(1), 0)
     refused("usage", "does not state its frame", helicarm.as_surface, mesh)
     space = vtk.vtkStringArray()
     space.SetName("SPACE")

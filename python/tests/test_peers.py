@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files of other people's libraries; those that are not installed are left out with a line."""
-import importlib.util  # noqa: F401
 import pytest
 
 import peers
