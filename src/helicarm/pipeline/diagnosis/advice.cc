@@ -97,11 +97,11 @@ Advice of_few(const Result& result) {
   const bool many = view && unlabelled_candidates(*view).size() > result.calibrator.balls.size();
   Advice advice{
       {"the calibrator is only partly in the field, or behind shutters or metal",
-       "its balls are of another diameter than the file states",
+       "its balls are of another diameter than the file states, or the pixel size of the image is wrong",
        "the dose is too low, or the balls are too small in the image"},
       "open the overlay: orange circles are all candidates. Bring the whole calibrator into the field "
       "and acquire the view again"};
-  if (many) std::swap(advice.causes[0], advice.causes[1]);
+  if (many || has_figure(*result.failure, "fitting_pixel_mm")) std::swap(advice.causes[0], advice.causes[1]);
   return advice;
 }
 

@@ -41,7 +41,7 @@ TEST(Advice, UnknownHandednessComesFirstWhereTheRivalIsMirrored) {
 }
 
 TEST(Advice, WrongTagsComeFirstWhereOthersFit) {
-  for (const Reason reason : {Reason::plate_mismatch, Reason::calibrator_mismatch})
+  for (const Reason reason : {Reason::plate_mismatch, Reason::calibrator_mismatch, Reason::too_few_fiducials})
     EXPECT_THAT(advice_for(refused(reason, {{"fitting_pixel_mm", 0.3}})).causes.front(),
                 HasSubstr("pixel size"));
 }
