@@ -3,15 +3,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <set>
+#include <unordered_map>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <fmt/format.h>
 
 #include "helicarm/geometry/dense_matrix.h"
+#include "helicarm/geometry/near_points.h"
 
 namespace helicarm::rectification {
 namespace {
@@ -32,29 +37,58 @@ Vector2i rounded(const Vector2d& p) {
   return {static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y()))};
 }
 
-struct PlateLattice {
-  std::vector<Vector2i> indices;
-  double pitch;
+/// From a dot to the one nearest to it, where they are closest.
+Vector2d shortest_step(const std::vector<Vector2d>& dots) {
+  Vector2d low = dots.front(), high = low;
+  for (const Vector2d& dot : dots) {
+    low = low.cwiseMin(dot);
+    high = high.cwiseMax(dot);
+  }
+  const geometry::NearPoints near(dots, (high - low).norm() / std::sqrt(double(dots.size())));
+  Vector2d shortest(1e9, 0);
+  for (std::size_t i = 0; i < dots.size(); ++i)
+    for (const std::size_t j : near.nearest_to(i, 1))
+      if (const Vector2d step = dots[j] - dots[i]; step.norm() < shortest.norm() - 1e-6) shortest = step;
+  return shortest;
+}
+
+/// A plate's lattice: its dots by their indices relative to the first.
+class PlateLattice {
+ public:
+  explicit PlateLattice(std::vector<Vector2i> indices) : indices_(std::move(indices)) {
+    for (std::size_t k = 0; k < indices_.size(); ++k) dots_.emplace(key(indices_[k]), k);
+  }
+
+  const std::vector<Vector2i>& indices() const { return indices_; }
+  /// The first dot there.
+  std::optional<std::size_t> dot_at(const Vector2i& index) const {
+    const auto found = dots_.find(key(index));
+    return found == dots_.end() ? std::nullopt : std::optional(found->second);
+  }
+
+ private:
+  static std::uint64_t key(const Vector2i& index) {
+    return std::uint64_t(std::uint32_t(index.x())) << 32 | std::uint32_t(index.y());
+  }
+
+  std::vector<Vector2i> indices_;
+  std::unordered_map<std::uint64_t, std::size_t> dots_;
 };
 
-/// The plate's lattice: its dots as indices relative to the first. The dots may be rotated.
+/// The dots may be rotated.
 PlateLattice lattice_of(const phantom::Plate& plate) {
-  double pitch = plate.pitch_mm.value_or(0);
   const Vector2d origin = plate.dots_mm.front();
-  Vector2d axis(1e9, 0);
-  for (const Vector2d& p : plate.dots_mm)
-    for (const Vector2d& q : plate.dots_mm)
-      if (const Vector2d d = q - p; &p != &q && d.norm() < axis.norm() - 1e-6) axis = d;
-  if (pitch == 0) pitch = axis.norm();
+  const Vector2d axis = shortest_step(plate.dots_mm);
+  const double pitch = plate.pitch_mm.value_or(axis.norm());
   const double sector =
       plate.lattice == phantom::Lattice::square ? std::numbers::pi / 2 : std::numbers::pi / 3;
   const double angle = std::atan2(axis.y(), axis.x());
   const double turn = angle - sector * std::round(angle / sector);
   const Matrix2d to_index =
       (Eigen::Rotation2Dd(turn).toRotationMatrix() * basis(plate.lattice) * pitch).inverse();
-  PlateLattice lattice{{}, pitch};
-  for (const Vector2d& p : plate.dots_mm) lattice.indices.push_back(rounded(to_index * (p - origin)));
-  return lattice;
+  std::vector<Vector2i> indices;
+  for (const Vector2d& p : plate.dots_mm) indices.push_back(rounded(to_index * (p - origin)));
+  return PlateLattice(std::move(indices));
 }
 
 /// All symmetries of a lattice about a node: proper ones first, smallest rotation first.
@@ -85,10 +119,8 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice,
     return matched;
   }
   const PlateLattice own = lattice_of(plate);
-  std::set<Cell> occupied;
-  for (const Vector2i& i : own.indices) occupied.insert({i.x(), i.y()});
   Vector2d own_middle = Vector2d::Zero();
-  for (const Vector2i& i : own.indices) own_middle += i.cast<double>() / double(own.indices.size());
+  for (const Vector2i& i : own.indices()) own_middle += i.cast<double>() / double(own.indices().size());
   Vector2d seen_middle = Vector2d::Zero();
   for (const IndexedDot& d : lattice.dots)
     seen_middle += d.index.cast<double>() / double(lattice.dots.size());
@@ -111,20 +143,17 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice,
     std::set<Cell> shifts;
     // Every shift that maps one dot to another; on a large plate only those that align the centres.
     const Vector2d about = own_middle - way.cast<double>() * seen_middle;
-    for (std::size_t k = 0; k < 3 * own.indices.size(); ++k) {
+    for (std::size_t k = 0; k < 3 * own.indices().size(); ++k) {
       // Three anchors, because one of them may be an outlier.
       const Vector2i anchor = way * lattice.dots[(1 + k % 3) * lattice.dots.size() / 4].index;
-      const Vector2i shift = own.indices[k / 3] - anchor;
-      if (own.indices.size() < 200 || (shift.cast<double>() - about).norm() < 4)
+      const Vector2i shift = own.indices()[k / 3] - anchor;
+      if (own.indices().size() < 200 || (shift.cast<double>() - about).norm() < 4)
         shifts.insert({shift.x(), shift.y()});
     }
     for (const Cell& cell : shifts) {
       const Vector2i shift(cell.first, cell.second);
       int hits = 0;
-      for (const IndexedDot& d : lattice.dots) {
-        const Vector2i at = way * d.index + shift;
-        hits += occupied.contains({at.x(), at.y()});
-      }
+      for (const IndexedDot& d : lattice.dots) hits += own.dot_at(way * d.index + shift).has_value();
       // A detected dot where the plate has none counts against, an undetected plate dot does not.
       const int score = 2 * hits - static_cast<int>(lattice.dots.size());
       const Vector2d middle = way.cast<double>().inverse() * (own_middle - shift.cast<double>());
@@ -146,14 +175,9 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice,
                 fmt::format("{} of {} dots on the lattice are at positions where the plate \"{}\" has none",
                             strays, lattice.dots.size(), plate.name),
                 {{"strays", strays}, {"indexed", double(lattice.dots.size())}});
-  const auto place_of = [&](const Vector2i& index) -> int {
-    for (std::size_t k = 0; k < own.indices.size(); ++k)
-      if (own.indices[k] == index) return static_cast<int>(k);
-    return -1;
-  };
   for (const IndexedDot& d : lattice.dots)
-    if (const int k = place_of(best_way * d.index + best_shift); k >= 0)
-      matched.push_back({d.dot, plate.dots_mm[static_cast<std::size_t>(k)]});
+    if (const auto k = own.dot_at(best_way * d.index + best_shift))
+      matched.push_back({d.dot, plate.dots_mm[*k]});
   return matched;
 }
 

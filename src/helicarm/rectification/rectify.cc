@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -59,6 +61,24 @@ void set_metric(DistortionMap& map, const xray::XrayImage& xray_image, const pha
   map.rectified_plane = RectifiedPlane::detector;
 }
 
+/// Places of the plate that no dot was seen at and that may lie in the image.
+std::vector<Vector2d> places_missed(const phantom::Plate& plate, const std::vector<Correspondence>& seen,
+                                    const MapFit& fit, const xray::XrayImage& xray_image) {
+  std::set<std::pair<double, double>> known;
+  for (const Correspondence& c : seen) known.emplace(c.place_mm.x(), c.place_mm.y());
+  const Vector2d size(xray_image.pixels.width(), xray_image.pixels.height());
+  const Vector2d margin = 0.25 * size;  // no intensifier displaces by more
+  std::vector<Vector2d> missed;
+  for (const Vector2d& place : plate.dots_mm) {
+    const Vector2d rectified = fit.rectified_from_plate * place;
+    if (known.contains({place.x(), place.y()}) || (rectified + margin).minCoeff() < 0 ||
+        (size + margin - rectified).minCoeff() < 0)
+      continue;
+    missed.push_back(place);
+  }
+  return missed;
+}
+
 /// Fits plate dots that the search missed at the positions predicted by the map.
 void fit_missing_dots(const xray::XrayImage& xray_image, const phantom::Plate& plate, const MapFit& fit,
                       const detection::DotAppearance& appearance, const std::vector<detection::Dot>& all,
@@ -66,21 +86,23 @@ void fit_missing_dots(const xray::XrayImage& xray_image, const phantom::Plate& p
   if (plate.dots_mm.empty() || plate_dots.empty()) return;
   double radius = 0;
   for (const detection::Dot& dot : plate_dots) radius += dot.radius_px / double(plate_dots.size());
-  for (const Vector2d& position : plate.dots_mm) {
-    const bool known =
-        std::any_of(seen.begin(), seen.end(), [&](const auto& c) { return c.place_mm == position; });
-    if (known) continue;
-    detection::Dot start;
-    start.centre_px = fit.map.raw_from_rectified(fit.rectified_from_plate * position);
-    start.radius_px = radius;
-    const auto dot = detection::refit_dots(xray_image, {start}, appearance, all);
-    if (dot.empty() || dot[0].sigma_px > 0.2 || dot[0].misfit > 0.3) continue;
-    if ((dot[0].contrast > 0) != (plate_dots[0].contrast > 0)) continue;
-    if (std::abs(dot[0].contrast) < 0.3 * std::abs(plate_dots[plate_dots.size() / 2].contrast)) continue;
-    if ((dot[0].centre_px - start.centre_px).norm() > 1.5 || std::abs(dot[0].radius_px / radius - 1) > 0.15)
+  const double contrast = plate_dots[plate_dots.size() / 2].contrast;
+  const bool is_bright = plate_dots[0].contrast > 0;
+  const std::vector<Vector2d> places = places_missed(plate, seen, fit, xray_image);
+  std::vector<detection::Dot> starts(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    starts[i].centre_px = fit.map.raw_from_rectified(fit.rectified_from_plate * places[i]);
+    starts[i].radius_px = radius;
+  }
+  const auto fitted = detection::refit_each(xray_image, starts, appearance, all);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto& dot = fitted[i];
+    if (!dot || dot->sigma_px > 0.2 || dot->misfit > 0.3) continue;
+    if ((dot->contrast > 0) != is_bright || std::abs(dot->contrast) < 0.3 * std::abs(contrast)) continue;
+    if ((dot->centre_px - starts[i].centre_px).norm() > 1.5 || std::abs(dot->radius_px / radius - 1) > 0.15)
       continue;
-    seen.push_back({position, dot[0].centre_px, dot[0].error_px()});
-    plate_dots.push_back(dot[0]);
+    seen.push_back({places[i], dot->centre_px, dot->error_px()});
+    plate_dots.push_back(*dot);
   }
 }
 
@@ -190,8 +212,10 @@ Expected<Rectification> rectify(const xray::XrayImage& xray_image, detection::Im
   if (auto pitch = check_pitch(attempt.seen.lattice, plate, scale, *fit); !pitch)
     return tl::unexpected<Failure>(pitch.error());
   if (appearance && dots.size() < plate.dots_mm.size()) {
+    const std::size_t found = dots.size();
     fit_missing_dots(xray_image, plate, *fit, *appearance, attempt.all, dots, seen);
-    if (auto again = fit_map(seen, width, height, map_options)) fit = std::move(again);
+    auto again = dots.size() > found ? fit_map(seen, width, height, map_options) : fit;
+    if (again) fit = std::move(again);
   }
 
   Rectification result;
