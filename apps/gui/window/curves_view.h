@@ -2,6 +2,8 @@
 #pragma once
 
 #include <QByteArray>
+#include <QComboBox>
+#include <QString>
 #include <QWidget>
 
 namespace helicarm::gui {
@@ -21,6 +23,22 @@ class CurvesView : public QWidget {
 
  private:
   QByteArray svg_;
+};
+
+/// A choice of sheets above the curves of the chosen one.
+class CurvesPanel : public QWidget {
+  Q_OBJECT
+
+ public:
+  /// The parts are called `name` + "Sheet" and `name` + "Curves".
+  CurvesPanel(const QString& name, const QString& sheet_says, const QString& curves_say);
+
+  QComboBox* sheet() { return sheet_; }
+  CurvesView* curves() { return curves_; }
+
+ private:
+  QComboBox* sheet_;
+  CurvesView* curves_;
 };
 
 }  // namespace helicarm::gui

@@ -130,20 +130,12 @@ QWidget* RunWindow::build_images() {
 }
 
 QWidget* RunWindow::build_curves() {
-  auto* whole = new QWidget;
-  auto* column = new QVBoxLayout(whole);
-  column->setContentsMargins(0, 0, 0, 0);
-  sheet_ = new QComboBox;
-  sheet_->setObjectName("runSheet");
-  sheet_->setAccessibleName(tr("Curves by angle or by image"));
+  auto* panel = new CurvesPanel("run", tr("Curves by angle or by image"), tr("Curves of the run's path"));
+  sheet_ = panel->sheet();
+  curves_ = panel->curves();
   sheet_->addItems({tr("Path and flex, by angle"), tr("Residuals and errors, by image")});
   connect(sheet_, &QComboBox::currentIndexChanged, this, &RunWindow::show_curves);
-  curves_ = new CurvesView;
-  curves_->setObjectName("runCurves");
-  curves_->setAccessibleName(tr("Curves of the run's path"));
-  column->addWidget(sheet_);
-  column->addWidget(curves_, 1);
-  return whole;
+  return panel;
 }
 
 int RunWindow::frame() const { return bar_->frame(); }

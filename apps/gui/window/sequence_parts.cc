@@ -122,19 +122,12 @@ QWidget* SequenceWindow::build_tables() {
 }
 
 QWidget* SequenceWindow::build_curves() {
-  auto* whole = new QWidget;
-  auto* column = new QVBoxLayout(whole);
-  column->setContentsMargins(0, 0, 0, 0);
-  sheet_ = new QComboBox;
-  sheet_->setObjectName("sequenceSheet");
-  sheet_->setAccessibleName(tr("Body, or body / reference"));
+  auto* panel = new CurvesPanel("sequence", tr("Body, or body / reference"),
+                                tr("Curves of the smooth motion with 95 % bars"));
+  sheet_ = panel->sheet();
+  curves_ = panel->curves();
   connect(sheet_, &QComboBox::currentIndexChanged, this, &SequenceWindow::show_curves);
-  curves_ = new CurvesView;
-  curves_->setObjectName("sequenceCurves");
-  curves_->setAccessibleName(tr("Curves of the smooth motion with 95 % bars"));
-  column->addWidget(sheet_);
-  column->addWidget(curves_, 1);
-  return whole;
+  return panel;
 }
 
 QWidget* SequenceWindow::build_scene() {
