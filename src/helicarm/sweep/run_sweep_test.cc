@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/core/temporary_folder.h"
+#include "helicarm/exchange/import_matrix.h"
+#include "helicarm/exchange/itk_transform.h"
 #include "helicarm/sweep/drawn_run_test.h"
 #include "helicarm/sweep/sweep.h"
 
@@ -157,6 +159,24 @@ TEST(RunSweep, ARunWithoutAnyBallIsRefused) {
   const TemporaryFolder folder;
   ASSERT_TRUE(write_sweep(sweep, folder.path()));
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "geometry"));
+}
+
+TEST(RunSweep, ForRtkTheAxisIsAlsoTurnedToY) {
+  const Sweep sweep = sweep_of(DrawnRun{});
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_sweep(sweep, folder.path()));
+  const auto cameras = exchange::import_cameras(folder.path() / "geometry/rtk_axis_y.xml");
+  const auto turned = exchange::read_itk_transform(folder.path() / "geometry/rtk_axis_y.tfm");
+  ASSERT_TRUE(cameras);
+  ASSERT_TRUE(turned && *turned);
+  ASSERT_EQ(cameras->size(), sweep.frames.size());
+  const Eigen::Vector3d point(10, -20, 30);
+  for (std::size_t i = 0; i < cameras->size(); ++i) {
+    const geometry::View& view = (*cameras)[i].view;
+    EXPECT_LT((view.project(**turned * point) - sweep.frames[i].best->view.project(point)).norm(), 1e-6);
+    EXPECT_LT(std::abs(view.source_in_world().y()), 5) << i;
+    EXPECT_LT(view.camera_from_world.rotation(1, 1), -0.95) << "upside down";
+  }
 }
 
 TEST(RunSweep, FilesOfAnEarlierRunAreRemoved) {

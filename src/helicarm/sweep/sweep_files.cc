@@ -3,11 +3,13 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "helicarm/core/csv.h"
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
+#include "helicarm/exchange/itk_transform.h"
 #include "helicarm/exchange/run_geometry.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/sweep/sweep.h"
@@ -38,6 +40,28 @@ constexpr std::array<std::pair<const char*, Writer>, 7> geometry_files{
      {"matrices.ompl", always<exchange::ompl_matrices>},
      {"matrices.csv", always<exchange::matrices_csv>},
      {"matrices.npy", always<exchange::matrices_npy>}}};
+
+constexpr const char *about_y = "rtk_axis_y.xml", *to_about_y = "rtk_axis_y.tfm";
+
+/// The run's axis becomes y, upwards in the images, its isocentre the origin.
+geometry::RigidTransform about_y_from_calibrator(const SweepPath& path, const exchange::RunGeometry& run) {
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  for (const exchange::RunGeometry::Image& image : run.images)
+    up -= image.view.camera_from_world.rotation.row(1);
+  const Eigen::Vector3d axis = path.axis->dot(up) < 0 ? Eigen::Vector3d(-*path.axis) : *path.axis;
+  const Eigen::Matrix3d turn =
+      Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  return {turn, -turn * path.isocentre};
+}
+
+/// For programs that weight the images by their angles about y: cameras, and the transform into their world.
+void write_about_y(const SweepPath& path, exchange::RunGeometry run, const std::filesystem::path& folder) {
+  const geometry::RigidTransform from_calibrator = about_y_from_calibrator(path, run);
+  for (exchange::RunGeometry::Image& image : run.images)
+    image.view.camera_from_world = image.view.camera_from_world * from_calibrator.inverse();
+  value_or_throw(write_file(folder / about_y, value_or_throw(exchange::rtk_geometry(run))));
+  value_or_throw(write_file(folder / to_about_y, exchange::itk_transform_text(from_calibrator)));
+}
 
 /// plastimatch reads a folder of files in the order of their names.
 std::string plastimatch_name(std::size_t image) { return fmt::format("{:04d}.txt", image + 1); }
@@ -107,7 +131,7 @@ void remove_if_empty(const std::filesystem::path& folder) {
 }  // namespace
 
 void forget_sweep(const std::filesystem::path& folder) {
-  std::vector<std::string> names;
+  std::vector<std::string> names{about_y, to_about_y};
   for (const auto& [name, writer] : geometry_files) names.emplace_back(name);
   forget_files(folder / "geometry", names);
   const std::filesystem::path plastimatch = folder / "geometry" / "plastimatch";
@@ -126,6 +150,7 @@ Expected<void> write_sweep(const Sweep& sweep, const std::filesystem::path& fold
       for (std::size_t i = 0; i < run.images.size(); ++i)
         value_or_throw(write_file(folder / "geometry" / "plastimatch" / plastimatch_name(i),
                                   exchange::plastimatch_matrix(run.images[i].view, run.pixel_mm)));
+      if (sweep.path && sweep.path->axis) write_about_y(*sweep.path, run, folder / "geometry");
     }
     value_or_throw(write_file(folder / "frames.csv", frames_csv(sweep)));
     if (sweep.check) value_or_throw(write_file(folder / "check.csv", check_csv(*sweep.check)));
