@@ -27,6 +27,15 @@ class OwnFiles(SimulatedCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         return out
 
+    def test_of_one_image_its_camera_is_printed_and_where_it_stands(self):
+        out, result = self.root / "one", self.root / "one-result"
+        for words in (["new", self.images[1], "--calibrator", self.root / "case/calibrator.json", "--plate", "plate48", "--out", out],
+                      ["run", out, "--out", result, "--no-report"]):
+            done = run(*words)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        for words in ("Source x, y, z, mm", "K, R, t", str(result / "result.json"), f"helicarm export {out} --as opencv"):
+            self.assertIn(words, done.stdout)
+
     def test_new_case_of_files_is_picked_by_a_table_and_run(self):
         case = self.made("new")
         description = json.loads((case / "case.json").read_text())

@@ -150,6 +150,11 @@ CommandResult run_one_case(const RunArguments& arguments, Console& console) {
     console.out << summary_of(result);
     if (measured->registration) console.out << "\n  models\n" << summary_of(*measured->registration);
     console.out << fmt::format("\n  written to {}\n", arguments.out.string());
+    if (result.views.size() == 1)
+      console.out << fmt::format(
+          "  K, R, t with their covariance: \"views\" in {}; for other programs: helicarm export {} --as "
+          "opencv (or rtk, astra, diffdrr, ...)\n",
+          (arguments.out / "result.json").string(), arguments.folder.string());
   }
   return {};
 }

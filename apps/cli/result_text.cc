@@ -20,8 +20,11 @@ void print_advice(const pipeline::Result& result, const std::string& report, std
 
 std::string summary_of(const pipeline::Result& result) {
   std::string text;
+  // Of a single image the camera is the result.
+  const report::Table camera =
+      result.views.size() == 1 ? report::calibration_table(result.views) : report::Table{};
   for (const report::Table& table :
-       {report::statistics_table(result.accuracy), report::points_table(result.points),
+       {camera, report::statistics_table(result.accuracy), report::points_table(result.points),
         report::tunnels_table(result), report::bone_table(result),
         report::verification_table(report::tools_at_ends(result.verifications))})
     if (!table.rows.empty())
