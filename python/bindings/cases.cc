@@ -13,6 +13,7 @@
 #include "helicarm/report/rectified_image.h"
 #include "helicarm/report/report.h"
 #include "helicarm/simulation/ball_sizes.h"
+#include "helicarm/simulation/rotation.h"
 #include "helicarm/simulation/truth_json.h"
 #include "helicarm/simulation/write_case.h"
 #include "helicarm/volume/hounsfield.h"
@@ -92,8 +93,13 @@ void write(const case_registration::Measurement& measured, const std::filesystem
 py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, const std::string& kind,
                     const std::optional<std::string>& preset, int size, int bits, bool knee,
                     const std::vector<std::string>& faults, const std::vector<std::string>& views,
-                    const std::optional<std::filesystem::path>& ct, unsigned threads) {
+                    const std::optional<std::filesystem::path>& ct, std::optional<int> run,
+                    std::optional<double> arc_deg, std::optional<double> flex_mm,
+                    std::optional<double> jitter_mm, std::optional<std::uint64_t> arm_seed,
+                    unsigned threads) {
   using namespace simulation;
+  if (!run && (arc_deg || flex_mm || jitter_mm))
+    raise({Reason::usage, "simulate_case: arc_deg, flex_mm and jitter_mm are of a run", {}, {}});
   SimulationOptions options;
   options.seed = seed;
   options.kind = value_or_raise(case_kind(kind));
@@ -101,6 +107,7 @@ py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, con
   options.size = size;
   options.bits = bits;
   options.knee = knee;
+  options.arm_seed = arm_seed;
   options.threads = threads;
   constexpr std::string_view lost = "lost:";
   for (const std::string& word : faults)
@@ -118,7 +125,16 @@ py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, con
   }
   value_or_raise(check_case_folder(folder));
   std::vector<Warning> warnings;
-  const auto simulated = without_gil([&] {
+  const auto simulated = without_gil([&]() -> Expected<Json> {
+    if (run) {
+      Rotation rotation{.frames = *run, .flex_mm = flex_mm};
+      rotation.arc_deg = arc_deg.value_or(rotation.arc_deg);
+      rotation.jitter_mm = jitter_mm.value_or(rotation.jitter_mm);
+      return simulate_run(options, rotation).and_then([&](const SimulatedRun& images) {
+        warnings = ball_size_warnings(images.images);
+        return write_run(folder, images).map([&] { return truth_json(images); });
+      });
+    }
     return simulate_case(options).and_then([&](const SimulatedCase& images) {
       warnings = ball_size_warnings(images);
       return write_case(folder, images).map([&] { return truth_json(images); });
@@ -313,13 +329,15 @@ Raises InputError; RefusedError with .result, which holds all that was computed 
       py::arg("kind") = std::string(simulation::word(usual_simulation.kind)), py::arg("preset") = py::none(),
       py::arg("size") = usual_simulation.size, py::arg("bits") = usual_simulation.bits,
       py::arg("knee") = usual_simulation.knee, py::arg("faults") = std::vector<std::string>(),
-      py::arg("views") = std::vector<std::string>(), py::arg("ct") = py::none(),
-      py::arg("threads") = usual_simulation.threads,
+      py::arg("views") = std::vector<std::string>(), py::arg("ct") = py::none(), py::arg("run") = py::none(),
+      py::arg("arc_deg") = py::none(), py::arg("flex_mm") = py::none(), py::arg("jitter_mm") = py::none(),
+      py::arg("arm_seed") = py::none(), py::arg("threads") = usual_simulation.threads,
       R"(Writes a simulated case (images, case.json, calibrator.json, plate.json, truth.json) into a folder.
 
 The same seed gives the same bytes. kind: accuracy, tunnels, flat or grid; preset: paper-sim, ii-9in or flat-panel;
 size: 512 or 1024 pixels; faults ("lost:P4": without this ball), views (NAME:PRIMARY,SECONDARY in degrees) and ct as
-`helicarm simulate`. Releases the GIL.
+`helicarm simulate`; arm_seed: of the C-arm (None: seed). run: a rotation of this many images for sweep instead, of 256 pixels too, over
+arc_deg, with sag up to flex_mm and jitter_mm of each image (None: as `helicarm simulate --run`). Releases the GIL.
 Returns the content of truth.json. Raises InputError: usage, bad_value, cannot_write.)");
 }
 

@@ -322,7 +322,9 @@ def run_case(folder: _Path, *, method: str = "best", max_error_mm: Optional[floa
              progress: Optional[Callable[[str], Any]] = None) -> Result: ...
 def simulate_case(folder: _Path, *, seed: int = 1, kind: str = "accuracy", preset: Optional[str] = None,
                   size: int = 1024, bits: int = 12, knee: bool = True, faults: Sequence[str] = ...,
-                  views: Sequence[str] = ..., ct: Optional[_Path] = None, threads: int = 0) -> _Dict: ...
+                  views: Sequence[str] = ..., ct: Optional[_Path] = None, run: Optional[int] = None,
+                  arc_deg: Optional[float] = None, flex_mm: Optional[float] = None, jitter_mm: Optional[float] = None,
+                  arm_seed: Optional[int] = None, threads: int = 0) -> _Dict: ...
 def register(folder: _Path, *, out: Optional[_Path] = None, dicom: bool = False, method: str = "best", max_error_mm: Optional[float] = None,
              motion_sigma_mm: float = 0, search_mm: float = ..., search_deg: float = ..., threads: int = 0,
              history: Optional[_Path] = None, cache: Union[bool, _Path] = True,

@@ -93,6 +93,21 @@ def test_a_check_that_is_not_possible_is_a_warning(run):
         helicarm.sweep(run, wire=((0, 0, -20), (0, 0, 20)))
 
 
+def test_a_simulated_run_is_swept_and_compared_with_its_truth(tmp_path):
+    truth = helicarm.simulate_case(tmp_path / "run", seed=2, kind="flat", knee=False, size=256, run=5, arc_deg=40, flex_mm=2, jitter_mm=0.1)
+    assert truth["run"] == {"file": "RUN.dcm", "frames": 5, "arc_deg": 40, "flex_mm": pytest.approx(2, abs=1e-6), "jitter_mm": 0.1}
+    sweep = helicarm.sweep(tmp_path / "run")
+    assert all(sweep.accepted)
+    for view, source, covariance in zip(truth["views"], sweep.sources, sweep.source_covariances):
+        assert np.linalg.norm(source - view["source_mm"]) < 4 * np.sqrt(np.trace(covariance))
+    arms = [helicarm.simulate_case(tmp_path / str(arm), seed=2, arm_seed=arm, kind="flat", knee=False, size=256, run=2) for arm in (2, 3)]
+    assert [arm["arm_seed"] for arm in arms] == [2, 3] and arms[0]["views"][0]["camera"] != arms[1]["views"][0]["camera"]
+    with pytest.raises(helicarm.InputError, match="of a run"):
+        helicarm.simulate_case(tmp_path / "none", flex_mm=2)
+    with pytest.raises(helicarm.InputError, match="must be 2 to 1000"):
+        helicarm.simulate_case(tmp_path / "none", kind="flat", run=1)
+
+
 def test_a_case_of_a_run_names_the_function_for_it(run):
     with pytest.raises(helicarm.InputError, match="helicarm sweep"):
         helicarm.run_case(run)
