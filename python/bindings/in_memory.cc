@@ -78,6 +78,9 @@ case_registration::GivenModel model_of(const std::string& name, const py::dict& 
   }
   if (entries.contains("scale_sigma"))
     loaded.scale_sigma = checked(entries["scale_sigma"].cast<double>(), {0, 0.1}, name + ": scale_sigma");
+  if (entries.contains("points"))
+    for (const auto& [point, at] : entries["points"].cast<std::vector<std::pair<std::string, Doubles>>>())
+      loaded.points.push_back({point, row_of<3>(at, fmt::format("{}: points: {}", name, point))});
   for (const Doubles& start : starts) loaded.starts.push_back(pose_from(start, "starts: " + name));
   return loaded;
 }

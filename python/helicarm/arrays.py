@@ -253,9 +253,9 @@ def _mask_on(volume, mask):
 
 
 def as_model(obj):
-    """The arguments of a model: {"volume" or "surface", "mask", "window_hu", "scale_sigma"}."""
+    """The arguments of a model: {"volume" or "surface", "mask", "window_hu", "scale_sigma", "points"}."""
     if isinstance(obj, Mapping):
-        known = {"volume", "surface", "mask", "window_hu", "scale_sigma"}
+        known = {"volume", "surface", "mask", "window_hu", "scale_sigma", "points"}
         if set(obj) - known:
             _refuse(f"models: {sorted(set(obj) - known)} is none of {sorted(known)}", "unknown_key")
         if ("volume" in obj) == ("surface" in obj) or ("surface" in obj and {"mask", "window_hu"} & set(obj)):
@@ -266,6 +266,8 @@ def as_model(obj):
                 model[name] = convert(model[name])
         if "mask" in model:
             model["mask"] = _mask_on(model["volume"], model["mask"])
+        if "points" in model:
+            model["points"] = [(name, np.asarray(place, float)) for name, place in model["points"].items()]
         return model
     is_surface = isinstance(obj, _c.Surface) or hasattr(obj, "GetPolys") or hasattr(obj, "faces")
     return {"surface": as_surface(obj)} if is_surface else {"volume": as_volume(obj)}

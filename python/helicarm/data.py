@@ -120,7 +120,8 @@ def register(folder=None, *, models=None, views=None, starts=None, camera_covari
 
     register(models={name: model}, views={name: (image, camera)}, starts={name: world_from_model}, ...): in memory.
       model: what as_volume or as_surface takes, or a dict of "volume" with "mask" (a volume, or an array of the volume's
-        shape, what is not 0 is the body) or "window_hu" (low, high), or "surface", and "scale_sigma" (relative). Model coordinates: L, P, S, mm.
+        shape, what is not 0 is the body) or "window_hu" (low, high), or "surface", and "scale_sigma" (relative), and
+        "points" {name: (x, y, z)}: planned points, carried into the world. Model coordinates: L, P, S, mm.
       image: what as_image takes, metal dark; of floats an XrayImage, which states their range. Free of distortion unless its
         camera has a map.
       camera: what as_camera takes, all of one world; or a Calibration, whose view of that name is used with its map, and
@@ -131,8 +132,8 @@ def register(folder=None, *, models=None, views=None, starts=None, camera_covari
       out, max_error_mm, motion_sigma_mm, search_mm, search_deg, threads, progress: as of a case.
 
     Returns the content of registration.json: ["models"][i]["world_from_model"], "covariance" (6 x 6: rotation vector in
-    rad, then mm, world axes, about centre_mm), "decision", ...; each model also has .world_from_model, .covariance and
-    .rotation (SciPy), the whole .to_frame() (pandas). World: the calibrator's frame, or that of the cameras.
+    rad, then mm, world axes, about centre_mm), "decision", ...; each model also has .world_from_model, .covariance,
+    .rotation (SciPy) and .points {name: {"xyz_mm", "covariance_mm2", "error_95_mm"}}, the whole .to_frame() (pandas). World: the calibrator's frame, or that of the cameras.
     Releases the GIL; progress is called with the name of each step, an exception from it ends the work, and Ctrl-C does.
     Raises InputError; RefusedError if the views or a model are refused, with all that was computed in .result.
     """

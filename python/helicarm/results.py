@@ -53,6 +53,12 @@ class RegisteredModel(dict):
         return rotation_of(self["world_from_model"])
 
     @property
+    def points(self):
+        """{name: {"xyz_mm", "covariance_mm2", "error_95_mm", ...}} of the planned points, in the world."""
+        return {point["name"]: {key: np.array(value) if key in ("xyz_mm", "covariance_mm2") else value
+                                for key, value in point.items()} for point in self["points"]}
+
+    @property
     def covariance(self):
         """(6, 6): rotation vector in rad, then mm, world axes, about centre_mm; NaN where it is not determined."""
         return np.full((6, 6), np.nan) if self["covariance"] is None else np.array(self["covariance"])

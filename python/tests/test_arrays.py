@@ -177,6 +177,29 @@ def test_a_mask_may_be_an_array_on_the_volumes_grid(sequence):  # noqa: F811
             models={"body": {"volume": volume, "mask": body[:-1]}}, views=views_of(sequence))
 
 
+def test_planned_points_in_memory_are_those_of_a_plan(sequence, tmp_path):  # noqa: F811
+    planned = {"entry": (0.0, 3, 12), "deep": (-4.0, 2, -9)}
+    body = {"volume": volume_of_body(), "window_hu": (300, 3000)}
+    found = helicarm.register(models={"body": {**body, "points": planned}}, views=views_of(sequence), starts={"body": start()}).models["body"]
+    points = [{"label": name, "position": list(at)} for name, at in planned.items()]
+    case = json.loads((sequence / "case.json").read_text())
+    for view in case["views"]:
+        view["image"] = view["image"].replace("{frame}", "1")
+    case["models"] = [{**case["models"][0], "plan": "plan.mrk.json"}]
+    for file in sequence.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    (tmp_path / "plan.mrk.json").write_text(json.dumps({"markups": [{"type": "Fiducial", "coordinateSystem": "LPS", "controlPoints": points}]}))
+    (tmp_path / "case.json").write_text(json.dumps(case))
+    of_files = helicarm.register(tmp_path)["models"][0]["points"]
+    assert found["points"] == [{key: other[key] for key in own} for own, other in zip(found["points"], of_files)]
+    assert list(found.points) == list(planned)
+    assert found.points["entry"]["xyz_mm"] == pytest.approx([1, 3, 12], abs=0.3) and found.points["deep"]["covariance_mm2"].shape == (3, 3)
+    for points, code, match in (({"far": (0, 0, 900)}, "bad_value", "far"), ({"short": (0, 0)}, "bad_value", "short")):
+        refused(code, match, helicarm.register, models={"body": {**body, "points": points}}, views=views_of(sequence), starts={"body": start()})
+    far = helicarm.register(models={"body": {**body, "points": {"off": (0, 0, 38)}}}, views=views_of(sequence), starts={"body": start()})
+    assert "outside_model" in [warning["code"] for warning in far["models"][0]["warnings"]]
+
+
 def test_a_start_may_be_one_of_several_and_views_a_list(sequence):  # noqa: F811
     far = start()
     far[:3, 3] += 60

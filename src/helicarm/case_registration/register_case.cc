@@ -10,6 +10,7 @@
 #include "helicarm/case_registration/carry_plan.h"
 #include "helicarm/case_registration/case_plans.h"
 #include "helicarm/case_registration/landmarks_alone.h"
+#include "helicarm/case_registration/model_box.h"
 #include "helicarm/case_registration/plan_errors.h"
 #include "helicarm/case_registration/register_in_memory.h"
 #include "helicarm/case_registration/registration_figures.h"
@@ -134,10 +135,16 @@ class Registrar {
           fmt::format("starts: \"{}\" is missing: with one view a pose is needed", case_model.name));
     RegisteredModel made;
     for (const RegistrationView& view : loaded_.views) made.views.push_back(view.view);
+    std::vector<PlacedPoint> placed;
+    for (const PlanPoint& point : loaded_model.points) placed.push_back({point.name, point.in_model});
+    const auto outside = check_places(case_model.name, "points", box_of(loaded_model.model), placed);
     const double motion_sigma_mm = options_.run.motion_sigma_mm;
     made.registration = registered_by_images(case_model, loaded_model.model, {loaded_model.starts, {}, {}},
                                              {}, loaded_.views, motion_sigma_mm);
     add_figures(loaded_model.model, loaded_.views, made);
+    for (const Warning& warning : outside) add_finding(made.registration, warning, false);
+    if (made.registration.is_determined()) carry_plan({loaded_model.points, {}}, given_, made);
+    limit_error(largest_error(made.points), options_.run.max_error_mm, made.registration);
     if (loaded_.views.size() > 1) made.registration.notes.push_back(motion_note(case_model, motion_sigma_mm));
     made.model = std::make_shared<const registration::Model>(std::move(loaded_model.model));
     add_warnings_of_files(*made.model, made.registration);

@@ -13,6 +13,7 @@ struct GivenModel {
   registration::Model model;
   std::vector<geometry::RigidTransform> starts;  ///< world_from_model; none: it is searched anywhere
   std::optional<double> scale_sigma = {};        ///< relative, of the model's size
+  std::vector<PlanPoint> points = {};            ///< planned, carried into the world
 };
 
 /// Views of images in memory that are free of distortion, with cameras of other programs. Fails as
