@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/calibration/c_arm_maps.h"
+#include "helicarm/pipeline/diagnosis/calibrator_checks.h"
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/pipeline/stages.h"
 #include "helicarm/pipeline/view_image.h"
@@ -72,6 +73,8 @@ void estimate_from(FrameEstimate& estimate, const Frame& frame, xray::XrayImage 
       expected ? labelled_near(std::move(rectified.front()), *expected, one, options)
                : passed(pipeline::label_views(std::move(rectified), one, options)).front();
   estimate.fiducials = pipeline::fiducials_of(labelled);
+  estimate.mirrored_without_statement = pipeline::is_mirrored_without_statement(
+      labelled.fiducials.mirrored, *labelled.xray_image, frame.view);
   for (const Warning& warning : labelled.fiducials.warnings) estimate.warnings.push_back(warning);
   value_or_throw(calibrate_alone(estimate, base));
 }

@@ -27,6 +27,7 @@ struct FrameEstimate {
   std::optional<calibration::PlateMap> plate;                    ///< by its own plate
   calibration::ViewFiducials fiducials;  ///< labelled by the evidence of this image; outliers are `rejected`
   std::optional<calibration::CalibratedView> alone;
+  bool mirrored_without_statement = false;  ///< `pipeline::is_mirrored_without_statement`
   double variance_scale = 1;  ///< of the residuals over the noise model, where inconsistent
   std::vector<Warning> warnings;
 };

@@ -330,6 +330,7 @@ Sweep swept(const SweepCase& the_case, const SweepOptions& options,
     return sweep;
   }
   if (is_one_run(the_case)) sweep.failure = unconfirmed(estimates, accepted);
+  if (!sweep.failure) sweep.failure = check_handedness(sweep, estimates);
   if (!sweep.failure) sweep.failure = check_scale(sweep, estimates, the_case.base.calibrator);
   if (sweep.failure) {
     for (SweepFrame& frame : sweep.frames) frame.best.reset();

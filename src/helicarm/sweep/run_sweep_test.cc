@@ -101,6 +101,26 @@ TEST(RunSweep, BallWhoseCoordinatesAreWrongIsNamed) {
   EXPECT_EQ(std::ranges::count(sweep.warnings, Reason::ball_displaced, &Warning::reason), 1);
 }
 
+TEST(RunSweep, MirroredImagesWithoutAStatementAreRefusedAsByRun) {
+  const TemporaryFolder folder;
+  DrawnRun run;
+  run.frames = 6;
+  run.write(folder.path());
+  Json calibrator = *read_json(folder.path() / "calibrator.json");
+  for (Json& ball : calibrator["balls"]) ball["xyz_mm"][0] = -ball["xyz_mm"][0].get<double>();
+  ASSERT_TRUE(write_file(folder.path() / "calibrator.json", calibrator.dump()));
+  const Sweep refused = *run_sweep(*read_sweep_case(folder.path()));
+  ASSERT_TRUE(refused.failure);
+  EXPECT_EQ(refused.failure->reason, Reason::ambiguous_handedness);
+  for (const SweepFrame& frame : refused.frames) EXPECT_FALSE(frame.best);
+  Json json = *read_json(folder.path() / "case.json");
+  json["views"][0]["mirrored"] = true;
+  ASSERT_TRUE(write_file(folder.path() / "case.json", json.dump()));
+  const Sweep stated = *run_sweep(*read_sweep_case(folder.path()));
+  ASSERT_FALSE(stated.failure) << stated.failure->message;
+  EXPECT_EQ(std::ranges::count(stated.notes, Reason::ambiguous_handedness, &Warning::reason), 1);
+}
+
 TEST(RunSweep, ACalibratorOfAnotherSizeThanItsBallsShowIsWarnedOf) {
   const TemporaryFolder folder;
   DrawnRun run;

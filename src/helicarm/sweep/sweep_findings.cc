@@ -29,6 +29,20 @@ void compare_distance(Sweep& sweep, const std::vector<FrameEstimate>& estimates)
        {{"found_mm", found_mm}, {"stated_mm", stated_mm}}});
 }
 
+std::optional<Failure> check_handedness(Sweep& sweep, const std::vector<FrameEstimate>& estimates) {
+  std::size_t accepted = 0, mirrored = 0, unstated = 0;
+  for (const FrameEstimate& at : estimates) {
+    if (at.failure) continue;
+    ++accepted;
+    mirrored += at.alone->view.intrinsics.fx < 0;
+    unstated += at.mirrored_without_statement;
+  }
+  if (mirrored < accepted) return std::nullopt;
+  if (unstated == accepted) return pipeline::mirrored_without_statement(accepted);
+  sweep.notes.push_back(pipeline::mirrored_as_stated());
+  return std::nullopt;
+}
+
 std::optional<Failure> check_scale(Sweep& sweep, const std::vector<FrameEstimate>& estimates,
                                    const phantom::Calibrator& calibrator) {
   pipeline::DiameterEvidence diameters;

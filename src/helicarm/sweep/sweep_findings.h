@@ -14,6 +14,10 @@ namespace helicarm::sweep {
 /// Warns where the source distance that the images show with the stated pixel size is not the stated one.
 void compare_distance(Sweep& sweep, const std::vector<FrameEstimate>& estimates);
 
+/// The refusal `ambiguous_handedness` where all accepted images are mirrored, and neither a tag nor the case
+/// says so; a note where one does.
+std::optional<Failure> check_handedness(Sweep& sweep, const std::vector<FrameEstimate>& estimates);
+
 /// Warns where the diameters of the balls' images contradict the calibrator's size; returns the refusal where
 /// they are certain to. By each accepted image alone.
 std::optional<Failure> check_scale(Sweep& sweep, const std::vector<FrameEstimate>& estimates,

@@ -20,13 +20,7 @@ std::optional<Failure> check_handedness(const std::vector<LabelledView>& images,
     if (!is_mirrored_without_statement(images[i].fiducials.mirrored, *images[i].xray_image,
                                        the_case.views[i]))
       return std::nullopt;
-  return Failure{
-      Reason::ambiguous_handedness,
-      "every image is labelled as mirrored, without a tag or \"mirrored\" in the case. If the C-arm stores "
-      "mirrored images, state \"mirrored\": true for each view; if the calibrator's file is a mirror "
-      "image of the calibrator (the sign of one axis), correct the file. The located points differ",
-      {},
-      {{"views", double(images.size())}}};
+  return mirrored_without_statement(images.size());
 }
 
 /// Unlabelled candidates within the used fiducials' largest distance from their centroid.
@@ -85,6 +79,16 @@ DiameterError diameter_error(double radius_px, std::optional<bool> logarithmic) 
   const double loss = std::pow(blurred_px / radius_px, 3);
   const double share = logarithmic ? double(*logarithmic) : 0.5;
   return {-share * loss, std::hypot(of_diameter, loss / 2)};
+}
+
+Failure mirrored_without_statement(std::size_t images) {
+  return {Reason::ambiguous_handedness,
+          "every image is labelled as mirrored, without a tag or \"mirrored\" in the case. If the C-arm stores "
+          "mirrored images, state \"mirrored\": true for each view; if the calibrator's file is a mirror "
+          "image of the calibrator (the sign of one axis, or two axes exchanged), correct the file. The "
+          "located points differ",
+          {},
+          {{"views", double(images)}}};
 }
 
 void DiameterEvidence::add(const geometry::View& view, std::span<const fiducials::Fiducial> fiducials,

@@ -61,6 +61,9 @@ ScaleEvidence scale_evidence(const calibration::CalibrationResult& calibration,
 /// Whether neither the case nor a tag explains why an image is mirrored.
 bool is_mirrored_without_statement(bool is_mirrored, const xray::XrayImage& xray_image, const CaseView& view);
 
+/// Refusal `ambiguous_handedness` of images that are all so.
+Failure mirrored_without_statement(std::size_t images);
+
 /// Checks the calibrator's file against the images. Refuses `ambiguous_labels` if a third of the fiducials
 /// and as many candidates are unexplained, `ambiguous_handedness` if every image is mirrored without a tag or
 /// `mirrored` in the case, `scale_disagrees` if the scale deviates by ten sigma, `calibrator_mismatch` if
