@@ -53,6 +53,22 @@ void refuse(FrameEstimate& estimate, Failure failure, const std::string& view) {
   estimate.failure = std::move(failure);
 }
 
+/// A repeated image is no second measurement: its noise is the same.
+void refuse_copies(const SweepCase& the_case, std::vector<FrameEstimate>& estimates) {
+  std::map<std::string, std::size_t> first;
+  for (std::size_t i = 0; i < estimates.size(); ++i) {
+    if (estimates[i].failure || estimates[i].image.empty()) continue;
+    const auto [same, is_new] = first.try_emplace(estimates[i].image, i);
+    if (!is_new)
+      refuse(estimates[i],
+             {Reason::views_too_close,
+              fmt::format("the image is a copy of {}", the_case.frames[same->second].view.name),
+              {},
+              {}},
+             the_case.frames[i].view.name);
+  }
+}
+
 /// The detector of all frames. Throws bad_value where they state different ones.
 Detector detector_of(const SweepCase& the_case, const std::vector<FrameEstimate>& estimates,
                      bool& pixel_known) {
@@ -311,6 +327,7 @@ Sweep swept(const SweepCase& the_case, const SweepOptions& options,
   Sweep sweep;
   sweep.warnings = the_case.base.warnings;
   std::vector<FrameEstimate> estimates = estimates_of(the_case, options, progress);
+  refuse_copies(the_case, estimates);
   sweep.detector = detector_of(the_case, estimates, sweep.pixel_known);
   take_handedness(the_case, estimates, sweep.detector);
   sweep.noise_factor = noise_factor(estimates);

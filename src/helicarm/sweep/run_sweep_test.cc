@@ -121,6 +121,26 @@ TEST(RunSweep, MirroredImagesWithoutAStatementAreRefusedAsByRun) {
   EXPECT_EQ(std::ranges::count(stated.notes, Reason::ambiguous_handedness, &Warning::reason), 1);
 }
 
+TEST(RunSweep, CopiesOfAnImageAreNamedAndNotUsedTwice) {
+  const TemporaryFolder folder;
+  DrawnRun run;
+  run.frames = 4;
+  run.write(folder.path());
+  for (const char* kind : {"png", "json"})
+    for (const int copy : {3, 4})
+      std::filesystem::copy_file(folder.path() / fmt::format("run_002.{}", kind),
+                                 folder.path() / fmt::format("run_{:03d}.{}", copy, kind),
+                                 std::filesystem::copy_options::overwrite_existing);
+  const Sweep sweep = *run_sweep(*read_sweep_case(folder.path()));
+  ASSERT_FALSE(sweep.failure) << sweep.failure->message;
+  for (const SweepFrame& frame : sweep.frames) {
+    ASSERT_EQ(frame.failure.has_value(), frame.number > 2) << frame.number;
+    if (!frame.failure) continue;
+    EXPECT_EQ(frame.failure->reason, Reason::views_too_close);
+    EXPECT_NE(frame.failure->message.find("RUN/2"), std::string::npos);
+  }
+}
+
 TEST(RunSweep, ACalibratorOfAnotherSizeThanItsBallsShowIsWarnedOf) {
   const TemporaryFolder folder;
   DrawnRun run;
