@@ -28,6 +28,7 @@ struct Solution {
   std::optional<geometry::DltFactors> dlt;
   std::optional<Eigen::MatrixXd> covariance;
   double condition = 0;
+  double sigmas_exceeded = 1;  ///< residuals over the stated sigmas, where inconsistent
 };
 
 std::vector<fiducials::Fiducial> points_from(const CsvTable& table, const std::string& origin) {
@@ -58,7 +59,8 @@ Expected<Solution> most_likely(const std::vector<fiducials::Fiducial>& points, b
   if (!result) return tl::unexpected<Failure>(result.error());
   const calibration::CalibratedView& view = result->views.front();
   const double scale = sigmas_given ? 1 : result->chi2 / result->dof / result->variance_scale;
-  return Solution{view.view, view.dlt, result->joint_covariance * scale, view.condition};
+  return Solution{view.view, view.dlt, result->joint_covariance * scale, view.condition,
+                  sigmas_given ? std::sqrt(result->variance_scale) : 1};
 }
 
 Expected<Solution> solve(const std::string& method, const std::vector<fiducials::Fiducial>& points,
@@ -68,7 +70,7 @@ Expected<Solution> solve(const std::string& method, const std::vector<fiducials:
     return fail(Reason::usage, fmt::format("--method: \"{}\" is none of: dlt, homogeneous, ml", method));
   const auto result = method == "dlt" ? geometry::dlt_least_squares(pairs) : geometry::dlt_homogeneous(pairs);
   return result.map([](const geometry::DltResult& dlt) {
-    return Solution{dlt.view, dlt.factors, std::nullopt, dlt.condition};
+    return Solution{dlt.view, dlt.factors, std::nullopt, dlt.condition, 1};
   });
 }
 
@@ -130,6 +132,15 @@ std::vector<Warning> warnings_of(const Solution& solution, double rms_px,
                      rms_px, limit, farthest(solution, points)),
          {},
          {{"rms_px", rms_px}, {"limit", limit}}});
+  else if (solution.sigmas_exceeded > 1)
+    warnings.push_back(
+        {Reason::residual_too_large,
+         fmt::format(
+             "residuals are {:.3g} times the stated sigma_px, and the covariance is inflated: check the "
+             "point with the largest residual ({}); solve rejects no outlier",
+             solution.sigmas_exceeded, farthest(solution, points)),
+         {},
+         {{"sigmas_exceeded", solution.sigmas_exceeded}}});
   if (const auto flipped = exchange::mirrored_or_upwards(solution.view.intrinsics))
     warnings.push_back(*flipped);
   return warnings;

@@ -3,6 +3,8 @@
 
 #include <cmath>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -69,6 +71,24 @@ TEST(SolveCommand, NegativeFxIsWarnedOf) {
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0]["code"], "ambiguous_handedness");
   EXPECT_NE(warnings[0]["message"].get<std::string>().find("upwards"), std::string::npos);
+}
+
+TEST(SolveCommand, AResidualOfManyStatedSigmasIsWarnedOf) {
+  std::string table = table_of(12, false, "0.02");
+  const auto codes = [](const std::string& points) {
+    std::vector<std::string> found;
+    const Json answer = *parse_json(solve_text(points, "ml").text, "out");
+    for (const Json& warning : answer["warnings"]) found.push_back(warning["code"]);
+    return found;
+  };
+  EXPECT_EQ(codes(table), std::vector<std::string>{"ambiguous_handedness"});
+  const std::size_t sigma = table.find(",0.02\nP6,");  // of P5: a pixel to the side
+  const std::size_t u_px = table.find("\nP5,");
+  ASSERT_NE(sigma, std::string::npos);
+  const Eigen::Vector3d p(50 * std::cos(0.5 + 1.57 * 5), 50 * std::sin(0.5 + 1.57 * 5), 4 * (0.5 + 1.57 * 5));
+  const Eigen::Vector2d uv = view.project(p) + Eigen::Vector2d(1, 0);
+  table.replace(u_px, sigma - u_px, fmt::format("\nP5,{},{},{},{},{}", p.x(), p.y(), p.z(), uv.x(), uv.y()));
+  EXPECT_EQ(codes(table), (std::vector<std::string>{"residual_too_large", "ambiguous_handedness"}));
 }
 
 TEST(SolveCommand, TableContainsEveryPoint) {

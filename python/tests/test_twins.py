@@ -96,6 +96,19 @@ def test_solve_gives_the_same_numbers(pair, tmp_path, method, sigma):
         assert found["covariance"] == pytest.approx(np.array(answer["covariance"]), rel=1e-6, abs=1e-12)
 
 
+@pytest.mark.parametrize("off_px, word", [(3, "times the stated sigma_px"), (40, "px rms, over 5 px")])
+def test_solve_warns_alike_of_a_point_that_does_not_fit(pair, tmp_path, off_px, word):
+    uv = pair.pixels("AP", pair.xyz)
+    uv[4] += off_px
+    labels = [f"Q{i}" for i in range(len(uv))]
+    rows = [(label, *map(repr, map(float, (*xyz, *at))), 0.1) for label, xyz, at in zip(labels, pair.xyz, uv)]
+    file = csv(tmp_path / "p.csv", rows, "label,x_mm,y_mm,z_mm,u_px,v_px,sigma_px")
+    answer = json.loads(program("solve", "--points", file, "--json"))["warnings"]
+    found = helicarm.solve(pair.xyz, uv, sigma_px=0.1, labels=labels)["warnings"]
+    assert [w["message"] for w in found] == [w["message"] for w in answer] and len(found) == 1
+    assert word in found[0]["message"] and found[0]["code"] == "residual_too_large"
+
+
 def test_drr_gives_the_same_pixels(tmp_path):
     voxels = np.random.default_rng(2).integers(-1000, 2000, (9, 8, 7)).astype("<i2")
     (tmp_path / "a.mha").write_bytes(b"NDims = 3\nDimSize = 9 8 7\nElementSpacing = 2 2 3\nElementType = MET_SHORT\n"
