@@ -10,6 +10,7 @@
 #include "helicarm/exchange/itk_transform.h"
 #include "helicarm/sweep/drawn_run_test.h"
 #include "helicarm/sweep/sweep.h"
+#include "helicarm/sweep/sweep_findings.h"
 
 namespace helicarm::sweep {
 namespace {
@@ -139,6 +140,24 @@ TEST(RunSweep, CopiesOfAnImageAreNamedAndNotUsedTwice) {
     EXPECT_EQ(frame.failure->reason, Reason::views_too_close);
     EXPECT_NE(frame.failure->message.find("RUN/2"), std::string::npos);
   }
+}
+
+TEST(RunSweep, ABallOutsideTheFieldIsNotSaidToBeLost) {
+  const phantom::Calibrator calibrator{"one", {{"G1", {0, 0, 40}, 4}}, {}};
+  const auto warnings = [&](fiducials::FiducialStatus status) {
+    std::vector<FrameEstimate> estimates(4);
+    for (FrameEstimate& at : estimates) {
+      at.fiducials.fiducials.resize(1);
+      at.fiducials.fiducials.front().status = status;
+    }
+    Sweep sweep;
+    warn_of_unused_balls(sweep, estimates, calibrator);
+    return sweep.warnings;
+  };
+  EXPECT_TRUE(warnings(fiducials::FiducialStatus::outside).empty());
+  const auto lost = warnings(fiducials::FiducialStatus::not_found);
+  ASSERT_EQ(lost.size(), 1U);
+  EXPECT_NE(lost[0].message.find("G1 fits in 0 of the 4 images"), std::string::npos);
 }
 
 TEST(RunSweep, ACalibratorOfAnotherSizeThanItsBallsShowIsWarnedOf) {

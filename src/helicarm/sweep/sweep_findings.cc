@@ -11,7 +11,6 @@
 #include "helicarm/sweep/joint_estimate.h"
 
 namespace helicarm::sweep {
-
 void compare_distance(Sweep& sweep, const std::vector<FrameEstimate>& estimates) {
   constexpr double limit = 0.05;
   const auto stated = stated_distance_mm(estimates);
@@ -118,18 +117,18 @@ void warn_of_unused_balls(Sweep& sweep, const std::vector<FrameEstimate>& estima
     int images = 0, used = 0;
     for (const FrameEstimate& at : estimates) {
       if (at.failure) continue;
-      ++images;
-      used += at.fiducials.fiducials[k].status == fiducials::FiducialStatus::used;
+      const fiducials::FiducialStatus status = at.fiducials.fiducials[k].status;
+      images += status != fiducials::FiducialStatus::outside;
+      used += status == fiducials::FiducialStatus::used;
     }
     if (images < least_images || most_share * used >= images) continue;
-    sweep.warnings.push_back(
-        {Reason::ball_displaced,
-         fmt::format(
-             "fiducial {} fits in {} of {} images: its coordinates in the calibrator's file are wrong, or it "
-             "is lost or hidden",
-             calibrator.balls[k].label, used, images),
-         {},
-         {{"used", double(used)}, {"images", double(images)}}});
+    sweep.warnings.push_back({Reason::ball_displaced,
+                              fmt::format("fiducial {} fits in {} of the {} images in whose field it lies: "
+                                          "its coordinates or diameter in the "
+                                          "calibrator's file are wrong, or it is lost or hidden",
+                                          calibrator.balls[k].label, used, images),
+                              {},
+                              {{"used", double(used)}, {"images", double(images)}}});
   }
 }
 
