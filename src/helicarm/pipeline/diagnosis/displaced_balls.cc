@@ -145,6 +145,25 @@ bool is_in_no_view(const CaseCalibration& calibration, const std::vector<Labelle
   return empty > 0 && uncovered >= std::min<std::size_t>(2, images.size());
 }
 
+/// Of a fiducial that the only view shows elsewhere: one view does not tell where along its ray.
+std::optional<Warning> rejected_alone(const CaseCalibration& calibration, const phantom::CalibratorBall& ball,
+                                      std::size_t k) {
+  const fiducials::Fiducial& found = calibration.fiducials.front()[k];
+  if (calibration.views.size() != 1 || found.status != fiducials::FiducialStatus::rejected)
+    return std::nullopt;
+  const geometry::View& view = calibration.views.front().view;
+  const double off_mm = found.residual_px * view.depth(ball.centre_in_calibrator) / view.intrinsics.fy;
+  if (off_mm < displaced_gap_mm) return std::nullopt;
+  return Warning{
+      Reason::ball_displaced,
+      fmt::format("fiducial {} lies {:.2g} px, {:.2g} mm at its depth, from where the calibrator's file has "
+                  "it: wrong coordinates, or something over it. It is not used; a second view, or "
+                  "`helicarm phantom measure`, tells which",
+                  ball.label, found.residual_px, off_mm),
+      calibration.views.front().name,
+      {{"residual_px", found.residual_px}, {"distance_mm", off_mm}}};
+}
+
 Warning of_absent(const std::vector<std::string>& labels) {
   const bool is_one = labels.size() == 1;
   return {
@@ -178,6 +197,7 @@ std::vector<Warning> displaced_balls(const CaseCalibration& calibration,
     const phantom::CalibratorBall& ball = calibrator.balls[k];
     const auto seen = displaced_ball(calibration, images, ball);
     if (!seen) {
+      if (auto rejected = rejected_alone(calibration, ball, k)) warnings.push_back(*std::move(rejected));
       if (is_in_no_view(calibration, images, ball, k)) absent.push_back(ball.label);
       continue;
     }

@@ -71,6 +71,22 @@ TEST_F(UnlabelledBalls, BallsThatNoViewShowsAreNamedTogether) {
   EXPECT_EQ(warnings[0].message.find("fiducials P3, P4 are found in no view"), 0u) << warnings[0].message;
 }
 
+TEST_F(UnlabelledBalls, TheOnlyViewNamesAFiducialThatItRejects) {
+  calibration.fiducials.resize(1);
+  calibration.views.resize(1);
+  images.resize(1);
+  for (auto& fiducial : calibration.fiducials[0]) fiducial.status = fiducials::FiducialStatus::used;
+  fiducials::Fiducial& rejected = calibration.fiducials[0][1];
+  rejected.status = fiducials::FiducialStatus::rejected;
+  rejected.residual_px = 5;
+  const auto warnings = displaced_balls(calibration, images, calibrator);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].reason, Reason::ball_displaced);
+  EXPECT_EQ(warnings[0].message.find("fiducial P4 lies 5 px, 1 mm"), 0u) << warnings[0].message;
+  rejected.residual_px = 0.5;
+  EXPECT_TRUE(displaced_balls(calibration, images, calibrator).empty()) << "0.1 mm";
+}
+
 TEST_F(UnlabelledBalls, ABallThatOneViewMayHideIsNotMissed) {
   detection::Dot plate_dot;
   plate_dot.centre_px = calibration.views[0].view.project(calibrator.balls[0].centre_in_calibrator);
