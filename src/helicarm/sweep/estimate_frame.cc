@@ -7,6 +7,7 @@
 
 #include "helicarm/calibration/c_arm_maps.h"
 #include "helicarm/pipeline/diagnosis/calibrator_checks.h"
+#include "helicarm/pipeline/diagnosis/causes.h"
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/pipeline/stages.h"
 #include "helicarm/pipeline/view_image.h"
@@ -73,18 +74,45 @@ void estimate_from(FrameEstimate& estimate, const Frame& frame, xray::XrayImage 
       expected ? labelled_near(std::move(rectified.front()), *expected, one, options)
                : passed(pipeline::label_views(std::move(rectified), one, options)).front();
   estimate.fiducials = pipeline::fiducials_of(labelled);
-  estimate.mirrored_without_statement = pipeline::is_mirrored_without_statement(
-      labelled.fiducials.mirrored, *labelled.xray_image, frame.view);
+  estimate.mirrored_without_statement =
+      pipeline::is_mirrored_without_statement(labelled.fiducials.mirrored, *labelled.xray_image, frame.view);
   for (const Warning& warning : labelled.fiducials.warnings) estimate.warnings.push_back(warning);
   value_or_throw(calibrate_alone(estimate, base));
 }
 
 }  // namespace
 
+const xray::ImageFile* file_of(const Frame& frame, const SweepCase& the_case) {
+  const auto file = the_case.files.find(frame.view.image);
+  return file == the_case.files.end() ? nullptr : file->second.get();
+}
+
+Failure with_cause(Failure failure, const Frame& frame, const SweepCase& the_case, unsigned threads) {
+  pipeline::RunOptions options;
+  options.maps = the_case.maps;
+  options.threads = threads;
+  pipeline::Case one = the_case.base;
+  one.views = {frame.view};
+  failure.view = frame.view.name;
+  const auto explained = guarded([&] {
+    const auto image = std::make_shared<const xray::XrayImage>(image_of(frame, file_of(frame, the_case)));
+    pipeline::Refusal refusal{failure, pipeline::Stage::label, {}};
+    pipeline::ViewResult& view = refusal.views.emplace_back();
+    view.name = frame.view.name;
+    view.xray_image = image;
+    auto rectified =
+        pipeline::detect_in_views({{{frame.view.name}, image}}, one, options).and_then([&](auto views) {
+          return pipeline::rectify_views(std::move(views), one, options);
+        });
+    if (rectified) view.rectification = rectified->front().rectification;
+    return pipeline::with_cause(refusal, one, options);
+  });
+  return explained ? *explained : failure;
+}
+
 Expected<xray::XrayImage> rectified_image_of(const Frame& frame, const SweepCase& the_case) {
   return guarded([&] {
-    const auto file = the_case.files.find(frame.view.image);
-    xray::XrayImage image = image_of(frame, file == the_case.files.end() ? nullptr : file->second.get());
+    xray::XrayImage image = image_of(frame, file_of(frame, the_case));
     if (!the_case.base.plate && !frame.view.map && !frame.view.plate_image && !the_case.maps) return image;
     pipeline::RunOptions options;
     options.maps = the_case.maps;

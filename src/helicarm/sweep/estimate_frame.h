@@ -28,7 +28,7 @@ struct FrameEstimate {
   calibration::ViewFiducials fiducials;  ///< labelled by the evidence of this image; outliers are `rejected`
   std::optional<calibration::CalibratedView> alone;
   bool mirrored_without_statement = false;  ///< `pipeline::is_mirrored_without_statement`
-  double variance_scale = 1;  ///< of the residuals over the noise model, where inconsistent
+  double variance_scale = 1;                ///< of the residuals over the noise model, where inconsistent
   std::vector<Warning> warnings;
 };
 
@@ -38,6 +38,13 @@ struct FrameEstimate {
 Expected<FrameEstimate> estimate_frame(const Frame& frame, const xray::ImageFile* file,
                                        const pipeline::Case& base, const pipeline::RunOptions& options,
                                        const std::optional<fiducials::ExpectedView>& expected = {});
+
+/// The opened file that holds the frame; null for a file of its own.
+const xray::ImageFile* file_of(const Frame& frame, const SweepCase& the_case);
+
+/// The refusal of an image with its cause, if another pixel size, source distance or shape of the pixels
+/// explains it (`pipeline::with_cause`).
+Failure with_cause(Failure failure, const Frame& frame, const SweepCase& the_case, unsigned threads);
 
 /// The frame's image with rectified pixels, as its camera has them. Fails as `estimate_frame`, or with why it
 /// cannot be rectified.

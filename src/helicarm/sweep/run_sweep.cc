@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -22,11 +23,6 @@ namespace helicarm::sweep {
 namespace {
 
 constexpr std::size_t least_smooth = 16;  // frames of a smooth path
-
-const xray::ImageFile* file_of(const Frame& frame, const SweepCase& the_case) {
-  const auto file = the_case.files.find(frame.view.image);
-  return file == the_case.files.end() ? nullptr : file->second.get();
-}
 
 /// Each frame's estimate; unreadable input is thrown.
 std::vector<FrameEstimate> estimates_of(const SweepCase& the_case, const SweepOptions& options,
@@ -268,40 +264,66 @@ bool is_one_run(const SweepCase& the_case) {
                              [&](const Frame& frame) { return frame.run == the_case.frames.front().run; });
 }
 
-Failure nothing_accepted(const std::vector<FrameEstimate>& estimates) {
-  std::map<Reason, int> count;
-  for (const FrameEstimate& at : estimates)
-    if (at.failure) ++count[at.failure->reason];
-  const auto most = std::ranges::max_element(count, {}, [](const auto& entry) { return entry.second; });
-  const auto example = std::ranges::find_if(
-      estimates, [&](const FrameEstimate& at) { return at.failure && at.failure->reason == most->first; });
-  return {most->first,
-          fmt::format("none of {} images is accepted; {} with this reason, the first: {}", estimates.size(),
-                      most->second, example->failure->message),
-          {},
-          {{"images", double(estimates.size())}}};
+/// Of the refused images those of the most frequent of these reasons, or of all.
+std::vector<std::size_t> most_frequent(const std::vector<FrameEstimate>& estimates,
+                                       const std::set<Reason>& reasons = {}) {
+  std::map<Reason, std::vector<std::size_t>> images;
+  for (std::size_t i = 0; i < estimates.size(); ++i)
+    if (const auto& failure = estimates[i].failure;
+        failure && (reasons.empty() || reasons.contains(failure->reason)))
+      images[failure->reason].push_back(i);
+  const auto most =
+      std::ranges::max_element(images, {}, [](const auto& entry) { return entry.second.size(); });
+  return most == images.end() ? std::vector<std::size_t>{} : most->second;
 }
 
-/// Why the accepted images of a run are not used: they are too few for a path, and the labels of more images
-/// were refused. A file that states some of a phantom's balls fits single images by chance.
-std::optional<Failure> unconfirmed(const std::vector<FrameEstimate>& estimates, std::size_t accepted) {
+Failure nothing_accepted(const std::vector<FrameEstimate>& estimates, const SweepCase& the_case,
+                         unsigned threads) {
+  const auto most = most_frequent(estimates);
+  const std::size_t first = most.front();
+  Failure failure = with_cause(*estimates[first].failure, the_case.frames[first], the_case, threads);
+  failure.message = fmt::format("none of {} images is accepted; {} with this reason, the first: {}",
+                                estimates.size(), most.size(), failure.message);
+  failure.view.clear();
+  failure.figures["images"] = double(estimates.size());
+  return failure;
+}
+
+bool is_explained(const Failure& failure) {
+  return std::ranges::any_of(
+      std::array{"fitting_pixel_mm", "fitting_source_detector_mm", "fitting_diameters", "aspect"},
+      [&](const char* key) { return failure.figures.contains(key); });
+}
+
+/// Why the accepted images of a run are not used, where the labels of more are refused: another pixel size,
+/// source distance or size of the balls explains an image that was refused, or the accepted ones are too few
+/// for a path. A file that states some of a phantom's balls, or a wrong size, fits single images by chance.
+std::optional<Failure> unconfirmed(const std::vector<FrameEstimate>& estimates, std::size_t accepted,
+                                   double noise_factor, const SweepCase& the_case, unsigned threads) {
   constexpr std::size_t least_confirmed = 8;  // frames of a path
-  std::size_t refused = 0;
-  const Failure* first = nullptr;
+  constexpr double doubtful_noise = 3;        // of accepted images that a wrong size may explain
+  const std::set<Reason> unclear{Reason::ambiguous_labels, Reason::calibrator_mismatch};
+  std::size_t refused = 0, unseen = 0;
   for (const FrameEstimate& at : estimates)
-    if (at.failure && (at.failure->reason == Reason::ambiguous_labels ||
-                       at.failure->reason == Reason::calibrator_mismatch)) {
-      ++refused;
-      if (!first) first = &*at.failure;
+    if (at.failure) {
+      refused += unclear.contains(at.failure->reason);
+      unseen += at.failure->reason == Reason::too_few_fiducials;
     }
-  if (accepted >= least_confirmed || refused <= accepted) return std::nullopt;
-  return Failure{
-      first->reason,
-      fmt::format("only {} of {} images would be accepted, and the labels of {} are refused: too few "
-                  "to confirm each other; the first: {}",
-                  accepted, estimates.size(), refused, first->message),
-      {},
-      {{"accepted", double(accepted)}, {"refused", double(refused)}, {"images", double(estimates.size())}}};
+  if (refused + unseen <= accepted || (accepted >= least_confirmed && noise_factor < doubtful_noise))
+    return std::nullopt;
+  const std::size_t first =
+      most_frequent(estimates, refused > 0 ? unclear : std::set{Reason::too_few_fiducials}).front();
+  Failure failure = with_cause(*estimates[first].failure, the_case.frames[first], the_case, threads);
+  if (!is_explained(failure) && (accepted >= least_confirmed || refused <= accepted)) return std::nullopt;
+  failure.message = fmt::format(
+      "only {} of {} images would be accepted, and the labels of {} are refused: too few "
+      "to confirm each other; the first: {}",
+      accepted, estimates.size(), refused + unseen, failure.message);
+  failure.view.clear();
+  failure.figures["accepted"] = double(accepted);
+  failure.figures["refused"] = double(refused + unseen);
+  failure.figures["images"] = double(estimates.size());
+  return failure;
 }
 
 SweepFrame reported(const Frame& frame, const FrameEstimate& estimate) {
@@ -343,10 +365,11 @@ Sweep swept(const SweepCase& the_case, const SweepOptions& options,
   for (std::size_t i = 0; i < estimates.size(); ++i)
     sweep.frames.push_back(reported(the_case.frames[i], estimates[i]));
   if (accepted == 0) {
-    sweep.failure = nothing_accepted(estimates);
+    sweep.failure = nothing_accepted(estimates, the_case, options.threads);
     return sweep;
   }
-  if (is_one_run(the_case)) sweep.failure = unconfirmed(estimates, accepted);
+  if (is_one_run(the_case))
+    sweep.failure = unconfirmed(estimates, accepted, sweep.noise_factor, the_case, options.threads);
   if (!sweep.failure) sweep.failure = check_handedness(sweep, estimates);
   if (!sweep.failure) sweep.failure = check_scale(sweep, estimates, the_case.base.calibrator);
   if (sweep.failure) {

@@ -142,6 +142,34 @@ TEST(RunSweep, CopiesOfAnImageAreNamedAndNotUsedTwice) {
   }
 }
 
+TEST(RunSweep, AWrongPixelSizeOfAllImagesIsNamedAsTheCause) {
+  DrawnRun run;
+  run.frames = 3;
+  const TemporaryFolder folder;
+  run.write(folder.path());
+  for (int i = 1; i <= run.frames; ++i)
+    ASSERT_TRUE(write_file(folder.path() / fmt::format("run_{:03d}.json", i),
+                           Json({{"pixel_mm", 0.55}, {"source_detector_mm", 1000}}).dump()));
+  const Sweep sweep = *run_sweep(*read_sweep_case(folder.path()));
+  ASSERT_TRUE(sweep.failure);
+  ASSERT_TRUE(sweep.failure->figures.contains("fitting_pixel_mm")) << sweep.failure->message;
+  EXPECT_NEAR(sweep.failure->figures.at("fitting_pixel_mm"), 1, 0.05);
+}
+
+TEST(RunSweep, RadiiInPlaceOfDiametersAreNamedAsTheCause) {
+  const TemporaryFolder folder;
+  DrawnRun run;
+  run.frames = 3;
+  run.write(folder.path());
+  Json calibrator = *read_json(folder.path() / "calibrator.json");
+  for (Json& ball : calibrator["balls"]) ball["diameter_mm"] = ball["diameter_mm"].get<double>() / 2;
+  ASSERT_TRUE(write_file(folder.path() / "calibrator.json", calibrator.dump()));
+  const Sweep sweep = *run_sweep(*read_sweep_case(folder.path()));
+  ASSERT_TRUE(sweep.failure);
+  ASSERT_TRUE(sweep.failure->figures.contains("fitting_diameters")) << sweep.failure->message;
+  EXPECT_NEAR(sweep.failure->figures.at("fitting_diameters"), 2, 0.15);
+}
+
 TEST(RunSweep, ABallOutsideTheFieldIsNotSaidToBeLost) {
   const phantom::Calibrator calibrator{"one", {{"G1", {0, 0, 40}, 4}}, {}};
   const auto warnings = [&](fiducials::FiducialStatus status) {

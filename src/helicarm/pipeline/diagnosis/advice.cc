@@ -88,6 +88,9 @@ Advice of_mismatch(const Result& result) {
         "pixel "
         "size or the source distance only if another source, such as the C-arm's manual, confirms the new "
         "value";
+  } else if (has_figure(*result.failure, "fitting_diameters")) {
+    advice.causes.insert(advice.causes.begin(), "the balls' diameters in calibrator.json are wrong");
+    advice.next = "measure a ball by caliper and correct \"diameter_mm\"";
   }
   return advice;
 }
@@ -101,7 +104,9 @@ Advice of_few(const Result& result) {
        "the dose is too low, or the balls are too small in the image"},
       "open the overlay: orange circles are all candidates. Bring the whole calibrator into the field "
       "and acquire the view again"};
-  if (many || has_figure(*result.failure, "fitting_pixel_mm")) std::swap(advice.causes[0], advice.causes[1]);
+  if (many || has_figure(*result.failure, "fitting_pixel_mm") ||
+      has_figure(*result.failure, "fitting_diameters"))
+    std::swap(advice.causes[0], advice.causes[1]);
   return advice;
 }
 

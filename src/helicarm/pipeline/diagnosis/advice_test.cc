@@ -46,6 +46,12 @@ TEST(Advice, WrongTagsComeFirstWhereOthersFit) {
                 HasSubstr("pixel size"));
 }
 
+TEST(Advice, WrongDiametersComeFirstWhereOthersFit) {
+  for (const Reason reason : {Reason::calibrator_mismatch, Reason::too_few_fiducials})
+    EXPECT_THAT(advice_for(refused(reason, {{"fitting_diameters", 2}})).causes.front(),
+                HasSubstr("diameter"));
+}
+
 TEST(Advice, PlateThatTheMapDoesNotStraightenIsMissingInTheCase) {
   EXPECT_THAT(advice_for(refused(Reason::plate_mismatch, {{"residual_rms_px", 2}})).causes.front(),
               HasSubstr("names no plate"));

@@ -82,13 +82,14 @@ DiameterError diameter_error(double radius_px, std::optional<bool> logarithmic) 
 }
 
 Failure mirrored_without_statement(std::size_t images) {
-  return {Reason::ambiguous_handedness,
-          "every image is labelled as mirrored, without a tag or \"mirrored\" in the case. If the C-arm stores "
-          "mirrored images, state \"mirrored\": true for each view; if the calibrator's file is a mirror "
-          "image of the calibrator (the sign of one axis, or two axes exchanged), correct the file. The "
-          "located points differ",
-          {},
-          {{"views", double(images)}}};
+  return {
+      Reason::ambiguous_handedness,
+      "every image is labelled as mirrored, without a tag or \"mirrored\" in the case. If the C-arm stores "
+      "mirrored images, state \"mirrored\": true for each view; if the calibrator's file is a mirror "
+      "image of the calibrator (the sign of one axis, or two axes exchanged), correct the file. The "
+      "located points differ",
+      {},
+      {{"views", double(images)}}};
 }
 
 void DiameterEvidence::add(const geometry::View& view, std::span<const fiducials::Fiducial> fiducials,

@@ -2,12 +2,14 @@
 #include "helicarm/pipeline/diagnosis/causes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/detection/find_dots.h"
+#include "helicarm/pipeline/diagnosis/calibrator_checks.h"
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/rectification/round_field.h"
 
@@ -103,6 +105,33 @@ std::optional<FittedFocal> fitted_focal(const Trial& trial, unsigned threads) {
   return best;
 }
 
+/// How many times as large as in the calibrator's file the balls are, by labels with other diameters.
+std::optional<double> fitted_diameters(const Trial& trial, unsigned threads) {
+  constexpr std::array factors{0.5, 0.6, 0.71, 0.84, 1.19, 1.41, 1.68, 2.0};
+  constexpr std::ptrdiff_t least_used = 8;
+  std::array<std::pair<std::ptrdiff_t, double>, factors.size()> found{};
+  parallel_for(found.size(), threads, [&](std::size_t i) {
+    Case other = trial.the_case;
+    for (phantom::CalibratorBall& ball : other.calibrator.balls) ball.diameter_mm *= factors[i];
+    const auto labelled = rectify_views({trial.with(1, 1)}, other, trial.options).and_then([&](auto views) {
+      return label_views(std::move(views), other, trial.options);
+    });
+    if (!labelled) return;
+    calibration::CalibrationOptions options;
+    options.common = common_prior(other.calibrator);
+    const auto fit = calibration::calibrate({fiducials_of(labelled->front())}, options);
+    if (!fit || fit->variance_scale != 1) return;
+    DiameterEvidence diameters;
+    diameters.add(fit->views[0].view, fit->fiducials[0], other.calibrator,
+                  trial.image.acquisition.logarithmic);
+    found[i] = {
+        std::ranges::count(fit->fiducials[0], fiducials::FiducialStatus::used, &fiducials::Fiducial::status),
+        factors[i] * std::exp(diameters.scale().excess)};
+  });
+  const auto best = std::ranges::max_element(found, {}, [](const auto& one) { return one.first; });
+  return best->first >= least_used ? std::optional(best->second) : std::nullopt;
+}
+
 void add_pixel(Failure& failure, double file_mm, double fitting_mm) {
   failure.message += fmt::format(
       ". A pixel size of {:.4g} mm fits, the file has {:.4g} mm: either it is wrong, or the case names "
@@ -125,6 +154,15 @@ void add_distance(Failure& failure, double file_mm, double fitting_mm, std::opti
     failure.figures["fitting_pixel_mm"] = fitting_pixel_mm;
   }
   failure.message += ": either it is wrong, or the case names another calibrator than the one in the image";
+}
+
+void add_diameters(Failure& failure, double times) {
+  failure.message += fmt::format(
+      ". Balls {:.2g} times as large as in the calibrator's file fit: its diameters are wrong (radii in "
+      "their "
+      "place?), or the case names another calibrator than the one in the image",
+      times);
+  failure.figures["fitting_diameters"] = times;
 }
 
 /// The image with its columns resampled, as wide as `factor` times.
@@ -213,7 +251,10 @@ Failure with_cause(const Refusal& refusal, const Case& the_case, const RunOption
         "plate_image or map, or a C-arm's record that holds maps (--machine)";
   if (!of_labels || !tags.pixel_mm || !tags.source_detector_mm) return failure;
   const auto focal = fitted_focal(trial, options.threads);
-  if (!focal) return failure;
+  if (!focal) {
+    if (const auto times = fitted_diameters(trial, options.threads)) add_diameters(failure, *times);
+    return failure;
+  }
   const double share = focal->focal_px * tags.pixel_mm->mean() / *tags.source_detector_mm;
   if (std::abs(share - 1) < least_change) return failure;
   add_distance(failure, *tags.source_detector_mm, *tags.source_detector_mm * share,
