@@ -127,8 +127,8 @@ def with_model(case_folder, folder):
     for name in ("ct.nrrd", "stack.tif", "cup.stl", "plan.mrk.json"):
         (folder / name).write_bytes(b"")
     models = [{"name": name, "decision": decision, "world_from_model": TURNED.tolist(), "points": points,
-               "warnings": [{"code": "near", "message": "close"}] if decision == "warn" else [],
-               "failure": None if decision != "refuse" else {"code": "wrong_model", "message": "no fit"}}
+               "warnings": [{"code": "near", "message": "close"}, {"code": "far", "message": name + ": far"}] if decision == "warn" else [],
+               "failure": None if decision != "refuse" else {"code": "wrong_model", "message": name + ": no fit"}}
               for name, decision, points in (("bone", "accept", [{"name": "entry", "xyz_mm": [1, 2, 3], "covariance_mm2": None}]),
                                              ("stack", "accept", []), ("cup", "warn", []), ("lost", "refuse", []))]
     return {"models": models}
@@ -153,7 +153,8 @@ def test_scene_has_what_the_result_has(shown, result):
     assert [(m.name, m.decision) for m in scene.models] == [("bone", "accept"), ("stack", "accept"), ("cup", "warn")]
     assert scene.model("cup").surface == folder / "cup.stl"
     assert scene.model("stack").ijk_to_ras == pytest.approx(np.diag([-0.4, -0.4, 0.6, 1]))
-    assert any("lost: registration refused" in message for message in scene.messages) and "cup: close" in scene.messages
+    said = [message for message in scene.messages if message.startswith(("cup", "lost"))]
+    assert said == ["cup: close", "cup: far", "lost: registration refused, not shown: no fit"]
 
 
 def test_cameras_of_the_scene_project_as_the_calibration_does(shown, result):
@@ -308,11 +309,11 @@ def test_everything_is_shown_at_its_place(slicer, shown):
     nodes = nodes_of(slicer)
     assert {"slicer_from_calibrator", "calibrator_from_bone", "calibrator_from_cup", "calibrator_from_AP", "points",
             "tunnel a", "95 % regions", "camera AP", "image AP", "camera LAT", "image LAT"} <= set(nodes)
-    volume = nodes[str(folder / "ct.nrrd")]
+    volume = nodes["bone"]
     assert volume.to_world() == pytest.approx(scenes.ras_transform(TURNED)) and volume.ijk_to_ras is None
-    assert nodes[str(folder / "stack.tif")].ijk_to_ras == pytest.approx(np.diag([-0.4, -0.4, 0.6, 1]))
+    assert nodes["stack"].ijk_to_ras == pytest.approx(np.diag([-0.4, -0.4, 0.6, 1]))
     assert nodes[str(folder / "plan.mrk.json")].parent is nodes["calibrator_from_bone"]
-    assert nodes[str(folder / "cup.stl")].display.colour == Helicarm.COLOURS["warn"]
+    assert nodes["cup"].display.colour == Helicarm.COLOURS["warn"]
     place, label = nodes["points"].points[0]
     assert label == scene.points[0].name and place == pytest.approx(scenes.ras_from_lps(scene.points[0].xyz_mm))
     assert nodes["points"].descriptions[0] == f"95 %: {scene.points[0].error_95_mm:.2f} mm"

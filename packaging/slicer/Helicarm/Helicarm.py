@@ -233,11 +233,13 @@ class HelicarmLogic(ScriptedLoadableModuleLogic):
 
     def _volume(self, model, transform):
         volume = self._keep(slicer.util.loadVolume(_file_of_volume(model.volume)), transform)
+        volume.SetName(model.name)
         if model.ijk_to_ras is not None:
             volume.SetIJKToRASMatrix(_vtk_matrix(model.ijk_to_ras))
 
     def _surface(self, model, transform):
         surface = self._keep(slicer.util.loadModel(str(model.surface)), transform)
+        surface.SetName(model.name)
         surface.GetDisplayNode().SetColor(*COLOURS.get(model.decision, COLOURS["warn"]))
 
     def _plan(self, model, transform):

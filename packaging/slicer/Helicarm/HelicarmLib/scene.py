@@ -255,6 +255,11 @@ def _stack_grid(model):
     return None if voxel is None else RAS_FROM_LPS @ np.diag([*_array(voxel, (3,), "voxel_mm"), 1.0])
 
 
+def _named(name, message):
+    """What is said of a model begins with its name once."""
+    return message if message.startswith(name + ": ") else f"{name}: {message}"
+
+
 def _models(case, registration, folder, scene):
     described = {model["name"]: model for model in case.get("models", [])}
 
@@ -265,9 +270,9 @@ def _models(case, registration, folder, scene):
         name, pose = registered["name"], registered.get("world_from_model")
         if pose is None or registered.get("decision") == "refuse":
             reason = (registered.get("failure") or {}).get("message", "no pose")
-            scene.messages.append(f"{name}: registration refused, not shown: {reason}")
+            scene.messages.append(f"{name}: registration refused, not shown: {_named(name, reason)[len(name) + 2:]}")
             continue
-        scene.messages += [f"{name}: {warning['message']}" for warning in registered.get("warnings") or []]
+        scene.messages += [_named(name, warning["message"]) for warning in registered.get("warnings") or []]
         model = described.get(name, {})
         scene.models.append(Model(name, registered["decision"], _array(pose, (4, 4), name), path_of(model, "volume"),
                                   path_of(model, "surface"), path_of(model, "plan"), _stack_grid(model)))
