@@ -24,6 +24,44 @@ inline std::string shape_of(const py::array& array) {
   return text + ")";
 }
 
+[[noreturn]] inline void raise_not_real(const py::array& array, const std::string& name) {
+  raise({Reason::bad_value,
+         fmt::format("{}: its elements are {}, not real numbers", name,
+                     std::string(py::str(py::object(array.dtype())))),
+         {},
+         {}});
+}
+
+/// What NumPy's conversion to a number type would change without a word: it drops a mask and an imaginary
+/// part, and reads numbers in texts.
+inline void check_plain(const py::handle& given, const std::string& name) {
+  if (!py::isinstance<py::array>(given)) return;
+  const auto array = py::reinterpret_borrow<py::array>(given);
+  const char kind = array.dtype().kind();
+  if (std::string_view("biufO").find(kind) == std::string_view::npos) raise_not_real(array, name);
+  if (Py_TYPE(array.ptr()) == py::detail::npy_api::get().PyArray_Type_) return;
+  const auto masked = py::module_::import("numpy.ma");
+  if (!masked.attr("is_masked")(array).cast<bool>()) return;
+  const auto count = masked.attr("count_masked")(array).cast<py::ssize_t>();
+  raise({Reason::bad_value,
+         fmt::format(
+             "{}: {} of {} elements are masked, and a mask is not kept: leave them out, or fill them by "
+             "numpy.ma.filled",
+             name, count, array.size()),
+         {},
+         {{"masked", double(count)}}});
+}
+
+/// The array of what NumPy makes one of, such as lists, with elements that are real numbers.
+inline py::array plain_array(const py::object& given, const std::string& name) {
+  check_plain(given, name);
+  const py::array array = py::array::ensure(given);
+  if (!array) raise({Reason::bad_value, name + ": is no array of numbers", {}, {}});
+  if (std::string_view("biuf").find(array.dtype().kind()) == std::string_view::npos)
+    raise_not_real(array, name);
+  return array;
+}
+
 inline void check_finite(const Doubles& array, const std::string& name, const std::string& view = {}) {
   for (py::ssize_t i = 0; i < array.size(); ++i)
     if (!std::isfinite(array.data()[i]))
@@ -58,11 +96,13 @@ py::array rows_array(const std::vector<Eigen::Vector<double, K>>& rows, bool one
   return array;
 }
 
-/// One row of K numbers.
+/// K numbers: a row, or a column as OpenCV's vectors are.
 template <int K>
 Eigen::Vector<double, K> row_of(const Doubles& array, const std::string& name, const std::string& view = {}) {
-  if (array.size() == K) return rows_of<K>(array, name, view).at(0);
-  raise({Reason::bad_value, fmt::format("{}: shape {} is not ({},)", name, shape_of(array), K), view, {}});
+  if (array.size() != K)
+    raise({Reason::bad_value, fmt::format("{}: shape {} is not ({},)", name, shape_of(array), K), view, {}});
+  check_finite(array, name, view);
+  return Eigen::Map<const Eigen::Vector<double, K>>(array.data());
 }
 
 /// An attribute's array: changing its elements would not change the object.
@@ -116,3 +156,21 @@ py::array moved_to_array(image::Image<T> image) {
 }
 
 }  // namespace helicarm::python
+
+namespace pybind11::detail {
+
+template <>
+class type_caster<helicarm::python::Doubles> : public pyobject_caster<helicarm::python::Doubles> {
+ public:
+  bool load(handle given, bool convert) {
+    helicarm::python::check_plain(given, "an array of shape " + shape(given));
+    return pyobject_caster<helicarm::python::Doubles>::load(given, convert);
+  }
+
+ private:
+  static std::string shape(handle given) {
+    return isinstance<array>(given) ? helicarm::python::shape_of(reinterpret_borrow<array>(given)) : "";
+  }
+};
+
+}  // namespace pybind11::detail

@@ -42,9 +42,10 @@ std::optional<Eigen::Vector2d> spacing_of(const py::object& pixel_mm) {
   return spacing;
 }
 
-xray::XrayImage image_from(const py::array& pixels, const py::object& pixel_mm,
+xray::XrayImage image_from(const py::object& given, const py::object& pixel_mm,
                            std::optional<double> source_detector_mm,
                            const std::optional<std::pair<float, float>>& range, const std::string& name) {
+  const py::array pixels = plain_array(given, "pixels");
   if (pixels.ndim() != 2 || pixels.size() == 0 || pixels.shape(0) > image::max_image_side ||
       pixels.shape(1) > image::max_image_side)
     raise({Reason::bad_size,
@@ -142,7 +143,7 @@ Pixels are neither flipped nor turned. Pixel (0, 0) is the centre of the top-lef
 v (row) down. Points are always (u, v); arrays are indexed [v, u].
 
 XrayImage(pixels, *, pixel_mm, source_detector_mm, range=None, name="")
-  pixels: (height, width), any numeric type; converted to float32 by one copy
+  pixels: (height, width), real numbers without a mask; converted to float32 by one copy
   pixel_mm: detector pixel spacing, 0.01 to 2 mm: a number, (column, row), or None where unknown
   source_detector_mm: 200 to 3000 mm, or None where unknown
   range: least and greatest possible grey value, which no pixel exceeds; of uint8 and uint16 pixels that of the type

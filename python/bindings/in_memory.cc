@@ -7,6 +7,7 @@
 #include "checks.h"
 #include "helicarm/case_registration/bone_checks.h"
 #include "helicarm/case_registration/register_in_memory.h"
+#include "helicarm/core/files.h"
 #include "helicarm/guidance/bone_check_description.h"
 #include "helicarm/guidance/tunnel.h"
 #include "helicarm/pipeline/model_description.h"
@@ -40,6 +41,19 @@ geometry::RigidTransform pose_from(const Doubles& matrix, const std::string& nam
   return pose;
 }
 
+/// A value of a model's mapping.
+template <class T>
+T entry(const py::dict& entries, const char* key, const std::string& model, const char* form) {
+  try {
+    return entries[key].cast<T>();
+  } catch (const py::cast_error&) {
+    raise({Reason::bad_value,
+           fmt::format("{}: {}: {} is not {}", model, key, std::string(py::repr(entries[key])), form),
+           {},
+           {}});
+  }
+}
+
 struct GivenVolume {
   VolumePointer volume;
   std::optional<volume::Volume> mask = {};
@@ -50,7 +64,7 @@ GivenVolume volume_in(const py::dict& entries, const std::string& name) {
   GivenVolume given{entries["volume"].cast<VolumePointer>()};
   if (entries.contains("mask")) given.mask = *entries["mask"].cast<VolumePointer>();
   if (entries.contains("window_hu")) {
-    const auto [low, high] = entries["window_hu"].cast<std::pair<double, double>>();
+    const auto [low, high] = entry<std::pair<double, double>>(entries, "window_hu", name, "(low, high)");
     checked(low, any_number, name + ": window_hu");
     checked(high, {low, std::numeric_limits<double>::infinity(), true}, name + ": window_hu");
     given.window = registration::HuWindow{low, high};
@@ -77,7 +91,8 @@ case_registration::GivenModel model_of(const std::string& name, const py::dict& 
       loaded.model.warnings.insert(loaded.model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
   }
   if (entries.contains("scale_sigma"))
-    loaded.scale_sigma = checked(entries["scale_sigma"].cast<double>(), {0, 0.1}, name + ": scale_sigma");
+    loaded.scale_sigma =
+        checked(entry<double>(entries, "scale_sigma", name, "a number"), {0, 0.1}, name + ": scale_sigma");
   if (entries.contains("points"))
     for (const auto& [point, at] : entries["points"].cast<std::vector<std::pair<std::string, Doubles>>>())
       loaded.points.push_back({point, row_of<3>(at, fmt::format("{}: points: {}", name, point))});
@@ -127,6 +142,7 @@ py::object register_given(const std::vector<std::pair<std::string, py::dict>>& m
                           const py::object& progress) {
   const auto options = measuring_options("register", "best", max_error_mm, motion_sigma_mm, search_mm,
                                          search_deg, threads, {}, py::bool_(false));
+  if (out) value_or_raise(check_can_write(*out));
   std::vector<case_registration::GivenModel> loaded_models;
   for (const auto& [name, model] : models) {
     const auto at = starts.find(name);

@@ -35,6 +35,7 @@ py::object segment_ct(const std::filesystem::path& ct, const py::dict& seeds, co
       value_or_raise(guarded([&] { return volume::declared_space(space, "space"); }));
   for (const auto& [name, point] : seeds) {
     const auto word = name.cast<std::string>();
+    check_plain(point, "seeds: " + word);
     request.seeds.push_back({word, row_of<3>(point.cast<Doubles>(), "seeds: " + word).cwiseProduct(to_lps)});
   }
   if (voxel_mm) request.voxel_mm = row_of<3>(*voxel_mm, "voxel_mm");

@@ -14,15 +14,20 @@ namespace {
 using registration::SurfaceMesh;
 using Indices = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 
-std::shared_ptr<SurfaceMesh> surface_from(const Doubles& vertices, const py::array& faces,
+std::shared_ptr<SurfaceMesh> surface_from(const Doubles& vertices, const py::object& triangles,
                                           const std::string& frame, const std::string& unit) {
   registration::SurfaceFile file;
   file.mesh.corners = rows_of<3>(vertices, "vertices");
-  if (std::string_view("iu").find(faces.dtype().kind()) == std::string_view::npos || faces.ndim() != 2 ||
-      faces.shape(1) != 3)
+  const py::array faces = plain_array(triangles, "faces");
+  if (faces.ndim() != 2 || faces.shape(1) != 3)
     raise({Reason::bad_value,
-           fmt::format("faces: shape {} is not (N, 3) whole numbers: the vertices of each triangle",
-                       shape_of(faces)),
+           fmt::format("faces: shape {} is not (N, 3): the vertices of each triangle", shape_of(faces)),
+           {},
+           {}});
+  if (std::string_view("iu").find(faces.dtype().kind()) == std::string_view::npos)
+    raise({Reason::bad_value,
+           fmt::format("faces: its elements are {}, not whole numbers: faces.astype(int) makes them so",
+                       std::string(py::str(py::object(faces.dtype())))),
            {},
            {}});
   value_or_raise(guarded([&] { registration::check_triangles(double(faces.shape(0)), "faces"); }));
@@ -89,6 +94,14 @@ unit). as_surface takes objects of other packages, read_surface files.)")
       .def("__repr__", [](const SurfaceMesh& s) {
         return fmt::format("<Surface: {} vertices, {} triangles>", s.corners.size(), s.triangles.size());
       });
+  module.def("_unit_mm", [](const std::string& unit) {
+    return value_or_raise(guarded([&] { return volume::declared_unit(unit, "unit"); }));
+  });
+  module.def("_space_signs", [](const std::string& frame) {
+    return rows_array<3>({value_or_raise(guarded([&] { return volume::declared_space(frame, "frame"); }))},
+                         true)
+        .attr("tolist")();
+  });
   module.def(
       "read_surface",
       [](const std::filesystem::path& path) {

@@ -36,11 +36,11 @@ Eigen::Affine3d affine_from(const Doubles& stated, const std::string& frame) {
   return affine;
 }
 
-std::shared_ptr<Volume> volume_from(const py::array& array, const Doubles& affine, const std::string& frame) {
+std::shared_ptr<Volume> volume_from(const py::object& given, const Doubles& affine,
+                                    const std::string& frame) {
+  const py::array array = plain_array(given, "array");
   if (array.ndim() != 3)
     raise({Reason::bad_size, fmt::format("array: shape {} is not (i, j, k)", shape_of(array)), {}, {}});
-  if (std::string_view("biuf").find(array.dtype().kind()) == std::string_view::npos)
-    raise({Reason::bad_value, "array: its elements are not real numbers", {}, {}});
   auto loaded = std::make_shared<Volume>();
   for (int axis = 0; axis < 3; ++axis) loaded->size[axis] = int(array.shape(axis));
   const std::size_t count = value_or_raise(volume::voxel_count(loaded->size.cast<double>(), "array"));
@@ -48,6 +48,17 @@ std::shared_ptr<Volume> volume_from(const py::array& array, const Doubles& affin
   const VoxelArray voxels = VoxelArray::ensure(array);
   if (!voxels) raise({Reason::bad_value, "array: its elements are not real numbers", {}, {}});
   loaded->voxels.assign(voxels.data(), voxels.data() + count);
+  const auto bad = std::ranges::find_if(loaded->voxels, [](float voxel) { return !std::isfinite(voxel); });
+  if (bad != loaded->voxels.end()) {
+    const auto at = std::size_t(bad - loaded->voxels.begin());
+    const auto ni = std::size_t(loaded->size.x()), nj = std::size_t(loaded->size.y());
+    raise({Reason::not_finite,
+           fmt::format("array: [{}, {}, {}] is {}: numpy.nan_to_num(array, nan=-1000) makes air of what is "
+                       "not a number",
+                       at % ni, at / ni % nj, at / ni / nj, *bad),
+           {},
+           {}});
+  }
   value_or_raise(volume::check_read(*loaded, "Volume"));
   return loaded;
 }
@@ -92,7 +103,7 @@ void add_volume(py::module_& module) {
   py::class_<Volume, std::shared_ptr<Volume>>(module, "Volume", R"(A CT or another voxel volume in memory.
 
 Volume(array, affine, *, frame)
-  array: (ni, nj, nk) indexed [i, j, k], real numbers, Hounsfield units in a CT; converted to float32 by one copy
+  array: (ni, nj, nk) indexed [i, j, k], real numbers without a mask, Hounsfield units in a CT; converted to float32 by one copy
   affine: (4, 4) or (3, 4): voxel index (i, j, k) to mm; integers are voxel centres. A shear such as a gantry tilt is kept
   frame: of affine: "LPS" (DICOM, ITK), "RAS" (NIfTI, 3D Slicer) or another patient space; LPS inside
 Raises InputError: bad_size, bad_value (singular, nearly coplanar axes, spacing outside 0.001 to 100 mm), not_finite,

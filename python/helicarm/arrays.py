@@ -22,7 +22,7 @@ def _refuse(message, code="bad_value"):
 
 
 def _own_frame(frame, own, what):
-    if frame is not None and frame.upper() != own:
+    if frame is not None and _c._space_signs(frame) != _c._space_signs(own):
         _refuse(f'frame: "{frame}" contradicts {what}, which is {own}', "usage")
 
 
@@ -70,7 +70,7 @@ def as_volume(obj, *, frame=None):
 
 
 def _is_dataset(obj):
-    return hasattr(obj, "save_as") and hasattr(obj, "SOPClassUID")
+    return hasattr(obj, "save_as") and hasattr(obj, "data_element")  # its class may be missing, which is then named
 
 
 def _is_series(obj):
@@ -91,6 +91,11 @@ def _volume_of_datasets(obj):
     return _c._volume_of_slices([_bytes_of(each) for each in series], "series")
 
 
+def _check_numbers(array, what):
+    if array.dtype.kind not in "biuf":
+        _refuse(f"{what}: its elements are {array.dtype}, not real numbers", "unsupported")
+
+
 def _scaled(affine, mm):
     return np.diag([mm, mm, mm, 1.0]) @ affine
 
@@ -101,6 +106,7 @@ def _volume_of_nibabel(image):
         data = data.reshape(data.shape[:3])
     if data.ndim != 3:
         _refuse(f"nibabel image: shape {data.shape} is a sequence of volumes; give one of them", "unsupported")
+    _check_numbers(data, "nibabel image")
     if image.affine is None:
         _refuse("nibabel image: has no affine: its place is unknown")
     header = image.header
@@ -179,6 +185,8 @@ def _volume_of_vtk(image, frame):
     scalars = image.GetPointData().GetScalars()
     if scalars is None or scalars.GetNumberOfComponents() != 1:
         _refuse("vtkImageData: has no scalars with one value in a point", "unsupported")
+    if scalars.GetDataTypeAsString() == "bit":
+        _refuse("vtkImageData: its scalars are bits, which NumPy has not: apply vtkImageCast", "unsupported")
     shape = image.GetDimensions()
     affine = np.eye(4)
     if hasattr(image, "GetDirectionMatrix"):
@@ -206,21 +214,21 @@ def as_surface(obj, *, frame=None, unit=None):
         return _c.read_surface(obj)
     if hasattr(obj, "GetPolys"):
         vertices, faces, declared = _triangles_of_vtk(obj)
-        frame = _agreed(frame, declared.get("space"), "frame")
-        unit = _agreed(unit, declared.get("unit", declared.get("units")), "unit")
+        frame = _agreed(frame, declared.get("space"), "frame", _c._space_signs)
+        unit = _agreed(unit, declared.get("unit", declared.get("units")), "unit", _c._unit_mm)
     elif hasattr(obj, "vertices") and hasattr(obj, "faces"):
         vertices, faces = obj.vertices, obj.faces
-        unit = _agreed(unit, getattr(obj, "units", None), "unit")
+        unit = _agreed(unit, getattr(obj, "units", None), "unit", _c._unit_mm)
     elif isinstance(obj, Sequence) and not isinstance(obj, str) and len(obj) == 2:
         vertices, faces = obj
     else:
         _refuse(f"surface: {type(obj).__name__} is neither a Surface, a path, (vertices, faces) nor a mesh of trimesh, VTK "
                 "or PyVista", "unsupported")
-    return _c.Surface(vertices, np.asarray(faces), frame=_stated(frame, type(obj).__name__), unit=unit or "mm")
+    return _c.Surface(vertices, faces, frame=_stated(frame, type(obj).__name__), unit=unit or "mm")
 
 
-def _agreed(given, declared, name):
-    if given is not None and declared is not None and given.lower() != declared.lower():
+def _agreed(given, declared, name, meaning):
+    if given is not None and declared is not None and meaning(given) != meaning(declared):
         _refuse(f'{name}: "{given}" is given, but the object states "{declared}"', "usage")
     return declared if given is None else given
 
@@ -248,7 +256,14 @@ def _mask_on(volume, mask):
     if not isinstance(mask, np.ndarray):
         return as_volume(mask)
     if mask.shape != tuple(volume.shape):
-        _refuse(f"mask: an array of shape {mask.shape} is not on the volume's grid, whose shape (i, j, k) is {tuple(volume.shape)}")
+        turned = "; an array (k, j, i) needs .transpose(2, 1, 0)" if mask.shape == tuple(volume.shape)[::-1] else ""
+        _refuse(f"mask: an array of shape {mask.shape} is not on the volume's grid, whose shape (i, j, k) is {tuple(volume.shape)}"
+                + turned)
+    _check_numbers(mask, "mask")
+    if np.ma.is_masked(mask):
+        _refuse("mask: a masked array: what it masks is neither body nor surroundings; give mask.filled(0)")
+    if not np.isfinite(mask).all():
+        _refuse("mask: holds values that are not finite: what is not 0 is the body", "not_finite")
     return _c.Volume((mask != 0).astype(np.float32), volume.affine, frame="LPS")
 
 
@@ -290,7 +305,25 @@ def as_image(obj, *, name="", pixel_mm=None, source_detector_mm=None, range=None
         return _c.read_image(obj, frame=frame)
     if _is_dataset(obj):
         return _c._image_of_dicom(_bytes_of(obj), name or "dataset", frame)
-    return _c.XrayImage(np.asarray(obj), name=name, **stated)
+    return _c.XrayImage(obj, name=name, **stated)
+
+
+def as_images(images, what, **stated):
+    """XrayImages of an array (n, height, width) or a list of what as_image takes."""
+    if isinstance(images, (str, os.PathLike, _c.XrayImage)) or _is_dataset(images):
+        _refuse(f"{what}: one {'path' if isinstance(images, (str, os.PathLike)) else type(images).__name__}: give an array "
+                "(n, height, width), such as a dataset's pixel_array, or a list with an image in each element", "usage")
+    if not hasattr(images, "__iter__"):
+        _refuse(f"{what}: {type(images).__name__} is neither an array (n, height, width) nor a list of images", "usage")
+    return [_named(as_image, image, f"{what}: image {i}", **stated) for i, image in enumerate(images, 1)]
+
+
+def _named(convert, obj, what, **stated):
+    """convert(obj), whose refusal names what it was of."""
+    try:
+        return convert(obj, **stated)
+    except InputError as error:
+        raise InputError(error.code, f"{what}: {error.message}", error.view, error.figures) from None
 
 
 def as_camera(obj):
@@ -300,9 +333,12 @@ def as_camera(obj):
     if isinstance(obj, (str, os.PathLike)):
         return _c.import_camera(obj)
     if isinstance(obj, Mapping):
-        if "K" in obj:
+        if all(name in obj for name in "KRt"):
             return _c.Camera(obj["K"], obj["R"], obj["t"])
-        return _c.Camera.from_projection(obj["projection"])
+        if "projection" in obj:
+            return _c.Camera.from_projection(obj["projection"])
+        _refuse(f'camera: a mapping with {", ".join(map(repr, obj)) or "no keys"}; must have "K", "R" and "t", or "projection"',
+                "unsupported")
     if isinstance(obj, Sequence) and len(obj) == 2 and isinstance(obj[0], _c.Calibration):
         calibration, view = obj
         pose = calibration.camera_from_calibrator(view)
@@ -310,6 +346,6 @@ def as_camera(obj):
     if isinstance(obj, Sequence) and len(obj) == 3 and np.shape(obj[0]) == (3, 3):
         return _c.Camera(*obj)
     if np.shape(obj) == (3, 4):
-        return _c.Camera.from_projection(np.asarray(obj, float))
+        return _c.Camera.from_projection(obj)
     _refuse(f"camera: {type(obj).__name__} is neither a Camera, a path, (K, R, t), a 3 x 4 projection nor (Calibration, view)",
             "unsupported")

@@ -38,8 +38,10 @@ def test_a_view_of_a_volume_keeps_it_alive():
 @pytest.mark.parametrize("array, affine, frame, code, match", [
     (np.zeros((3, 3)), PLACE, "LPS", "bad_size", r"shape \(3, 3\) is not \(i, j, k\)"),
     (np.zeros((3, 3, 0)), PLACE, "LPS", "bad_size", "a side of 0"),
-    (np.full((3, 3, 3), np.nan), PLACE, "LPS", "not_finite", "a voxel is not finite"),
-    (np.zeros((3, 3, 3), complex), PLACE, "LPS", "bad_value", "not real numbers"),
+    (np.full((3, 3, 3), np.nan), PLACE, "LPS", "not_finite", r"array: \[0, 0, 0\] is nan"),
+    (np.zeros((3, 3, 3), complex), PLACE, "LPS", "bad_value", "array: its elements are complex128"),
+    (np.ma.masked_equal(np.arange(27).reshape(3, 3, 3), 5), PLACE, "LPS", "bad_value", "array: 1 of 27 elements are masked"),
+    (None, PLACE, "LPS", "bad_value", "array: .*not real numbers"),
     (np.zeros((3, 3, 3)), PLACE, "MNI", "unsupported", "frame.*MNI"),
     (np.zeros((3, 3, 3)), np.diag([1, 1, 0, 1]), "LPS", "bad_value", "a spacing of 0 mm"),
     (np.zeros((3, 3, 3)), np.diag([1, 1, 1, 2]), "LPS", "bad_value", "the last row is not 0 0 0 1"),
@@ -65,7 +67,9 @@ def test_a_surface_is_converted_to_lps_and_mm():
     (TETRAHEDRON[0], TETRAHEDRON[1] + 1, {}, "bad_value", "row 1 holds 4, the vertices are 0 to 3"),
     (TETRAHEDRON[0], TETRAHEDRON[1] - 1, {}, "bad_value", "holds -1"),
     (TETRAHEDRON[0], np.zeros((3, 4), int), {}, "bad_value", r"shape \(3, 4\)"),
-    (TETRAHEDRON[0], TETRAHEDRON[1].astype(float), {}, "bad_value", "whole numbers"),
+    (TETRAHEDRON[0], TETRAHEDRON[1].astype(float), {}, "bad_value", "elements are float64, not whole numbers"),
+    (np.ma.masked_equal(TETRAHEDRON[0], 40), TETRAHEDRON[1], {}, "bad_value", r"shape \(4, 3\): 1 of 12 elements are masked"),
+    (TETRAHEDRON[0].astype(complex), TETRAHEDRON[1], {}, "bad_value", "complex128, not real"),
     (TETRAHEDRON[0] * np.nan, TETRAHEDRON[1], {}, "not_finite", "vertices"),
     (TETRAHEDRON[0] * 1000, TETRAHEDRON[1], {}, "bad_value", "not in mm"),
     (TETRAHEDRON[0], TETRAHEDRON[1], {"unit": "cubit"}, "unsupported", "unit.*cubit")])
@@ -78,6 +82,38 @@ def test_frames_are_never_assumed():
     refused("usage", 'give frame="LPS" or frame="RAS"', helicarm.as_surface, TETRAHEDRON)
     with pytest.raises(TypeError):
         helicarm.Volume(np.zeros((3, 3, 3)), PLACE)
+
+
+@pytest.mark.parametrize("same", [
+    np.asfortranarray, lambda a: a.astype(">i2"), lambda a: a.astype(np.int64), lambda a: np.repeat(a, 2, 1)[:, ::2],
+    lambda a: a[::-1, :, ::-1][::-1, :, ::-1], lambda a: a.astype(np.float16), np.ma.asarray, lambda a: a.tolist()])
+def test_order_type_and_container_of_an_array_do_not_matter(same):
+    voxels = np.random.default_rng(2).integers(0, 250, (3, 4, 5)).astype(np.int16)
+    assert np.array_equal(helicarm.Volume(same(voxels), PLACE, frame="LPS").array, voxels)
+    image = helicarm.XrayImage(same(voxels[0]) if same is np.asfortranarray else same(voxels)[0], pixel_mm=None,
+                               source_detector_mm=None, range=(0, 255))
+    assert np.array_equal(image.pixels, voxels[0])
+    vertices, faces = TETRAHEDRON
+    surface = helicarm.Surface(vertices.tolist(), faces.tolist(), frame="LPS")
+    assert np.array_equal(surface.vertices, helicarm.Surface(vertices, np.asfortranarray(faces), frame="LPS").vertices)
+
+
+@pytest.mark.parametrize("call", [
+    lambda a: helicarm.XrayImage(np.ma.masked_equal(np.full((4, 5), 3, np.uint8), 3), pixel_mm=None, source_detector_mm=None),
+    lambda a: helicarm.as_image(np.ma.masked_equal(np.full((4, 5), 3, np.uint8), 3)),
+    lambda a: helicarm.ViewPoints("A", a, a[:, :2], sigma_px=0.1), lambda a: helicarm.ViewPoints("A", a.data, a[:, :2], sigma_px=0.1),
+    lambda a: helicarm.as_surface((a, TETRAHEDRON[1]), frame="LPS"), lambda a: helicarm.Camera(np.eye(3), np.eye(3), a[0])])
+def test_masked_elements_are_no_numbers(call):
+    refused("bad_value", "elements are masked", call, np.ma.masked_equal(TETRAHEDRON[0], 0))
+
+
+def test_a_camera_takes_opencvs_columns_and_names_what_a_mapping_lacks():
+    k, rotation, source = projection(0)
+    t = -rotation @ source
+    assert np.array_equal(helicarm.Camera(k, rotation, t.reshape(3, 1)).t, t)
+    refused("bad_value", r"t: shape \(4,\) is not \(3,\)", helicarm.Camera, k, rotation, [*t, 1])
+    refused("unsupported", "'camera_matrix'; must have", helicarm.as_camera, {"camera_matrix": k})
+    refused("unsupported", "must have", helicarm.as_camera, {"K": k})
 
 
 def test_a_camera_of_a_projection_and_of_its_parts_are_one():
@@ -223,6 +259,14 @@ def test_what_registration_of_arrays_needs_is_named(sequence):  # noqa: F811
     small = helicarm.Camera(*views["A"][1], shape=(10, 10))
     refused("bad_size", "the camera is for 10 x 10", helicarm.register, models=models, views={"A": (image, small), "B": views["B"]})
     refused("bad_value", "range", helicarm.register, models=models, views={"A": (image.pixels, small)}, starts={"body": start()})
+
+
+def test_an_output_folder_that_cannot_be_written_is_refused_before_the_search(sequence, tmp_path):  # noqa: F811
+    (tmp_path / "file").write_text("")
+    steps = []
+    refused("cannot_write", "is not a folder", helicarm.register, models={"body": {"volume": volume_of_body(), "window_hu": (300, 3000)}},
+            views=views_of(sequence), starts={"body": start()}, out=tmp_path / "file/out", progress=steps.append)
+    assert not steps
 
 
 def test_a_sweep_of_arrays_is_that_of_files():

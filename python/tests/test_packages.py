@@ -67,6 +67,7 @@ def test_trimesh_states_its_unit_but_no_frame():
     assert surface.vertices[surface.faces] == pytest.approx((TETRAHEDRON[0] * [-1, -1, 1])[TETRAHEDRON[1]])
     refused("usage", 'give frame="LPS"', helicarm.as_surface, mesh)
     refused("usage", "the object states", helicarm.as_surface, mesh, frame="LPS", unit="mm")
+    assert np.array_equal(helicarm.as_surface(mesh, frame="right-anterior-superior", unit="m").vertices, surface.vertices)
     mesh.units = None
     metres = helicarm.as_surface(mesh, frame="LPS", unit="m")
     assert metres.vertices[metres.faces] == pytest.approx(TETRAHEDRON[0][TETRAHEDRON[1]])
@@ -136,6 +137,12 @@ def test_other_images_of_nibabel_need_an_orientation(nibabel):
     refused("unsupported", "sequence of volumes", helicarm.as_volume, nibabel.Nifti1Image(np.zeros((3, 4, 5, 2), np.int16), place))
 
 
+@pytest.mark.parametrize("kind", [np.dtype([("R", "u1"), ("G", "u1"), ("B", "u1")]), np.complex64])
+@pytest.mark.filterwarnings("error")
+def test_colours_and_complex_values_of_nibabel_are_refused(nibabel, kind):
+    refused("unsupported", "nibabel image: its elements are", helicarm.as_volume, nibabel.Nifti1Image(np.zeros((3, 4, 5), kind), np.eye(4)))
+
+
 # pydicom
 
 @pytest.fixture
@@ -171,7 +178,22 @@ def test_a_dataset_is_an_image(case):
     assert np.array_equal(peer.pixels, image.pixels) and np.array_equal(peer.pixel_mm, image.pixel_mm) and peer.name == "AP"
 
 
+def test_a_dataset_without_a_class_is_no_array():
+    dataset = pytest.importorskip("pydicom", reason="pydicom is not installed").Dataset()
+    dataset.PatientID = "1"
+    for convert, given in ((helicarm.as_image, dataset), (helicarm.as_volume, dataset), (helicarm.as_volume, [dataset])):
+        refused("unsupported", "dataset: pydicom cannot write it", convert, given)
+
+
 # VTK
+
+def test_bits_of_vtk_are_refused():
+    vtk = pytest.importorskip("vtk", reason="VTK is not installed")
+    image = vtk.vtkImageData()
+    image.SetDimensions(3, 4, 5)
+    image.AllocateScalars(vtk.VTK_BIT, 1)
+    refused("unsupported", "apply vtkImageCast", helicarm.as_volume, image, frame="RAS")
+
 
 def test_a_space_of_poly_data_is_honoured():
     vtk = pytest.importorskip("vtk", reason="VTK is not installed")
