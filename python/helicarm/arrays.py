@@ -281,6 +281,8 @@ def as_model(obj):
                 model[name] = convert(model[name])
         if "mask" in model:
             model["mask"] = _mask_on(model["volume"], model["mask"])
+        if not isinstance(model.get("points", {}), Mapping):
+            _refuse(f"points: {type(model['points']).__name__} is not {{name: (x, y, z)}}", "usage")
         if "points" in model:
             model["points"] = [(name, np.asarray(place, float)) for name, place in model["points"].items()]
         return model

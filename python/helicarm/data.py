@@ -1,21 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
 """Registration, DRR, sweep and track: of a case's folder, or of arrays in memory."""
+import operator
 import os
 import pathlib
+import re
+import reprlib
 import tempfile
 from collections.abc import Mapping
 
 import numpy as np
 
 from . import _helicarm as _c
-from .arrays import as_camera, as_image, as_model, as_volume
+from .arrays import _named, as_camera, as_image, as_images, as_model, as_volume
 from .errors import InputError, RefusedError
 from .results import MigrationAnswer, RegistrationAnswer, SequenceAnswer
 
 
-def _answered(answer, call, *arguments, **options):
+def _called(function, call, *arguments, **options):
+    """call(...), whose TypeError is that of the function which the caller knows."""
     try:
-        return answer(call(*arguments, **options))
+        return call(*arguments, **options)
+    except TypeError as error:
+        if f"{call.__name__}(): incompatible function arguments" not in str(error):
+            raise
+        known = set(re.findall(r"(\w+): ", (call.__doc__ or "").split("\n")[0]))
+        unknown = [name for name in options if name not in known]
+        said = ", ".join(f"{name}={reprlib.repr(value)}" for name, value in options.items() if value is not None)
+        raise TypeError(f"{function}() got an unexpected keyword argument '{unknown[0]}'" if unknown else
+                        f"{function}(): an argument has a wrong type; of the options {said or 'none was given'}") from None
+
+
+def _answered(function, answer, call, *arguments, **options):
+    try:
+        return answer(_called(function, call, *arguments, **options))
     except RefusedError as error:
         if isinstance(error.result, dict):
             error.result = answer(error.result)
@@ -41,11 +58,17 @@ def drr(volume, camera, *, shape=None, values="hu", threads=0):
     several = isinstance(camera, list)
     cameras = [as_camera(each) for each in (camera if several else [camera])]
     if shape is None:
+        if not cameras:
+            raise InputError("bad_value", "camera: the list is empty")
         shapes = {each.shape for each in cameras}
         if len(shapes) != 1 or None in shapes:
             raise InputError("usage", "shape: is missing, and the cameras do not state one")
         shape = shapes.pop()
-    images = _c._drr(as_volume(volume), cameras, tuple(shape), values, threads)
+    try:
+        height, width = map(operator.index, shape)
+    except (TypeError, ValueError):
+        raise InputError("bad_value", f"shape: {shape!r} is not (height, width) in whole pixels") from None
+    images = _called("drr", _c._drr, as_volume(volume), cameras, (height, width), values, threads=threads)
     return images if several else images[0]
 
 
@@ -83,14 +106,23 @@ def segment(ct, seeds=None, *, label_map=None, voxel_mm=None, tiff_offset_hu=0.0
     with tempfile.TemporaryDirectory() as folder:
         ct, label_map = (given if is_file(given) else _write_nrrd(pathlib.Path(folder) / name, as_volume(given))
                          for given, name in ((ct, "ct.nrrd"), (label_map, "label_map.nrrd")))
-        return _c.segment(ct, seeds or {}, label_map=label_map, voxel_mm=voxel_mm, tiff_offset_hu=tiff_offset_hu, **options)
+        return _called("segment", _c.segment, ct, _mapping("seeds", seeds, "{name: (x, y, z)}"), label_map=label_map,
+                       voxel_mm=voxel_mm, tiff_offset_hu=tiff_offset_hu, **options)
+
+
+def _mapping(what, given, form):
+    if given is None or isinstance(given, Mapping):
+        return given or {}
+    raise InputError("usage", f"{what}: {type(given).__name__} is not {form}")
 
 
 def _views_of(views):
     """[(name, image or images, camera)]."""
-    if isinstance(views, Mapping):
-        return [(name, *pair) for name, pair in views.items()]
-    return [(f"V{i + 1}", *pair) for i, pair in enumerate(views)]
+    named = list(views.items() if isinstance(views, Mapping) else ((f"V{i}", pair) for i, pair in enumerate(views, 1)))
+    for name, pair in named:
+        if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+            raise InputError("usage", f"views: {name}: {type(pair).__name__} is not (image, camera)")
+    return [(name, *pair) for name, pair in named]
 
 
 def _cameras_of(views, covariance):
@@ -104,7 +136,7 @@ def _cameras_of(views, covariance):
             cameras.append((as_camera((calibration, view)), calibration.map(view)))
             held.append((calibration, view if isinstance(view, int) else calibration.names.index(view)))
         else:
-            cameras.append((as_camera(camera), None))
+            cameras.append((_named(as_camera, camera, f"views: {name}"), None))
     one = len(held) == len(views) and all(calibration is held[0][0] for calibration, _ in held)
     if covariance is None and one and held[0][0].joint_covariance.size:
         rows = np.concatenate([np.arange(11 * i, 11 * i + 11) for _, i in held])
@@ -140,23 +172,26 @@ def register(folder=None, *, models=None, views=None, starts=None, camera_covari
     given = {"models": models, "views": views, "starts": starts, "camera_covariance": camera_covariance, "usable": usable}
     _one_of("register", folder, given)
     if folder is not None:
-        return _answered(RegistrationAnswer, _c.register, folder, **options)
+        return _answered("register", RegistrationAnswer, _c.register, folder, **options)
     if not models or not views:
         raise InputError("usage", "register: models and views are both required")
     if not isinstance(models, Mapping):
         raise InputError("bad_value", "models: is not {name: model}")
     triples = _views_of(views)
     names = [name for name, _, _ in triples]
+    starts = _mapping("starts", starts, "{name of the model: world_from_model}")
+    usable = _mapping("usable", usable, "{name of the view: mask}")
     for what, of, known in (("starts", starts, models), ("usable", usable, names)):
-        for name in of or ():
+        for name in of:
             if name not in known:
                 raise InputError("bad_value", f'{what}: there is no "{name}"')
     cameras, covariance = _cameras_of(triples, camera_covariance)
-    held = [(name, as_image(image, name=name), camera, map_)
+    held = [(name, _named(as_image, image, f"views: {name}", name=name), camera, map_)
             for (name, image, _), (camera, map_) in zip(triples, cameras)]
-    poses = {name: list(start) if np.ndim(start) == 3 else [start] for name, start in (starts or {}).items()}
-    return _answered(RegistrationAnswer, _c._register_given, [(name, as_model(model)) for name, model in models.items()],
-                     poses, held, covariance, [(usable or {}).get(name) for name in names], **options)
+    poses = {name: list(start) if np.ndim(start) == 3 else [start] for name, start in starts.items()}
+    return _answered("register", RegistrationAnswer, _c._register_given,
+                     [(name, _named(as_model, model, name)) for name, model in models.items()],
+                     poses, held, covariance, [usable.get(name) for name in names], **options)
 
 
 def check_tunnels(model, tunnels, *, diameter_mm, bridge_mm=None):
@@ -176,16 +211,17 @@ def check_tunnels(model, tunnels, *, diameter_mm, bridge_mm=None):
             raise InputError("bad_value", f'{what}: there is none of "{name}"')
         return value[name]
 
-    return _c._check_tunnels(as_model(model), [(name, ends, of(name, diameter_mm, "diameter_mm"), of(name, bridge_mm, "bridge_mm"))
-                                               for name, ends in tunnels.items()])
+    tunnels = _mapping("tunnels", tunnels, "{name: (start, end)}")
+    return _called("check_tunnels", _c._check_tunnels, as_model(model),
+                   [(name, ends, of(name, diameter_mm, "diameter_mm"), of(name, bridge_mm, "bridge_mm")) for name, ends in tunnels.items()])
 
 
 def register_sequence(folder, frames, **options):
-    return _answered(SequenceAnswer, _c.register_sequence, folder, frames, **options)
+    return _answered("register_sequence", SequenceAnswer, _c.register_sequence, folder, frames, **options)
 
 
 def migration(first, second, **options):
-    return MigrationAnswer(_c.migration(first, second, **options))
+    return MigrationAnswer(_called("migration", _c.migration, first, second, **options))
 
 
 def sweep(folder=None, *, images=None, calibrator=None, plate=None, pixel_mm=None, source_detector_mm=None, range=None,
@@ -210,18 +246,20 @@ def sweep(folder=None, *, images=None, calibrator=None, plate=None, pixel_mm=Non
              "source_detector_mm": source_detector_mm, "range": range, "mirrored": mirrored}
     _one_of("sweep", folder, given)
     if folder is not None:
-        return _c.sweep(folder, **options)
+        return _called("sweep", _c.sweep, folder, **options)
     if images is None or calibrator is None:
         raise InputError("usage", "sweep: images and calibrator are both required")
     stated = {"pixel_mm": pixel_mm, "source_detector_mm": source_detector_mm, "range": range}
-    held = [as_image(image, **stated) for image in images]
-    return _c._sweep_images(held, _loaded(calibrator, _c.Calibrator, "udcsc"), _loaded(plate, _c.Plate, "plate48"), mirrored,
-                            **options)
+    return _called("sweep", _c._sweep_images, as_images(images, "images", **stated),
+                   _loaded(calibrator, _c.Calibrator, "udcsc", "calibrator"), _loaded(plate, _c.Plate, "plate48", "plate"),
+                   mirrored=mirrored, **options)
 
 
-def _loaded(given, kind, built_in):
+def _loaded(given, kind, built_in, what):
     if given is None or isinstance(given, kind):
         return given
+    if not isinstance(given, (str, os.PathLike)):
+        raise InputError("usage", f'{what}: {type(given).__name__} is neither a {kind.__name__}, a path nor "{built_in}"')
     return getattr(kind, built_in)() if given == built_in else kind.load(given)
 
 
@@ -260,41 +298,53 @@ def track(case=None, *, frames=None, views=None, picks=None, diameter_mm=None, b
     if case is not None:
         if frames is None:
             raise InputError("usage", "track: frames is missing, such as frames=\"1-100\"")
-        return _c.track(case, frames=frames, axes=axes, **options)
+        return _called("track", _c.track, case, frames=frames, axes=axes, **options)
     if views is None or not picks or diameter_mm is None or frames is not None:
         raise InputError("usage", "track: views, picks and diameter_mm are required; frames is for a case")
     triples = _views_of(views)
     if len(triples) < 2:
         raise RefusedError("too_few_views", "track: markers are located in two views or more")
     cameras, covariance = _cameras_of(triples, camera_covariance)
-    counts = {name: len(images) for name, images, _ in triples}
+    stacks = {name: as_images(images, f"views: {name}", name=name) for name, images, _ in triples}
+    counts = {name: len(images) for name, images in stacks.items()}
     if len(set(counts.values())) != 1 or 0 in counts.values():
         raise InputError("bad_size", f"views: numbers of images differ or are 0: {counts}")
-    held = [(name, [as_image(image, name=name) for image in images], camera, map_)
-            for (name, images, _), (camera, map_) in zip(triples, cameras)]
+    held = [(name, stacks[name], camera, map_) for (name, _, _), (camera, map_) in zip(triples, cameras)]
+    picks = _mapping("picks", picks, "{marker: {view: (u, v)}}")
+    corrections = _mapping("corrections", corrections, "{frame: {marker: {view: (u, v)}}}")
+    axes, bodies = _mapping("axes", axes, "{body: axes}"), _mapping("bodies", bodies, "{body: markers}")
     names, markers = list(counts), list(picks)
+
+    def place_of(given, what):
+        place = np.ma.filled(np.ma.asarray(given, float), np.nan)
+        if place.shape != (2,):
+            raise InputError("bad_value", f"{what}: shape {place.shape} is not (2,): u, v")
+        if not np.isfinite(place).all():
+            raise InputError("not_finite", f"{what}: ({place[0]:g}, {place[1]:g}) is not finite; leave out what is not seen")
+        return map(float, place)
+
     def flattened(places_of, what, *frame):
         made = []
         for marker, places in places_of.items():
             if marker not in markers:
                 raise InputError("bad_value", f'{what}: "{marker}" has no pick in the first frame')
-            for view, uv in places.items():
+            for view, uv in _mapping(f"{what}: {marker}", places, "{view: (u, v)}").items():
                 if view not in counts:
                     raise InputError("bad_value", f'{what}: "{marker}": there is no view "{view}"')
-                u, v = map(float, uv)
+                u, v = place_of(uv, f"{what}: {marker}: {view}")
                 made.append((markers.index(marker), names.index(view), *frame, u, v))
         return made
     last = next(iter(counts.values()))
-    for frame in corrections or {}:
-        if not 2 <= frame <= last:
-            raise InputError("bad_value", f"corrections: frame {frame}: they are of frames 2 to {last}, picks of the first")
-    later = [each for frame, of in (corrections or {}).items() for each in flattened(of, "corrections", int(frame))]
-    for name in axes or {}:
-        if name not in (bodies or {}):
+    for frame in corrections:
+        if not isinstance(frame, (int, np.integer)) or not 2 <= frame <= last:
+            raise InputError("bad_value", f"corrections: frame {frame!r}: they are of frames 2 to {last}, picks of the first")
+    later = [each for frame, of in corrections.items() for each in flattened(of, "corrections", int(frame))]
+    for name in axes:
+        if name not in bodies:
             raise InputError("bad_value", f'axes: "{name}" is no body')
-    held_axes = [(list(bodies).index(name), np.array(matrix, float)) for name, matrix in (axes or {}).items()]
-    return _c._track_images(held, covariance, markers, flattened(picks, "picks"), _bodies_of(bodies or {}, markers), axes=held_axes,
-                            diameter_mm=diameter_mm, frame_rate_hz=frame_rate_hz, corrections=later, **options)
+    held_axes = [(list(bodies).index(name), np.array(matrix, float)) for name, matrix in axes.items()]
+    return _called("track", _c._track_images, held, covariance, markers, flattened(picks, "picks"), _bodies_of(bodies, markers),
+                   axes=held_axes, diameter_mm=diameter_mm, frame_rate_hz=frame_rate_hz, corrections=later, **options)
 
 
 def _bodies_of(bodies, markers):

@@ -148,6 +148,11 @@ def test_a_drr_is_the_exact_chord_of_a_block():
     refused("bad_value", "inside", helicarm.drr, volume, helicarm.Camera.orbit(volume.centre_mm, source_centre_mm=1))
     refused("usage", "values", helicarm.drr, volume, camera, values="ct")
     refused("usage", "shape", helicarm.drr, volume, (camera.K, camera.R, camera.t))
+    for shape in (5, (5.5, 5), (1, 2, 3)):
+        refused("bad_value", "shape: .* is not", helicarm.drr, volume, camera, shape=shape)
+    refused("bad_value", "camera: the list is empty", helicarm.drr, volume, [])
+    with pytest.raises(TypeError, match=r"drr\(\): an argument has a wrong type; of the options threads=-1"):
+        helicarm.drr(volume, camera, threads=-1)
 
 
 def test_values_that_are_no_hounsfield_units_are_warned_of():
@@ -258,7 +263,24 @@ def test_what_registration_of_arrays_needs_is_named(sequence):  # noqa: F811
     image = views["A"][0]
     small = helicarm.Camera(*views["A"][1], shape=(10, 10))
     refused("bad_size", "the camera is for 10 x 10", helicarm.register, models=models, views={"A": (image, small), "B": views["B"]})
-    refused("bad_value", "range", helicarm.register, models=models, views={"A": (image.pixels, small)}, starts={"body": start()})
+    refused("bad_value", "views: A: range", helicarm.register, models=models, views={"A": (image.pixels, small)}, starts={"body": start()})
+    refused("usage", r"views: A: .* is not \(image, camera\)", helicarm.register, models=models, views={"A": image})
+    refused("unsupported", "views: A: camera", helicarm.register, models=models, views={"A": (image, image)})
+    refused("usage", "starts: ndarray", helicarm.register, models=models, views=views, starts=start())
+    refused("usage", "body: volume: an array has no place", helicarm.register, models={"body": models["body"].array}, views=views)
+    for wrong in (200, (1, 2, 3), ("a", "b")):
+        refused("bad_value", r"body: window_hu: .* is not \(low, high\)", helicarm.register, views=views,
+                models={"body": {"volume": models["body"], "window_hu": wrong}})
+    refused("bad_value", "body: scale_sigma: 'x' is not a number", helicarm.register, views=views,
+            models={"body": {"volume": models["body"], "window_hu": (300, 3000), "scale_sigma": "x"}})
+    for mask, code, match in ((np.full(models["body"].shape, np.nan), "not_finite", "mask: holds values"),
+                              (np.ma.masked_less(models["body"].array, 300), "bad_value", "mask: a masked array"),
+                              (np.full(models["body"].shape, "1"), "unsupported", "mask: its elements are <U1")):
+        refused(code, match, helicarm.register, views=views, models={"body": {"volume": models["body"], "mask": mask}})
+    refused("usage", "body: points: ndarray is not", helicarm.register, views=views,
+            models={"body": {"volume": models["body"], "points": np.zeros((2, 3))}})
+    with pytest.raises(TypeError, match=r"register\(\) got an unexpected keyword argument 'serch_mm'"):
+        helicarm.register(models=models, views=views, serch_mm=5)
 
 
 def test_an_output_folder_that_cannot_be_written_is_refused_before_the_search(sequence, tmp_path):  # noqa: F811
@@ -281,6 +303,9 @@ def test_a_sweep_of_arrays_is_that_of_files():
         assert np.linalg.norm(sweep.sources[frame] - projection(frame)[2]) < 4 * np.sqrt(np.trace(sweep.source_covariances[frame]))
     refused("usage", "both required", helicarm.sweep, images=stack)
     refused("usage", "give the folder", helicarm.sweep)
+    refused("usage", "images: one path: give an array", helicarm.sweep, images="run.dcm", calibrator=calibrator)
+    refused("bad_value", "images: image 1: range", helicarm.sweep, images=stack / 4095, calibrator=calibrator)
+    refused("usage", "calibrator: ndarray is neither a Calibrator", helicarm.sweep, images=stack, calibrator=np.eye(3))
 
 
 def spheres(places, camera, shape):
@@ -347,3 +372,25 @@ def test_markers_are_tracked_in_arrays(tmp_path):
             picks=picks, diameter_mm=3)
     refused("bad_value", '"x" has no pick', helicarm.track, views=views, picks=picks, diameter_mm=3, bodies={"bone": ["x"]})
     refused("bad_value", "diameter_mm", helicarm.track, views=views, picks=picks, diameter_mm=300)
+    for wrong, code, match in ([(1, 2)], "usage", "picks: list is not"), ({"a": [(1, 2)]}, "usage", "picks: a: list is not"), \
+            ({"a": {"A": (np.nan, 3)}}, "not_finite", r"picks: a: A: \(nan, 3\)"), ({"a": {"A": (1, 2, 3)}}, "bad_value", r"picks: a: A: shape \(3,\)"), \
+            ({"a": {"A": np.ma.masked_equal([1, 2], 2)}}, "not_finite", r"picks: a: A: \(1, nan\)"):
+        refused(code, match, helicarm.track, views=views, picks=wrong, diameter_mm=3)
+    refused("bad_value", "corrections: frame '2'", helicarm.track, views=views, picks=picks, diameter_mm=3, corrections={"2": spot})
+    refused("usage", "bodies: list", helicarm.track, views=views, picks=picks, diameter_mm=3, bodies=["bone"])
+    refused("bad_size", "views: A: image 1: pixels", helicarm.track, views={"A": (views["A"][0][0], views["A"][1]), "B": views["B"]}, picks=picks,
+            diameter_mm=3)
+
+
+def test_a_wrong_option_is_named_by_the_function_that_was_called():
+    volume = volume_of_body()
+    for call, match in ((lambda: helicarm.segment(volume, {"b": (0, 0, 0)}, gapmm=1), r"^segment\(\) got an unexpected keyword argument 'gapmm'"),
+                        (lambda: helicarm.segment(volume, labels={"b": 1}), r"^segment\(\): .* wrong type.*labels=\{'b': 1\}"),
+                        (lambda: helicarm.check_tunnels({"volume": volume, "window_hu": (300, 3000)}, {"F": ((0, 0, 0), (9, 0, 0))}, diameter_mm="8"),
+                         r"^check_tunnels\(\): an argument has a wrong type"),
+                        (lambda: helicarm.sweep("folder", treads=2), r"^sweep\(\) got an unexpected keyword argument 'treads'")):
+        with pytest.raises(TypeError, match=match):
+            call()
+    refused("usage", "seeds: list is not", helicarm.segment, volume, [(1, 2, 3)])
+    refused("usage", "tunnels: list is not", helicarm.check_tunnels, volume, [((0, 0, 0), (9, 0, 0))], diameter_mm=8)
+    refused("bad_value", "seeds: b: 1 of 3 elements are masked", helicarm.segment, volume, {"b": np.ma.masked_equal([1.0, 2, 3], 2)})
