@@ -226,6 +226,41 @@ void learn_shape(SequenceData& work, const BodyPlan& plan, Estimated& at, BodySe
   }
 }
 
+struct OddMarker {
+  std::size_t marker;  ///< of the body
+  double mm;
+};
+
+/// The first frame's discs lie at their picks, so a body in which one is far from its place was learnt from
+/// other markers' discs.
+std::optional<OddMarker> contradiction_of_first(const SequenceData& work, const BodyPlan& plan,
+                                                const Estimated& at, const BodySequence& body) {
+  constexpr double least_mm = 3, beside_pick_px = 12;
+  if (!plan.geometry.empty() || !work.the_case.points.empty()) return std::nullopt;
+  std::vector<Eigen::Vector3d> in_body, places;
+  std::vector<std::size_t> indices;
+  for (std::size_t i = 0; i < plan.markers.size(); ++i)
+    if (const auto& point = work.points[0][plan.markers[i]];
+        point && at.counts[i] && at.shape.in_body[i] && !body.markers[i].moved_at) {
+      in_body.push_back(*at.shape.in_body[i]);
+      places.push_back(point->place);
+      indices.push_back(i);
+    }
+  if (places.size() < 3) return std::nullopt;
+  const RigidTransform pose = at.poses[0] ? at.poses[0]->pose : geometry::absolute_pose(in_body, places);
+  double mm_per_px = 0;
+  for (const geometry::View& camera : work.cameras)
+    mm_per_px = std::max(mm_per_px, camera.depth(geometry::mean_of(places)) / std::abs(camera.intrinsics.fy));
+  OddMarker worst{0, std::max(least_mm, beside_pick_px * mm_per_px)};
+  bool is_any = false;
+  for (std::size_t i = 0; i < places.size(); ++i)
+    if (const double off = (pose * in_body[i] - places[i]).norm(); off > worst.mm) {
+      worst = {indices[i], off};
+      is_any = true;
+    }
+  return is_any ? std::optional(worst) : std::nullopt;
+}
+
 }  // namespace
 
 void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
@@ -256,6 +291,14 @@ void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, Body
   }
   body.condition_per_m = track::condition_per_m(points);
   pose_frames(work, plan, at, body);
+  if (const auto odd = contradiction_of_first(work, plan, at, body)) {
+    refuse(fmt::format(
+        "frame {}: \"{}\" is {:.1f} mm from where the later frames place it in the body, although "
+        "its pick shows it: in later frames discs of other markers are followed, or it belongs to another "
+        "body; look where, and pick the markers there too",
+        sequence.frames.front(), work.the_case.markers[plan.markers[odd->marker]], odd->mm));
+    return;
+  }
   std::vector<double> turns;
   for (const auto& pose : at.poses)
     if (pose)
@@ -264,7 +307,7 @@ void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, Body
                         .eigenvalues()[2]) *
           180 / EIGEN_PI);
   if (turns.empty()) {
-    refuse("in no frame are three of its markers seen");
+    refuse("in no frame do three of its markers agree with one shape");
     return;
   }
   const double turn = median(turns);

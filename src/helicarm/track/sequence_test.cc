@@ -417,6 +417,23 @@ TEST(Sequence, DiscThatIsNotTheMarkersIsNotItsPlace) {
   EXPECT_EQ(sequence.bodies[0].frames[24].decision, PoseDecision::warn);
 }
 
+TEST(Sequence, BodyThatContradictsTheFirstFramesPicksHasNoPose) {
+  const TrackCase the_case = two_bodies();
+  const Shift to_another = [](std::size_t marker, int frame) {
+    return marker == 3 && frame > 1 ? Eigen::Vector3d(8, -6, 9) : Eigen::Vector3d(0, 0, 0);
+  };
+  const auto sights = drawn(the_case, to_another);
+  const Sequence sequence = estimate_sequence(the_case, sights);
+  const Warning* warning = warning_of(sequence, Reason::body_ill_conditioned);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(warning->message.find("frame 1: \"j4\" is 13."), std::string::npos) << warning->message;
+  EXPECT_EQ(sequence.bodies[0].smoothed[20].decision, PoseDecision::refuse);
+  EXPECT_EQ(sequence.bodies[1].smoothed[20].decision, PoseDecision::accept);
+  TrackCase of_file = the_case;  // whose first row is no surer than others
+  of_file.points.assign(sights.size(), {});
+  EXPECT_FALSE(warning_of(estimate_sequence(of_file, sights), Reason::body_ill_conditioned));
+}
+
 TEST(Sequence, LooseMarkerIsNamed) {
   const TrackCase the_case = two_bodies();
   const Shift loose = [](std::size_t marker, int frame) {
