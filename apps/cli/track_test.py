@@ -37,8 +37,12 @@ def project(axes, point):
     return FOCUS * x / z + (SIZE - 1) / 2, FOCUS * y / z + (SIZE - 1) / 2
 
 
-def image(axes, frame, bright, hidden=()):
+def image(axes, frame, bright, hidden=(), gaps=False):
     grey = [[120.0] * SIZE for _ in range(SIZE)]
+    for row in range(SIZE if gaps else 0):  # bright, as between bones
+        for column in range(SIZE):
+            if row % 8 < 3 and column % 8 < 3 and abs(row - SIZE / 2) > 56:
+                grey[row][column] += 50
     for body, markers in BODIES.items():
         for name, xyz in markers.items():
             if name in hidden:
@@ -62,7 +66,7 @@ def image(axes, frame, bright, hidden=()):
             chunk(b"IDAT", zlib.compress(b"".join(rows))) + chunk(b"IEND", b""))
 
 
-def make_case(folder, bright=False, hidden=lambda view, frame: ()):
+def make_case(folder, bright=False, hidden=lambda view, frame: (), gaps=False):
     folder.mkdir()
     views, picks = [], []
     for name, axes in CAMERAS.items():
@@ -73,7 +77,7 @@ def make_case(folder, bright=False, hidden=lambda view, frame: ()):
         offset = 100 if name == "B" else 0
         for frame in range(1, FRAMES + 1):
             (folder / f"{name}_{frame + offset:04d}.png").write_bytes(
-                image(axes, frame, bright, hidden(name, frame)))
+                image(axes, frame, bright, hidden(name, frame), gaps))
         views.append({"name": name, "image": name + "_{frame:04d}.png", "camera": f"{name}.json",
                       "frame_offset": offset})
         for body, markers in BODIES.items():
@@ -587,6 +591,19 @@ class Track(unittest.TestCase):
         done = self.track(self.root / "bright", "bright-out")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.check_places(self.root / "bright-out")
+
+    def test_bright_gaps_do_not_invert_dark_markers(self):
+        make_case(self.root / "gaps", gaps=True)
+        done = self.track(self.root / "gaps", "gaps-out")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("tag_disagrees", done.stderr)
+        self.check_places(self.root / "gaps-out")
+        case = json.loads((self.root / "gaps/case.json").read_text())
+        del case["picks"], case["bodies"]
+        (self.root / "gaps/case.json").write_text(json.dumps(case))
+        found = self.track(self.root / "gaps", "gaps-found", f"1-{FRAMES}", "--json")
+        self.assertEqual(found.returncode, 0, found.stderr)
+        self.assertGreaterEqual(len(json.loads(found.stdout)["markers"]), 6)
 
     def test_exchanged_picks_are_refused_by_name(self):
         def exchange(case, folder):

@@ -45,12 +45,14 @@ struct Match {
 
 class FirstFrames {
  public:
-  FirstFrames(const TrackCase& the_case, const FrameRange& frames)
+  FirstFrames(const TrackCase& the_case, const FrameRange& frames, bool as_stored = false)
       : given_(the_case),
         images_(value_or_throw(SequenceImages::open(
             std::vector<SequenceView>(the_case.views.begin(), the_case.views.end()), frames))),
-        frames_(frames),
-        first_(value_or_throw(images_.at(frames.first))) {
+        frames_(frames) {
+    if (as_stored)
+      for (std::size_t k = 0; k < the_case.views.size(); ++k) images_.undo_inversion(k);
+    first_ = value_or_throw(images_.at(frames.first));
     check_views_differ(names_of_views(the_case), frames.first, RepeatedImages().among(frames.first, first_));
     std::vector<Sight> middles;
     for (std::size_t k = 0; k < 2; ++k) {
@@ -73,6 +75,11 @@ class FirstFrames {
   }
 
   const Images& first() const { return first_; }
+  bool is_any_inverted() const {
+    for (std::size_t k = 0; k < given_.views.size(); ++k)
+      if (images_.is_inverted(k)) return true;
+    return false;
+  }
   int frame_count() const { return std::min(most_frames, frames_.count()); }
   Images frame(int index) const { return value_or_throw(images_.at(frames_.first + index * frames_.step)); }
 
@@ -258,6 +265,10 @@ Found found_markers(const FirstFrames& frames, std::size_t a, const std::vector<
   return found;
 }
 
+std::size_t certain_count(const FirstFrames& frames) {
+  return found_markers(frames, 0, frames.all_discs(0), 1, frames.all_discs(1)).certain.size();
+}
+
 void warn(TrackCase& the_case, Reason reason, std::size_t view, const Eigen::Vector2d& at,
           std::string message) {
   the_case.warnings.push_back(
@@ -358,10 +369,17 @@ void complete_picks(TrackCase& the_case, const FrameRange& frames) {
       });
   if (!is_open || the_case.views.size() < 2) return;
   const FirstFrames first(the_case, frames);
-  if (the_case.picks.empty())
-    find_all(the_case, first, frames.first);
-  else
+  if (!the_case.picks.empty()) {
     find_partners(the_case, first, frames.first);
+    return;
+  }
+  // Gaps between bones may look like bright metal: the grey values in which more markers are found count.
+  if (first.is_any_inverted())
+    if (const FirstFrames stored(the_case, frames, true); certain_count(stored) > certain_count(first)) {
+      find_all(the_case, stored, frames.first);
+      return;
+    }
+  find_all(the_case, first, frames.first);
 }
 
 }  // namespace helicarm::track

@@ -121,6 +121,14 @@ void SequenceImages::decide_polarity(const case_registration::FrameRange& frames
   }
 }
 
+void SequenceImages::undo_inversion(std::size_t view) {
+  inverted_[view] = false;
+  std::erase_if(warnings_, [&](const Warning& warning) {
+    return warning.view == views_[view].images.name &&
+           warning.message.find(xray::inverted_note) != std::string::npos;
+  });
+}
+
 Expected<xray::XrayImage> SequenceImages::image(std::size_t view, int frame) const {
   const SequenceView& source = views_[view];
   return guarded([&] {

@@ -34,6 +34,11 @@ class SequenceImages {
   /// Thread-safe.
   Expected<std::vector<xray::XrayImage>> at(int frame) const;
 
+  /// Whether the view's grey values are inverted because metal looks bright.
+  bool is_inverted(std::size_t view) const { return inverted_[view]; }
+  /// The grey values as stored, without a warning: the view's markers show that its metal is dark.
+  void undo_inversion(std::size_t view);
+
   /// tag_disagrees for each view that is inverted, lossy_image for one whose images were compressed with
   /// loss.
   const std::vector<Warning>& warnings() const { return warnings_; }

@@ -135,6 +135,17 @@ Expected<SequenceImages> open_images(const TrackCase& the_case, const case_regis
                               frames);
 }
 
+/// What looks like bright metal, as gaps between bones do, counts for less than the markers themselves.
+bool undo_wrong_inversions(SequenceImages& images, const Tracker& tracker, std::size_t views) {
+  bool is_any = false;
+  for (std::size_t view = 0; view < views; ++view)
+    if (images.is_inverted(view) && tracker.is_bright(view)) {
+      images.undo_inversion(view);
+      is_any = true;
+    }
+  return is_any;
+}
+
 /// The frames that an interrupted run left in the folder.
 std::vector<FrameSights> kept_frames(const fs::path& folder, const TrackCase& the_case,
                                      const std::string& identity, const std::vector<int>& numbers,
@@ -189,12 +200,21 @@ Expected<Sequence> run_track(const TrackCase& the_case, const case_registration:
     const auto begun = std::chrono::steady_clock::now();
     const std::vector<int> numbers = frames.numbers();
     if (!the_case.points.empty()) return placed_sequence(the_case, numbers, options, on_frame);
-    const SequenceImages images = value_or_throw(open_images(the_case, frames));
+    SequenceImages images = value_or_throw(open_images(the_case, frames));
     const std::string identity = identity_of(the_case, frames);
     std::vector<FrameSights> kept = options.kept;
     drop_corrected(kept, options.kept_corrections, the_case, options);
     if (options.out && options.resume) kept = kept_frames(*options.out, the_case, identity, numbers, options);
-    const auto first = value_or_throw(images.at(numbers.front()));
+    auto first = value_or_throw(images.at(numbers.front()));
+    RepeatedImages repeated;
+    check_views_differ(names_of_views(the_case), numbers.front(), repeated.among(numbers.front(), first));
+    Tracker tracker = value_or_throw(Tracker::begin(the_case, numbers.front(), first));
+    if (undo_wrong_inversions(images, tracker, the_case.views.size())) {
+      first = value_or_throw(images.at(numbers.front()));
+      repeated = {};
+      repeated.among(numbers.front(), first);
+      tracker = value_or_throw(Tracker::begin(the_case, numbers.front(), first));
+    }
     std::vector<ImageKeys> keys;
     const bool is_resumed = options.out && options.resume && !kept.empty();
     if (is_resumed) keys = kept_keys(*options.out, the_case, numbers);
@@ -209,9 +229,6 @@ Expected<Sequence> run_track(const TrackCase& the_case, const case_registration:
     };
     ImageKeys now_keys = keys_of(first);
     keep_unchanged(0, now_keys);
-    RepeatedImages repeated;
-    check_views_differ(names_of_views(the_case), numbers.front(), repeated.among(numbers.front(), first));
-    Tracker tracker = value_or_throw(Tracker::begin(the_case, numbers.front(), first));
     std::optional<GrowingTables> tables;
     if (options.out) {
       std::error_code ignored;

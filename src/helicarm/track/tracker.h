@@ -36,6 +36,8 @@ class Tracker {
                                  const std::vector<xray::XrayImage>& images);
 
   const FrameSights& first() const { return first_; }
+  /// Whether the view's markers are brighter than what is around them.
+  bool is_bright(std::size_t view) const { return appearance_[view].polarity < 0; }
   const std::vector<Warning>& warnings() const { return warnings_; }
 
   /// The markers in the images of the frame after the last one absorbed; those that the case corrects there
