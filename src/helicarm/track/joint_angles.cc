@@ -115,11 +115,15 @@ void check_body_axes(const std::vector<BodyAxes>& axes, const TrackCase& the_cas
   constexpr double tolerance = 1e-3;
   for (const BodyAxes& of : axes) {
     const double off = (of.axes.transpose() * of.axes - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-    if (!(off < tolerance) || of.axes.determinant() < 0)
+    if (!(off < tolerance))
       throw BadInput(Reason::bad_value,
-                     fmt::format("{}: the axes of \"{}\" are no right-handed, perpendicular unit vectors: "
-                                 "they are off by {:.2g}, limit {:g}",
+                     fmt::format("{}: the axes of \"{}\" are no perpendicular unit vectors: they are off by "
+                                 "{:.2g}, limit {:g}",
                                  origin, the_case.bodies[of.body].name, off, tolerance));
+    if (of.axes.determinant() < 0)
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{}: the axes of \"{}\" are left-handed: z is the cross product of x and y",
+                                 origin, the_case.bodies[of.body].name));
   }
   if (axes.size() < 2)
     throw BadInput(Reason::bad_value,

@@ -160,8 +160,11 @@ TEST_F(BodyAxesFile, WrongAxesAreNamed) {
   EXPECT_EQ(message(tibia + "femur,x,1,0,0\n"), "axes.csv: axes of \"femur\" are missing: x, y and z");
   EXPECT_EQ(message("patella,x,1,0,0\n"), "axes.csv: \"patella\" is no body of the case");
   EXPECT_EQ(message(tibia + "femur,w,1,0,0\n"), "axes.csv: axis \"w\" is none of x, y, z, origin");
-  EXPECT_NE(message(tibia + "femur,x,1,0,0\nfemur,y,0,1,0\nfemur,z,0,0,-1\n").find("no right-handed"),
-            std::string::npos);
+  EXPECT_EQ(message(tibia + "femur,x,1,0,0\nfemur,y,0,1,0\nfemur,z,0,0,-1\n"),
+            "axes.csv: the axes of \"femur\" are left-handed: z is the cross product of x and y");
+  EXPECT_EQ(
+      message(tibia + "femur,x,1,0,0\nfemur,y,0.1,1,0\nfemur,z,0,0,1\n"),
+      "axes.csv: the axes of \"femur\" are no perpendicular unit vectors: they are off by 0.1, limit 0.001");
 }
 
 TEST_F(BodyAxesFile, MarkupsOfSlicerGiveAxesAndOrigins) {
