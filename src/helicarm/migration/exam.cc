@@ -154,6 +154,23 @@ Expected<Exam> read_exam(const fs::path& path, std::optional<int> frame) {
   });
 }
 
+std::vector<Marker> markers_of(const Exam& exam, const Segment& segment) {
+  std::vector<Marker> markers;
+  for (const std::string& name : segment.markers) {
+    const Marker* marker = exam.find(name);
+    if (!marker)
+      throw BadInput(Reason::bad_value, fmt::format("segment \"{}\": {} has no marker \"{}\" with a place",
+                                                    segment.name, exam.name, name));
+    markers.push_back(*marker);
+  }
+  return markers;
+}
+
+std::vector<Marker> candidates_for(const Exam& exam, const std::string& segment) {
+  const auto named = std::ranges::find(exam.segments, segment, &Segment::name);
+  return named == exam.segments.end() ? exam.markers : markers_of(exam, *named);
+}
+
 Expected<Segment> segment_from(const std::string& text) {
   const std::size_t equals = text.find('=');
   Segment segment{text.substr(0, equals), {}};

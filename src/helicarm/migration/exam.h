@@ -36,6 +36,12 @@ struct Exam {
   const Marker* find(const std::string& marker) const;
 };
 
+/// The segment's; bad_value (thrown) for one without a place.
+std::vector<Marker> markers_of(const Exam& exam, const Segment& segment);
+
+/// Those of the segment of this name, where the examination names segments, or all.
+std::vector<Marker> candidates_for(const Exam& exam, const std::string& segment);
+
 /// Reads an examination:
 /// - CSV `name,x_mm,y_mm,z_mm` and optional `sx_mm,sy_mm,sz_mm` (standard deviations), `ray_gap_mm`,
 ///   `segment`;

@@ -9,6 +9,9 @@
 
 namespace helicarm::migration {
 
+/// Of a marker from its place in the segment: farther ones are not it.
+inline constexpr double largest_shift_mm = 1.5;
+
 /// Which marker of the second examination is which of a segment of the first.
 struct Match {
   std::vector<std::size_t> first;   ///< indices of the segment's markers

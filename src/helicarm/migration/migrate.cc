@@ -10,6 +10,7 @@
 #include "helicarm/core/statistics.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/migration/match.h"
+#include "helicarm/migration/mismatch.h"
 #include "helicarm/track/body_pose.h"
 #include "helicarm/track/body_series.h"
 
@@ -17,28 +18,10 @@ namespace helicarm::migration {
 namespace {
 
 constexpr double degrees = 180 / EIGEN_PI;
-constexpr double reach_mm = 1.5;  // of a marker from its place in the segment: farther ones are not it
 constexpr double line_mm =
     0.5;  // of markers about their common line: below, the turn about it is not determined
-constexpr double same_place_mm = 1e-3;  // a tenth of what radiostereometry resolves, above a file's rounding
-
-std::vector<Marker> markers_of(const Exam& exam, const Segment& segment) {
-  std::vector<Marker> markers;
-  for (const std::string& name : segment.markers) {
-    const Marker* marker = exam.find(name);
-    if (!marker)
-      throw BadInput(Reason::bad_value, fmt::format("segment \"{}\": {} has no marker \"{}\" with a place",
-                                                    segment.name, exam.name, name));
-    markers.push_back(*marker);
-  }
-  return markers;
-}
-
-/// Those of the segment of this name, where the second examination names segments too, or all.
-std::vector<Marker> candidates_for(const Exam& second, const std::string& segment) {
-  const auto named = std::ranges::find(second.segments, segment, &Segment::name);
-  return named == second.segments.end() ? second.markers : markers_of(second, *named);
-}
+constexpr double small_segment_mm = 10;  // radiostereometry spreads a segment's markers over more
+constexpr double same_place_mm = 1e-3;   // a tenth of what radiostereometry resolves, above a file's rounding
 
 std::vector<Segment> segments_of(const Exam& first, const MigrationOptions& options) {
   std::vector<Segment> segments = options.segments.empty() ? first.segments : options.segments;
@@ -133,21 +116,28 @@ void require_spread(const std::string& name, const std::vector<Marker>& markers)
     throw BadInput(
         {Reason::body_ill_conditioned,
          fmt::format("segment \"{}\": its markers are within {:.2f} mm of one line, limit {:g} mm: "
-                     "its rotation about the line is not determined",
-                     name, off_line, line_mm),
+                     "its rotation about the line is not determined{}",
+                     name, off_line, line_mm, off_line < 0.1 * line_mm ? "; are its coordinates in mm?" : ""),
          {},
          {{"off_line_mm", off_line}}});
 }
 
-Matched matched_segment(const Exam& first, const Exam& second, const Segment& segment, Matching matching,
-                        std::vector<Warning>& warnings) {
+double farthest_mm(const std::vector<Eigen::Vector3d>& places) {
+  double most = 0;
+  for (const Eigen::Vector3d& a : places)
+    for (const Eigen::Vector3d& b : places) most = std::max(most, (a - b).norm());
+  return most;
+}
+
+Matched matched_as_given(const Exam& first, const Exam& second, const Segment& segment, Matching matching,
+                         std::vector<Warning>& warnings) {
   const std::vector<Marker> of_first = markers_of(first, segment),
                             of_second = candidates_for(second, segment.name);
   require_spread(segment.name, of_first);
   const std::string what = fmt::format("segment \"{}\"", segment.name);
-  const Match match =
-      value_or_throw(matching == Matching::name ? match_by_name(what, of_first, of_second)
-                                                : match_by_geometry(what, of_first, of_second, reach_mm));
+  const Match match = value_or_throw(matching == Matching::name
+                                         ? match_by_name(what, of_first, of_second)
+                                         : match_by_geometry(what, of_first, of_second, largest_shift_mm));
   Matched matched;
   matched.segment.name = segment.name;
   for (std::size_t n = 0; n < match.first.size(); ++n) {
@@ -179,11 +169,31 @@ Matched matched_segment(const Exam& first, const Exam& second, const Segment& se
   if (matched.segment.condition_per_m > condition_limit_per_m)
     warnings.push_back({Reason::body_ill_conditioned,
                         fmt::format("{}: condition number {:.0f} per metre, limit {:g}: its markers are too "
-                                    "near one line or each other for its rotations",
-                                    what, matched.segment.condition_per_m, condition_limit_per_m),
+                                    "near one line or each other for its rotations{}",
+                                    what, matched.segment.condition_per_m, condition_limit_per_m,
+                                    farthest_mm(matched.segment.places) < small_segment_mm
+                                        ? "; all lie within 10 mm: are the coordinates in mm?"
+                                        : ""),
                         {},
                         {{"condition_per_m", matched.segment.condition_per_m}}});
   return matched;
+}
+
+Matched matched_segment(const Exam& first, const Exam& second, const Segment& segment, Matching matching,
+                        std::vector<Warning>& warnings) {
+  try {
+    return matched_as_given(first, second, segment, matching, warnings);
+  } catch (const BadInput& bad) {
+    Failure failure = bad.failure();
+    const bool is_open = failure.reason == Reason::too_few_fiducials ||
+                         failure.reason == Reason::ambiguous_labels ||
+                         failure.reason == Reason::residual_too_large;
+    const std::string cause =
+        is_open ? mismatch_cause(markers_of(first, segment), second, segment.name) : std::string();
+    if (cause.empty()) throw;
+    failure.message += "; " + cause;
+    throw BadInput(failure);
+  }
 }
 
 /// No marker of the second examination serves two segments.
@@ -213,6 +223,37 @@ void require_two_examinations(const Exam& first, const Exam& second, const std::
                               first.name, second.name, same_place_mm),
                   {},
                   {{"largest_mm", largest_mm}, {"limit", same_place_mm}}});
+}
+
+/// Both examinations are in mm: segments that are larger in one by the same share show its calibration.
+std::optional<Warning> scale_between(const std::vector<Matched>& all, const std::string& second) {
+  constexpr double least = 0.002, sigmas = 4;
+  double along = 0, squares = 0, seconds = 0, freedom = -1;
+  for (const Matched& each : all) {
+    Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = Eigen::Vector3d::Zero();
+    for (std::size_t n = 0; n < each.first.size(); ++n)
+      from += each.first[n].place / double(each.first.size()),
+          to += each.second[n].place / double(each.first.size());
+    for (std::size_t n = 0; n < each.first.size(); ++n) {
+      const Eigen::Vector3d a = each.segment.fit.second_from_first.rotation * (each.first[n].place - from);
+      const Eigen::Vector3d b = each.second[n].place - to;
+      along += a.dot(b);
+      squares += a.squaredNorm();
+      seconds += b.squaredNorm();
+    }
+    freedom += 3.0 * double(each.first.size()) - 6;
+  }
+  const double scale = along / squares;
+  const double sigma = std::sqrt(std::max(0.0, seconds - scale * along) / std::max(1.0, freedom) / squares);
+  if (freedom < 2 || std::abs(scale - 1) < std::max(least, sigmas * sigma)) return std::nullopt;
+  return Warning{
+      Reason::scale_disagrees,
+      fmt::format("the segments are {:.2f} % {} in {} than in the first examination (standard "
+                  "deviation {:.2f} %): the calibration of one has another scale, which displaces "
+                  "what lies apart; check the cage's coordinates",
+                  100 * std::abs(scale - 1), scale > 1 ? "larger" : "smaller", second, 100 * sigma),
+      {},
+      {{"scale", scale}, {"sigma", sigma}}};
 }
 
 /// The errors that the residuals show, where the examinations state none, or larger ones.
@@ -325,6 +366,7 @@ Expected<Migration> migrate(const Exam& first, const Exam& second, const Migrati
       all.push_back(matched_segment(first, second, segment, options.matching, migration.warnings));
     require_own_markers(all);
     require_two_examinations(first, second, all);
+    if (auto warning = scale_between(all, second.name)) migration.warnings.push_back(*std::move(warning));
     take_errors(migration, all);
     for (std::size_t i = 1; i < all.size(); ++i)
       migration.bodies.push_back(migration_of(all, i, options.axes));

@@ -188,6 +188,47 @@ TEST(Migration, ResidualsBeyondTheStatedErrorsWidenThem) {
   EXPECT_NEAR(std::sqrt(widened->bodies[0].covariance(3, 3) / stated->bodies[0].covariance(3, 3)), 1, 0.4);
 }
 
+Exam stretched(Exam exam, const Eigen::Vector3d& by) {
+  for (Marker& marker : exam.markers) marker.place = by.cwiseProduct(marker.place);
+  return exam;
+}
+
+TEST(Migration, AnExaminationThatCannotCorrespondNamesTheCause) {
+  const Noise noise{0.02, 3, false};
+  const Exam first = exam_of("a", {}, {}, noise);
+  Exam second = exam_of("b", elsewhere, implant_motion({1, 0, 0}, {0.4, 0, 0}), {0.02, 4, false});
+  const auto message = [](const Exam& a, const Exam& b, Matching matching = Matching::geometry) {
+    const auto made = migrate(a, b, {.matching = matching});
+    return made ? "" : made.error().message;
+  };
+  const Eigen::Vector3d all(1, 1, 1);
+  EXPECT_NE(message(first, stretched(second, 0.1 * all)).find("if b is in cm"), std::string::npos);
+  EXPECT_NE(message(first, stretched(second, 0.001 * all)).find("if b is in m:"), std::string::npos);
+  EXPECT_NE(message(stretched(first, 0.1 * all), second).find("if the first examination is in cm"),
+            std::string::npos);
+  EXPECT_NE(message(first, stretched(second, {1, -1, 1})).find("the mirror image of b"), std::string::npos);
+  EXPECT_NE(message(stretched(first, 0.001 * all), stretched(second, 0.001 * all)).find("coordinates in mm?"),
+            std::string::npos);
+  const auto in_cm = migrate(stretched(first, 0.1 * all), stretched(second, 0.1 * all), {});
+  ASSERT_TRUE(in_cm) << in_cm.error().message;
+  EXPECT_NE(in_cm->warnings.at(0).message.find("coordinates in mm?"), std::string::npos);
+  std::swap(second.segments[0].name, second.segments[1].name);
+  EXPECT_NE(message(first, second).find("the segments' names are exchanged"), std::string::npos);
+}
+
+TEST(Migration, AnotherScaleOfOneExaminationIsWarnedOf) {
+  const Exam first = exam_of("a", {}, {}, {0.02, 5, false});
+  const Exam second = exam_of("b", elsewhere, implant_motion({1, 0, 0}, {0.4, 0, 0}), {0.02, 6, false});
+  const auto usual = migrate(first, second, {});
+  ASSERT_TRUE(usual) << usual.error().message;
+  EXPECT_TRUE(usual->warnings.empty());
+  const auto made = migrate(first, stretched(second, {1.008, 1.008, 1.008}), {});
+  ASSERT_TRUE(made) << made.error().message;
+  ASSERT_EQ(made->warnings.size(), 1u);
+  EXPECT_EQ(made->warnings[0].reason, Reason::scale_disagrees);
+  EXPECT_NEAR(made->warnings[0].figures.at("scale"), 1.008, 0.003);
+}
+
 TEST(Migration, TheSameExaminationTwiceIsRefused) {
   const Exam first = exam_of("a", {}, {}, {}), again = exam_of("copy", {}, {}, {});
   const auto refused = migrate(first, again, {});
