@@ -8,6 +8,7 @@
 #include "helicarm/image/grey_image.h"
 #include "helicarm/xray/dicom_acquisition.h"
 #include "helicarm/xray/image_in_memory.h"
+#include "helicarm/xray/read_dicom.h"
 #include "helicarm/xray/read_xray_image.h"
 #include "module.h"
 
@@ -16,7 +17,8 @@ namespace {
 
 using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 
-/// What the array's type can hold; of floating-point pixels the caller must say it.
+/// What the array's type can hold; of floating-point pixels the caller must say it. Of 16 bits a detector
+/// uses fewer, as the pixels show (`highest_grey`), like those of a file.
 std::pair<float, float> range_of(const py::array& pixels,
                                  const std::optional<std::pair<float, float>>& stated) {
   if (stated) {
@@ -63,6 +65,7 @@ xray::XrayImage image_from(const py::object& given, const py::object& pixel_mm,
     checked(values.data()[i], {image.lowest, image.highest}, "pixels");
     image.pixels.pixels()[i] = values.data()[i];
   }
+  if (!range && pixels.itemsize() == 2) image.highest = xray::highest_grey(image.pixels);
   image.acquisition.pixel_mm = spacing_of(pixel_mm);
   image.acquisition.source_detector_mm = checked(
       source_detector_mm, {xray::min_source_detector_mm, xray::max_source_detector_mm}, "source_detector_mm");
@@ -146,7 +149,8 @@ XrayImage(pixels, *, pixel_mm, source_detector_mm, range=None, name="")
   pixels: (height, width), real numbers without a mask; converted to float32 by one copy
   pixel_mm: detector pixel spacing, 0.01 to 2 mm: a number, (column, row), or None where unknown
   source_detector_mm: 200 to 3000 mm, or None where unknown
-  range: least and greatest possible grey value, which no pixel exceeds; of uint8 and uint16 pixels that of the type
+  range: least and greatest possible grey value, which no pixel exceeds; of uint8 pixels 0 to 255, of uint16 that of
+    the bits that the pixels use, as of a file's
 Raises InputError: bad_size, bad_value, not_finite.)")
       .def(py::init(&image_from), py::arg("pixels"), py::kw_only(), py::arg("pixel_mm"),
            py::arg("source_detector_mm"), py::arg("range") = py::none(), py::arg("name") = "")

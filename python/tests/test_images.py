@@ -46,6 +46,16 @@ def test_marks_agree_with_opencv():
         assert np.linalg.norm(found - centroid, axis=1).min() < 0.3
 
 
+@pytest.mark.parametrize("scale", [1, 4, 16, 257])
+def test_sixteen_bit_pixels_have_the_range_of_their_file(tmp_path, scale):
+    pixels = drawn(CENTRES).astype(np.uint16) * scale
+    cv2.imwrite(str(tmp_path / "image.png"), pixels)
+    images = [image_of(pixels), helicarm.read_image(tmp_path / "image.png")]
+    assert images[0].range == images[1].range
+    found = [helicarm.detect(image, kind="balls")["uv"] for image in images]
+    assert np.array_equal(*found) and len(found[0]) == len(CENTRES)
+
+
 def test_pixels_are_shared_and_read_only():
     pixels = drawn(CENTRES)
     image = image_of(pixels)
