@@ -225,15 +225,18 @@ void require_two_examinations(const Exam& first, const Exam& second, const std::
                   {{"largest_mm", largest_mm}, {"limit", same_place_mm}}});
 }
 
+Eigen::Vector3d middle_of(const std::vector<Marker>& markers) {
+  std::vector<Eigen::Vector3d> places;
+  for (const Marker& marker : markers) places.push_back(marker.place);
+  return geometry::mean_of(places);
+}
+
 /// Both examinations are in mm: segments that are larger in one by the same share show its calibration.
 std::optional<Warning> scale_between(const std::vector<Matched>& all, const std::string& second) {
   constexpr double least = 0.002, sigmas = 4;
   double along = 0, squares = 0, seconds = 0, freedom = -1;
   for (const Matched& each : all) {
-    Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = Eigen::Vector3d::Zero();
-    for (std::size_t n = 0; n < each.first.size(); ++n)
-      from += each.first[n].place / double(each.first.size()),
-          to += each.second[n].place / double(each.first.size());
+    const Eigen::Vector3d from = middle_of(each.first), to = middle_of(each.second);
     for (std::size_t n = 0; n < each.first.size(); ++n) {
       const Eigen::Vector3d a = each.segment.fit.second_from_first.rotation * (each.first[n].place - from);
       const Eigen::Vector3d b = each.second[n].place - to;

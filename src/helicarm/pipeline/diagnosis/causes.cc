@@ -159,8 +159,7 @@ void add_distance(Failure& failure, double file_mm, double fitting_mm, std::opti
 void add_diameters(Failure& failure, double times) {
   failure.message += fmt::format(
       ". Balls {:.2g} times as large as in the calibrator's file fit: its diameters are wrong (radii in "
-      "their "
-      "place?), or the case names another calibrator than the one in the image",
+      "their place?), or the case names another calibrator than the one in the image",
       times);
   failure.figures["fitting_diameters"] = times;
 }
