@@ -42,8 +42,8 @@ Expected<FrameEstimate> estimate_frame(const Frame& frame, const xray::ImageFile
 /// The opened file that holds the frame; null for a file of its own.
 const xray::ImageFile* file_of(const Frame& frame, const SweepCase& the_case);
 
-/// The refusal of an image with its cause, if another pixel size, source distance or shape of the pixels
-/// explains it (`pipeline::with_cause`).
+/// The refusal of an image with its cause, if another pixel size, source distance, shape of the pixels or
+/// diameter of the balls explains it (`pipeline::with_cause`).
 Failure with_cause(Failure failure, const Frame& frame, const SweepCase& the_case, unsigned threads);
 
 /// The frame's image with rectified pixels, as its camera has them. Fails as `estimate_frame`, or with why it
