@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Registers a modelled knee's bones without a start, their volumes turned at random, and wrong ones.
+"""Registers a modelled knee's bones, or a patient's head, without a start, their volumes turned at random, and wrong ones.
 
   tools/evaluation/registration_anywhere.py --cases 20 --rows anywhere.jsonl
+  tools/evaluation/registration_anywhere.py --head --cases 20 --rows head.jsonl
 
-Knees and images are those of tools/evaluation/registration_protocol.py. Each case's volume and mask are turned by a rotation
-that is uniform over all of them, so that any orientation occurs. Right kinds: femur, tibia. Wrong ones: `mirrored` (femur), `mirrored_tibia`,
-`patient` (another knee's femur), `patient_tibia`. Error: rms over the corners of a box of 40 mm about the bone's end.
-False accept: not refused, and the error over 2 mm or the kind wrong. Exit code 1 if there is one. --rows keeps what is done; the
-same command goes on after an interruption. Needs NumPy."""
+Knees, head and images are those of tools/evaluation/registration_protocol.py. Each case's volume and mask are turned by a rotation
+that is uniform over all of them, so that any orientation occurs. Right kinds: femur, tibia, head. Wrong ones: `mirrored` (femur),
+`mirrored_tibia`, `mirrored_head`, `patient` (the femur of one of twelve other knees), `patient_tibia`, `absent_femur` (images of the same knee
+without its femur: the other bone is all there is), `absent_tibia`. Error: rms over the corners of a box of 40 mm about the bone's
+end, of the head over points of the skull. False accept: not refused, and the error over 2 mm or the kind wrong. Exit code 1 if there is
+one. --rows keeps what is done; the same command goes on after an interruption. Needs NumPy."""
 import argparse
 import json
 import math
@@ -19,12 +21,28 @@ import tempfile
 
 import numpy as np
 
+import bone_ct
 import registration_protocol as protocol
 
 RIGHT = ("femur", "tibia")
-WRONG = ("mirrored", "mirrored_tibia", "patient", "patient_tibia")
+WRONG = ("mirrored", "mirrored_tibia", "patient", "patient_tibia", "absent_femur", "absent_tibia")
+OF_HEAD = ("head", "mirrored_head")
+KINDS = RIGHT + WRONG + OF_HEAD
 MARKS = "<!-- registration anywhere -->", "<!-- end of the registration anywhere -->"
+HEAD_MARKS = "<!-- registration anywhere, head -->", "<!-- end of the registration anywhere, head -->"
 END_MM = {"femur": (0, 5, 20.0), "tibia": (0, 5, -20.0)}
+OTHERS = 12
+
+
+class Knees(protocol.Knees):
+    def other(self, number):
+        return 4 + number % OTHERS
+
+    def write(self, folder, subject):
+        super().write(folder, subject)
+        knee = bone_ct.Knee(subject)
+        for name, mask in (("femur", knee.femur), ("tibia", knee.tibia)):
+            bone_ct.write_nrrd(folder / f"without_{name}.nrrd", bone_ct.rounded(np.where(mask, bone_ct.MUSCLE, knee.hu)))
 
 
 def random_rotation(rng):
@@ -47,28 +65,40 @@ def turn_nrrd(source, target, rotation):
     target.write_bytes("\n".join(lines).encode() + b"\n\n" + voxels)
 
 
-def row_of(knees, kind, number):
-    rng = np.random.default_rng([number, (RIGHT + WRONG).index(kind), 9])
-    body, case = knees.body, knees.simulated(number)
-    bone = "tibia" if "tibia" in kind else "femur"
-    volumes = knees.volumes(body.subject(number, other="patient" in kind))
+def files_of(bodies, kind, number):
+    """The model's volume and mask, and the model's other keys of case.json."""
+    body = bodies.body
     side = "mirrored" if "mirrored" in kind else "scan"
-    files = {"volume": volumes / f"{side}.nrrd", "mask": volumes / f"{'mirrored_' if side == 'mirrored' else ''}{bone}.nrrd"}
+    if kind in OF_HEAD:
+        return {"volume": bodies.volumes(body.subject(number)) / f"{side}.nrrd"}, {"window_hu": body.files(bodies.folder, "right")["window_hu"]}
+    volumes = bodies.volumes(body.other(number) if "patient" in kind else body.subject(number))
+    return {"volume": volumes / f"{side}.nrrd", "mask": volumes / f"{'mirrored_' if side == 'mirrored' else ''}{bone_of(kind)}.nrrd"}, {}
+
+
+def bone_of(kind):
+    return "head" if kind in OF_HEAD else "tibia" if "tibia" in kind else "femur"
+
+
+def row_of(bodies, kind, number):
+    rng = np.random.default_rng([number, KINDS.index(kind), 9])
+    bone = bone_of(kind)
+    case = bodies.simulated(number, of=f"without_{bone}" if "absent" in kind else "true")
     rotation = random_rotation(rng)
-    folder = knees.folder / f"anywhere-{kind}-{number}"
+    folder = bodies.folder / f"anywhere-{kind}-{number}"
     folder.mkdir(exist_ok=True)
-    model = {"name": bone, "scale_sigma": 0}
+    files, keys = files_of(bodies, kind, number)
+    model = {"name": bone, "scale_sigma": 0, **keys}
     for name, path in files.items():
         turn_nrrd(path, folder / f"{name}.nrrd", rotation)
         model[name] = folder / f"{name}.nrrd"
     views = json.loads((case / "case.json").read_text())["views"]
-    result = knees.register(case, model, folder / "out", views)
+    result = bodies.register(case, model, folder / "out", views)
     row = {"kind": kind, "number": number, "decision": result["decision"], "code": (result.get("failure") or {}).get("code"),
            "seconds": result.get("seconds")}
-    if kind in RIGHT and result.get("world_from_model"):
+    if kind == bone and result.get("world_from_model"):
         truth = np.array(json.loads((case / "truth.json").read_text())["ct"]["calibrator_from_patient"])
         found = np.array(result["world_from_model"])
-        points = np.array(END_MM[bone]) + protocol.TARGETS
+        points = bodies.body.targets if bone == "head" else np.array(END_MM[bone]) + protocol.TARGETS
         errors = protocol.placed(found, points @ rotation.T) - protocol.placed(truth, points)
         row["error_mm"] = math.sqrt(np.mean(np.sum(errors**2, axis=1)))
     shutil.rmtree(folder)
@@ -76,18 +106,18 @@ def row_of(knees, kind, number):
 
 
 def is_false(row):
-    return row["decision"] != "refuse" and (row["kind"] in WRONG or row.get("error_mm", math.inf) > 2)
+    return row["decision"] != "refuse" and row.get("error_mm", math.inf) > 2
 
 
 def table(rows):
     lines = ["| model | cases | right | refused | false accepts | error median | max | seconds median | 95 % |", "| --- |" + " --- |" * 8]
-    for kind in RIGHT + WRONG:
+    for kind in KINDS:
         own = [row for row in rows if row["kind"] == kind]
         if not own:
             continue
         kept = [row["error_mm"] for row in own if row["decision"] != "refuse" and "error_mm" in row]
         seconds = [row["seconds"] for row in own if row["seconds"] is not None]
-        cells = [kind, len(own), sum(error <= 2 for error in kept) if kind in RIGHT else "-", sum(row["decision"] == "refuse" for row in own),
+        cells = [kind, len(own), sum(error <= 2 for error in kept) if kind == bone_of(kind) else "-", sum(row["decision"] == "refuse" for row in own),
                  sum(map(is_false, own)), *protocol.figures(kept, (50, 100)), *protocol.figures(seconds, (50, 95), 1)]
         lines.append(f"| {' | '.join(map(str, cells))} |")
     return "\n".join(lines)
@@ -97,30 +127,41 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="build/bin/helicarm")
     parser.add_argument("--cases", type=int, default=10, help="of each kind (default: 10)")
-    parser.add_argument("--kinds", default=",".join(RIGHT + WRONG))
+    parser.add_argument("--head", nargs="?", const="", metavar="PATH",
+                        help="the head instead of the knees; PATH of Cranium.inv3, default: where its package installs it")
+    parser.add_argument("--kinds", help=f"some of {','.join(KINDS)}; default: all that the body has")
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--rows", type=pathlib.Path, help="JSON lines of all cases; those it holds are not run again")
     parser.add_argument("--doc", type=pathlib.Path, help="renews the table between the marks of that document")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for the simulated cases (default: a temporary one)")
     arguments = parser.parse_args()
+    is_head = arguments.head is not None
+    body = protocol.Heads(arguments.head or None) if is_head else Knees()
+    own = OF_HEAD if is_head else RIGHT + WRONG
+    kinds = arguments.kinds.split(",") if arguments.kinds else own
+    if unknown := [kind for kind in kinds if kind not in own]:
+        parser.error(f"--kinds: {', '.join(unknown)}: the {body.name} has {', '.join(own)}")
     rows = protocol.rows_in(arguments.rows)
     done = {(row["kind"], row["number"]) for row in rows}
     with tempfile.TemporaryDirectory() as temporary:
         folder = arguments.keep or pathlib.Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        knees = protocol.Protocol(protocol.Knees(), arguments, folder)
+        bodies = protocol.Protocol(body, arguments, folder)
         for number in range(arguments.cases):
-            for kind in arguments.kinds.split(","):
+            for kind in kinds:
                 if (kind, number) in done:
                     continue
-                rows.append(row_of(knees, kind, number))
+                rows.append(row_of(bodies, kind, number))
                 print(json.dumps(rows[-1]), flush=True)
                 if arguments.rows:
                     with arguments.rows.open("a") as out:
                         out.write(json.dumps(rows[-1]) + "\n")
+            if not bodies.keep:
+                for case in folder.glob(f"{body.name}-*-{number}"):
+                    shutil.rmtree(case)
     print(table(rows))
     if arguments.doc:
-        protocol.renew(arguments.doc, table(rows), *MARKS)
+        protocol.renew(arguments.doc, table(rows), *(HEAD_MARKS if is_head else MARKS))
     return any(map(is_false, rows))
 
 

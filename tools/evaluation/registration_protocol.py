@@ -187,11 +187,11 @@ class Protocol:
         with self.lock:
             return made(self.folder / f"{self.body.name}{subject}", lambda folder: self.body.write(folder, subject))
 
-    def simulated(self, number, shift=(0, 0, 0)):
-        """Case folder, the same for every kind. `shift`: of the body along L, P, S."""
+    def simulated(self, number, shift=(0, 0, 0), of="true"):
+        """Case folder, the same for every kind. `shift`: of the body along L, P, S. `of`: one of the subject's volumes."""
         centre = ",".join(f"{-s:g}" for s in shift)
-        volume = self.volumes(self.body.subject(number)) / "true.nrrd"
-        folder = self.folder / f"{self.body.name}-case-{number}{''.join(f'_{s:g}' for s in shift)}"
+        volume = self.volumes(self.body.subject(number)) / f"{of}.nrrd"
+        folder = self.folder / f"{self.body.name}-{of}-{number}{''.join(f'_{s:g}' for s in shift)}"
         with self.lock:
             own = self.locks.setdefault(folder, threading.Lock())
         with own:
