@@ -1,17 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include <Eigen/Cholesky>
 
 #include "helicarm/geometry/triangulation.h"
+#include "helicarm/track/sighted_point.h"
 #include "helicarm/track/tracker.h"
 
 namespace helicarm::track {
 namespace {
 
 constexpr double texture_floor_px = 0.05;  // of a fit, by the texture behind a marker
+
+/// Poses by the markers that two views show: `near` shifted to each, and those of each three.
+std::vector<geometry::RigidTransform> poses_by_places(const geometry::RigidTransform& near,
+                                                      const std::vector<SeenMarker>& markers) {
+  constexpr std::size_t most = 10;  // beyond, three neighbours in the list do
+  std::vector<Eigen::Vector3d> in_body, places;
+  for (const SeenMarker& marker : markers)
+    if (const auto met = marker.sights.size() >= 2 ? sighted_point(marker.sights) : std::nullopt) {
+      in_body.push_back(marker.in_body);
+      places.push_back(met->place);
+    }
+  std::vector<geometry::RigidTransform> poses;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    poses.push_back(near);
+    poses.back().translation += places[i] - near * in_body[i];
+  }
+  const std::size_t reach = places.size() > most ? 3 : places.size();
+  for (std::size_t i = 0; i < places.size(); ++i)
+    for (std::size_t j = i + 1; j < std::min(i + reach, places.size()); ++j)
+      for (std::size_t k = j + 1; k < std::min(i + reach, places.size()); ++k)
+        poses.push_back(geometry::absolute_pose(std::array{in_body[i], in_body[j], in_body[k]},
+                                                std::array{places[i], places[j], places[k]}));
+  return poses;
+}
 
 }  // namespace
 
@@ -51,7 +77,6 @@ std::optional<PoseFit> Tracker::pose_of(const BodyState& body, const BodyPlan& p
     if (!sights_of_it.empty()) whole.push_back({body.in_body[i], sights_of_it});
   }
   if (seen.empty()) return std::nullopt;
-  // From the prior moved by one marker, whichever agrees with most images.
   constexpr double cut = 50;  // chi2 of an image that counts as wrong
   const auto cost_of = [&](const geometry::RigidTransform& pose) {
     const auto at = fit_pose(pose, seen, prior, {.loose_mm = body.loose_mm, .iterations = 1});
@@ -63,12 +88,20 @@ std::optional<PoseFit> Tracker::pose_of(const BodyState& body, const BodyPlan& p
   };
   geometry::RigidTransform best = prior->world_from_body;
   double least = cost_of(best);
+  const auto consider = [&](const geometry::RigidTransform& pose) {
+    if (const double cost = cost_of(pose); cost < least) {
+      least = cost;
+      best = pose;
+    }
+  };
+  // From the prior moved by one marker, or by what two views show of the body, whichever agrees with most
+  // images.
   for (const SeenMarker& marker : whole)
     if (const auto moved = fit_pose(best, {&marker, 1}, prior, {.loose_mm = body.loose_mm}))
-      if (const double cost = cost_of(moved->world_from_body); cost < least) {
-        least = cost;
-        best = moved->world_from_body;
-      }
+      consider(moved->world_from_body);
+  if (least > cut)
+    for (const geometry::RigidTransform& pose : poses_by_places(prior->world_from_body, whole))
+      consider(pose);
   auto fit = fit_pose(best, seen, prior, {.loose_mm = body.loose_mm, .robust = true});
   if (!fit) return std::nullopt;
   std::vector<char> determines(plan.markers.size(), 0);
