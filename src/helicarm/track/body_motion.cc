@@ -11,6 +11,7 @@
 #include "helicarm/track/body_rays.h"
 #include "helicarm/track/body_residuals.h"
 #include "helicarm/track/body_series.h"
+#include "helicarm/track/first_shape.h"
 
 namespace helicarm::track {
 namespace {
@@ -226,52 +227,32 @@ void learn_shape(SequenceData& work, const BodyPlan& plan, Estimated& at, BodySe
   }
 }
 
-struct OddMarker {
-  std::size_t marker;  ///< of the body
-  double mm;
-};
-
-/// The first frame's discs lie at their picks, so a body in which one is far from its place was learnt from
-/// other markers' discs.
-std::optional<OddMarker> contradiction_of_first(const SequenceData& work, const BodyPlan& plan,
-                                                const Estimated& at, const BodySequence& body) {
-  constexpr double least_mm = 3, beside_pick_px = 12;
-  if (!plan.geometry.empty() || !work.the_case.points.empty()) return std::nullopt;
-  std::vector<Eigen::Vector3d> in_body, places;
-  std::vector<std::size_t> indices;
-  for (std::size_t i = 0; i < plan.markers.size(); ++i)
-    if (const auto& point = work.points[0][plan.markers[i]];
-        point && at.counts[i] && at.shape.in_body[i] && !body.markers[i].moved_at) {
-      in_body.push_back(*at.shape.in_body[i]);
-      places.push_back(point->place);
-      indices.push_back(i);
-    }
-  if (places.size() < 3) return std::nullopt;
-  const RigidTransform pose = at.poses[0] ? at.poses[0]->pose : geometry::absolute_pose(in_body, places);
-  double mm_per_px = 0;
-  for (const geometry::View& camera : work.cameras)
-    mm_per_px = std::max(mm_per_px, camera.depth(geometry::mean_of(places)) / std::abs(camera.intrinsics.fy));
-  OddMarker worst{0, std::max(least_mm, beside_pick_px * mm_per_px)};
-  bool is_any = false;
-  for (std::size_t i = 0; i < places.size(); ++i)
-    if (const double off = (pose * in_body[i] - places[i]).norm(); off > worst.mm) {
-      worst = {indices[i], off};
-      is_any = true;
-    }
-  return is_any ? std::optional(worst) : std::nullopt;
-}
-
 }  // namespace
 
 void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
                    Sequence& sequence) {
   constexpr double worst_turn_deg = 5, condition_limit = 150;
+  const auto sights = work.sights;
+  const auto warnings = std::ptrdiff_t(sequence.warnings.size());
   learn_shape(work, plan, at, body, sequence);
+  pose_frames(work, plan, at, body);
+  auto odd = contradiction_of_first(work, plan, at, body);
+  if (odd) {
+    sequence.warnings.erase(sequence.warnings.begin() + warnings, sequence.warnings.end());
+    for (const std::size_t marker : plan.markers) {
+      for (std::size_t f = 0; f < work.frames; ++f) work.sights[f][marker] = sights[f][marker];
+      locate_marker(work, marker);
+    }
+    drop_contradicting(work, plan, sequence);
+    at = {};
+    body = {};
+    learn_shape(work, plan, at, body, sequence);
+    pose_frames(work, plan, at, body);
+    odd = contradiction_of_first(work, plan, at, body);
+  }
   std::vector<Eigen::Vector3d> points;
   for (std::size_t i = 0; i < plan.markers.size(); ++i)
     if (at.counts[i] && at.shape.in_body[i]) points.push_back(*at.shape.in_body[i]);
-  at.dropped.assign(work.frames, std::nullopt);
-  body.frames.assign(work.frames, {});
   body.smoothed.assign(work.frames, {});
   const auto refuse = [&](const std::string& why) {
     sequence.warnings.push_back({Reason::body_ill_conditioned,
@@ -290,8 +271,12 @@ void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, Body
     return;
   }
   body.condition_per_m = track::condition_per_m(points);
-  pose_frames(work, plan, at, body);
-  if (const auto odd = contradiction_of_first(work, plan, at, body)) {
+  if (odd) {
+    for (std::size_t f = 1; f < work.frames; ++f)
+      for (const std::size_t marker : plan.markers) {
+        work.points[f][marker].reset();
+        for (auto& sight : work.sights[f][marker]) sight.reset();
+      }
     refuse(fmt::format(
         "frame {}: \"{}\" is {:.1f} mm from where the later frames place it in the body, although "
         "its pick shows it: in later frames discs of other markers are followed, or it belongs to another "

@@ -107,7 +107,7 @@ std::vector<std::optional<FramePlace>> smoothed_alone(const SequenceData& work, 
 
 /// Whether the images are of something else than the marker that its body places there.
 bool contradicts(const SightedPoint& point, const FramePlace& by_body) {
-  constexpr double farthest_mm = 1, farthest_chi2 = 60;
+  constexpr double farthest_mm = 0.5, farthest_chi2 = 60;
   const Eigen::Vector3d off = point.place - by_body.place;
   const Eigen::Matrix3d spread = point.covariance + by_body.covariance;
   return off.norm() > farthest_mm && off.dot(spread.ldlt().solve(off)) > farthest_chi2;

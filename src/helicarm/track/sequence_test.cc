@@ -82,7 +82,8 @@ double farthest(const Sequence& sequence, const Shift& shift) {
   double most = 0;
   for (std::size_t f = 0; f < sequence.frames.size(); ++f)
     for (std::size_t m = 0; m < sequence.markers[f].size(); ++m)
-      most = std::max(most, (sequence.markers[f][m].place->place - place_of(m, int(f) + 1, shift)).norm());
+      if (const auto& place = sequence.markers[f][m].place)
+        most = std::max(most, (place->place - place_of(m, int(f) + 1, shift)).norm());
   return most;
 }
 
@@ -417,21 +418,47 @@ TEST(Sequence, DiscThatIsNotTheMarkersIsNotItsPlace) {
   EXPECT_EQ(sequence.bodies[0].frames[24].decision, PoseDecision::warn);
 }
 
-TEST(Sequence, BodyThatContradictsTheFirstFramesPicksHasNoPose) {
+std::vector<MarkerStatus> statuses_of(const Sequence& sequence, std::size_t marker) {
+  std::vector<MarkerStatus> made;
+  for (const auto& frame : sequence.markers) made.push_back(frame[marker].status);
+  return made;
+}
+
+TEST(Sequence, MarkerThatContradictsItsPickInMostFramesDoesNotCount) {
   const TrackCase the_case = two_bodies();
   const Shift to_another = [](std::size_t marker, int frame) {
     return marker == 3 && frame > 1 ? Eigen::Vector3d(8, -6, 9) : Eigen::Vector3d(0, 0, 0);
   };
   const auto sights = drawn(the_case, to_another);
   const Sequence sequence = estimate_sequence(the_case, sights);
-  const Warning* warning = warning_of(sequence, Reason::body_ill_conditioned);
+  const Warning* warning = warning_of(sequence, Reason::marker_lost);
   ASSERT_TRUE(warning);
-  EXPECT_NE(warning->message.find("frame 1: \"j4\" is 13."), std::string::npos) << warning->message;
-  EXPECT_EQ(sequence.bodies[0].smoothed[20].decision, PoseDecision::refuse);
-  EXPECT_EQ(sequence.bodies[1].smoothed[20].decision, PoseDecision::accept);
+  EXPECT_NE(warning->message.find("\"j4\" is another's in 39 of 39 frames, first in frame 2"),
+            std::string::npos)
+      << warning->message;
+  EXPECT_EQ(std::ranges::count(statuses_of(sequence, 3), MarkerStatus::lost), frames);
+  EXPECT_EQ(std::ranges::count(statuses_of(sequence, 0), MarkerStatus::tracked), frames);
+  EXPECT_LT(farthest(sequence, none), 0.5);
+  for (const BodySequence& body : sequence.bodies)
+    EXPECT_EQ(body.smoothed[20].decision, PoseDecision::accept);
   TrackCase of_file = the_case;  // whose first row is no surer than others
   of_file.points.assign(sights.size(), {});
-  EXPECT_FALSE(warning_of(estimate_sequence(of_file, sights), Reason::body_ill_conditioned));
+  EXPECT_FALSE(warning_of(estimate_sequence(of_file, sights), Reason::marker_lost));
+}
+
+TEST(Sequence, WhereAllMarkersContradictTheFirstFrameNoneIsPlaced) {
+  const TrackCase the_case = two_bodies();
+  // A rigid body of other discs, in the frames behind the first.
+  const Shift to_others = [](std::size_t marker, int frame) {
+    static const std::vector<Eigen::Vector3d> others{{8, -6, 9}, {-9, 7, 5}, {6, 8, -9}, {-7, -8, 6}};
+    return marker < 4 && frame > 1 ? others[marker] : Eigen::Vector3d(0, 0, 0);
+  };
+  const Sequence sequence = estimate_sequence(the_case, drawn(the_case, to_others));
+  ASSERT_TRUE(warning_of(sequence, Reason::body_ill_conditioned));
+  EXPECT_EQ(sequence.bodies[0].smoothed[20].decision, PoseDecision::refuse);
+  EXPECT_EQ(sequence.bodies[1].smoothed[20].decision, PoseDecision::accept);
+  for (std::size_t m = 0; m < 4; ++m)
+    EXPECT_EQ(std::ranges::count(statuses_of(sequence, m), MarkerStatus::tracked), 1) << m;
 }
 
 TEST(Sequence, LooseMarkerIsNamed) {

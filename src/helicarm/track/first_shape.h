@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "helicarm/track/body_motion.h"
+
+namespace helicarm::track {
+
+/// A marker of a body in the first frame, and where the body has it.
+struct OddMarker {
+  std::size_t marker;  ///< of the body
+  double mm;
+};
+
+/// The first frame's discs lie at their picks, so a body in which one is far from its place was learnt from
+/// other markers' discs: the farthest.
+std::optional<OddMarker> contradiction_of_first(const SequenceData& work, const BodyPlan& plan,
+                                                const Estimated& at, const BodySequence& body);
+
+/// Takes out the discs of later frames that are not where the first frame's shape has them beside the body's
+/// other markers, and warns of them. A marker of which most frames show another disc than the first does not
+/// count at all: either may be the right one. Frames in which fewer than three markers agree with the first
+/// show none of the body.
+void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequence);
+
+}  // namespace helicarm::track
