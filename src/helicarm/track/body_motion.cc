@@ -254,6 +254,10 @@ void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, Body
   for (std::size_t i = 0; i < plan.markers.size(); ++i)
     if (at.counts[i] && at.shape.in_body[i]) points.push_back(*at.shape.in_body[i]);
   body.smoothed.assign(work.frames, {});
+  if (std::ranges::all_of(work.refused, [](const auto& reason) { return reason.has_value(); })) {
+    for (std::size_t f = 0; f < work.frames; ++f) body.smoothed[f].reason = work.refused[f];
+    return;
+  }
   const auto refuse = [&](const std::string& why) {
     sequence.warnings.push_back({Reason::body_ill_conditioned,
                                  fmt::format("the body \"{}\" has no pose: {}", plan.name, why),
@@ -273,10 +277,7 @@ void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, Body
   body.condition_per_m = track::condition_per_m(points);
   if (odd) {
     for (std::size_t f = 1; f < work.frames; ++f)
-      for (const std::size_t marker : plan.markers) {
-        work.points[f][marker].reset();
-        for (auto& sight : work.sights[f][marker]) sight.reset();
-      }
+      for (const std::size_t marker : plan.markers) drop_sights(work, f, marker);
     refuse(fmt::format(
         "frame {}: \"{}\" is {:.1f} mm from where the later frames place it in the body, although "
         "its pick shows it: in later frames discs of other markers are followed, or it belongs to another "

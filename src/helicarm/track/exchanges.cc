@@ -112,4 +112,55 @@ void repair_exchanges(SequenceData& work, Sequence& sequence) {
     }
 }
 
+std::optional<ExchangedNames> exchanged_names(const SequenceData& work) {
+  constexpr double suspect_rms_mm = 0.1, explained_share = 0.15;  // of the mean squares
+  constexpr std::size_t fewest = 4;  // of a body's markers: three fit many shapes
+  const auto rms_of = [&](const BodyPlan& plan) {
+    const std::vector<char> all(plan.markers.size(), 1);
+    const Shape shape = shape_of(work, plan, all);
+    double squares = 0;
+    int count = 0;
+    for (std::size_t f = 0; f < work.frames; ++f)
+      for (std::size_t i = 0; i < plan.markers.size(); ++i)
+        if (const auto& point = work.points[f][plan.markers[i]];
+            point && shape.poses[f] && shape.in_body[i]) {
+          squares +=
+              std::min(cut_mm * cut_mm, (point->place - *shape.poses[f] * *shape.in_body[i]).squaredNorm());
+          ++count;
+        }
+    return std::sqrt(squares / std::max(1, count));
+  };
+  const auto& plans = work.the_case.bodies;
+  std::vector<double> now;
+  for (const BodyPlan& plan : plans) now.push_back(plan.markers.size() < fewest ? 0 : rms_of(plan));
+  for (std::size_t a = 0; a < plans.size(); ++a)
+    for (std::size_t b = a + 1; b < plans.size(); ++b) {
+      if (now[a] < suspect_rms_mm || now[b] < suspect_rms_mm) continue;
+      for (std::size_t i = 0; i < plans[a].markers.size(); ++i)
+        for (std::size_t k = 0; k < plans[b].markers.size(); ++k) {
+          BodyPlan first = plans[a], second = plans[b];
+          std::swap(first.markers[i], second.markers[k]);
+          const double of_first = rms_of(first);
+          if (of_first * of_first > explained_share * now[a] * now[a]) continue;
+          const double of_second = rms_of(second);
+          if (of_second * of_second > explained_share * now[b] * now[b]) continue;
+          const std::size_t one = plans[a].markers[i], other = plans[b].markers[k];
+          return ExchangedNames{
+              one,
+              other,
+              {Reason::markers_swapped,
+               fmt::format("\"{}\" of the body \"{}\" and \"{}\" of \"{}\" have each other's names in all "
+                           "frames: their markers "
+                           "move against each other by {:.2f} and {:.2f} mm rms, with the names exchanged by "
+                           "{:.2f} and {:.2f} "
+                           "mm: correct the names",
+                           work.the_case.markers[one], plans[a].name, work.the_case.markers[other],
+                           plans[b].name, now[a], now[b], of_first, of_second),
+               {},
+               {{"rms_mm", std::max(now[a], now[b])}, {"exchanged_mm", std::max(of_first, of_second)}}}};
+        }
+    }
+  return std::nullopt;
+}
+
 }  // namespace helicarm::track

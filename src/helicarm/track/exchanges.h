@@ -10,4 +10,14 @@ namespace helicarm::track {
 /// `Sequence::repaired` and names them in a warning.
 void repair_exchanges(SequenceData& work, Sequence& sequence);
 
+struct ExchangedNames {
+  std::size_t first, second;
+  Failure failure;
+};
+
+/// Names of two markers of different bodies that are exchanged in all views and all frames: each body moves
+/// as a rigid one only with the other's marker (markers_swapped). Bodies that do not move against each other
+/// do not show it.
+std::optional<ExchangedNames> exchanged_names(const SequenceData& work);
+
 }  // namespace helicarm::track

@@ -87,11 +87,6 @@ void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequ
   std::vector<Odd> odd(plan.markers.size());
   int untold = 0;
   std::optional<std::size_t> first_untold;
-  const auto drop = [&](std::size_t f, std::size_t i) {
-    const std::size_t m = plan.markers[i];
-    work.points[f][m].reset();
-    for (auto& sight : work.sights[f][m]) sight.reset();
-  };
   for (std::size_t f = 1; f < work.frames; ++f) {
     std::vector<Located> located;
     for (std::size_t i = 0; i < plan.markers.size(); ++i) {
@@ -109,7 +104,7 @@ void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequ
       if (is_told) ++odd[each.marker].seen;
       if (is_told && std::ranges::count(set, each.marker, &Located::marker) > 0) continue;
       if (is_told && odd[each.marker].frames++ == 0) odd[each.marker].first = f;
-      drop(f, each.marker);
+      drop_sights(work, f, plan.markers[each.marker]);
     }
   }
   if (untold > 0)
@@ -126,7 +121,7 @@ void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequ
     if (odd[i].frames == 0) continue;
     const bool is_unknown = 2 * odd[i].frames > odd[i].seen;
     if (is_unknown)
-      for (std::size_t f = 0; f < work.frames; ++f) drop(f, i);
+      for (std::size_t f = 0; f < work.frames; ++f) drop_sights(work, f, plan.markers[i]);
     sequence.warnings.push_back(
         {Reason::marker_lost,
          fmt::format("the disc of \"{}\" is another's in {} of {} frames, first in frame {}: it is not where "

@@ -340,6 +340,12 @@ Sequence estimate_sequence(const TrackCase& the_case, const std::vector<FrameSig
   warn_of_repeated_images(the_case, sights, sequence);
   repair_dropped_frames(work, sequence);
   repair_exchanges(work, sequence);
+  if (const auto exchanged = exchanged_names(work)) {
+    sequence.failure = exchanged->failure;
+    work.refused.assign(work.frames, exchanged->failure.reason);
+    for (const std::size_t marker : {exchanged->first, exchanged->second})
+      for (std::size_t f = 0; f < work.frames; ++f) drop_sights(work, f, marker);
+  }
   correct_delays(work, sequence);
   warn_of_delays(work, sequence);
   sequence.sigma_factor = sigma_factors(work);
@@ -363,7 +369,7 @@ Sequence estimate_sequence(const TrackCase& the_case, const std::vector<FrameSig
   sequence.relative = relative_motions(sequence.bodies);
   sequence.joints = joints_of(the_case, sequence.bodies);
   add_camera_errors(work, sequence);
-  sequence.failure = nothing_followed(work, sequence);
+  if (!sequence.failure) sequence.failure = nothing_followed(work, sequence);
   return sequence;
 }
 

@@ -57,7 +57,7 @@ struct Sequence {
   std::vector<FrameSights> sights = {};  ///< as they were found, of a sequence of images
   int repaired = 0, complete = 0;
   std::vector<Warning> warnings;
-  std::optional<Failure> failure;  ///< nothing that was asked for was followed
+  std::optional<Failure> failure;  ///< nothing that was asked for was followed, or names are exchanged
   double seconds = 0;
 };
 

@@ -17,6 +17,11 @@ void locate_marker(SequenceData& work, std::size_t marker) {
   }
 }
 
+void drop_sights(SequenceData& work, std::size_t f, std::size_t marker) {
+  work.points[f][marker].reset();
+  for (auto& sight : work.sights[f][marker]) sight.reset();
+}
+
 OptionalPlace velocity_at(const SequenceData& work, std::size_t f, std::size_t m) {
   const std::size_t before = f > 0 ? f - 1 : 0, after = std::min(f + 1, work.frames - 1);
   const auto &from = work.points[before][m], &to = work.points[after][m], &here = work.points[f][m];

@@ -31,6 +31,8 @@ struct SequenceData {
 
 void locate_all(SequenceData& work);
 void locate_marker(SequenceData& work, std::size_t marker);
+/// As if no image of the frame showed the marker.
+void drop_sights(SequenceData& work, std::size_t f, std::size_t marker);
 
 /// By the neighbouring frames, mm a frame.
 OptionalPlace velocity_at(const SequenceData& work, std::size_t f, std::size_t m);

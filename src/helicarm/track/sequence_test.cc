@@ -475,11 +475,21 @@ TEST(Sequence, LooseMarkerIsNamed) {
   EXPECT_EQ(sequence.repaired, 0);
 }
 
-TEST(Sequence, NamesExchangedBetweenBodiesAreSuspected) {
+TEST(Sequence, NamesExchangedBetweenBodiesAreRefusedByName) {
   TrackCase the_case = two_bodies();
   std::swap(the_case.bodies[0].markers[2], the_case.bodies[1].markers[1]);
   const Sequence sequence = estimate_sequence(the_case, drawn(the_case, none));
-  EXPECT_TRUE(warning_of(sequence, Reason::marker_loose));
+  ASSERT_TRUE(sequence.failure);
+  EXPECT_EQ(sequence.failure->reason, Reason::markers_swapped);
+  EXPECT_TRUE(sequence.failure->message.starts_with(
+      "\"s2\" of the body \"jaw\" and \"j3\" of \"skull\" have each other's names"))
+      << sequence.failure->message;
+  for (const BodySequence& body : sequence.bodies) {
+    EXPECT_EQ(body.frames[20].decision, PoseDecision::refuse);
+    EXPECT_EQ(body.smoothed[20].decision, PoseDecision::refuse);
+  }
+  EXPECT_EQ(sequence.markers[20][2].status, MarkerStatus::lost);
+  EXPECT_EQ(sequence.markers[20][0].status, MarkerStatus::tracked);
 }
 
 TEST(Sequence, MarkersThatMoveAgainstEachOtherAllTheTimeAreNoBody) {
