@@ -136,4 +136,17 @@ void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequ
   }
 }
 
+bool stands_alone(const SequenceData& work, const BodyPlan& plan, std::size_t marker, std::size_t f) {
+  if (f == 0 || plan.markers.size() < 3 || !work.the_case.points.empty()) return false;
+  const auto &first = work.points[0][marker], &now = work.points[f][marker];
+  if (!first || !now) return false;
+  const double limit_mm = farthest_mm(work, now->place);
+  return std::ranges::none_of(plan.markers, [&](std::size_t other) {
+    const auto &other_first = work.points[0][other], &other_now = work.points[f][other];
+    return other != marker && other_first && other_now &&
+           std::abs((first->place - other_first->place).norm() - (now->place - other_now->place).norm()) <
+               limit_mm;
+  });
+}
+
 }  // namespace helicarm::track

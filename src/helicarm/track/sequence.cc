@@ -16,6 +16,7 @@
 #include "helicarm/track/delays.h"
 #include "helicarm/track/dropped_frames.h"
 #include "helicarm/track/exchanges.h"
+#include "helicarm/track/first_shape.h"
 #include "helicarm/track/image_errors.h"
 #include "helicarm/track/view_map.h"
 
@@ -151,6 +152,10 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
     const auto i = std::size_t(std::ranges::find(holder->markers, m) - holder->markers.begin());
     return place_by_body(work, *holder, bodies[b], sequence.bodies[b], i, f, by_others);
   };
+  const bool has_no_pose =
+      holder != work.the_case.bodies.end() &&
+      std::ranges::none_of(sequence.bodies[std::size_t(holder - work.the_case.bodies.begin())].frames,
+                           [](const TrackedBody& frame) { return frame.pose.has_value(); });
   std::vector<std::optional<FramePlace>> alone;
   Eigen::Matrix3d of_cameras = Eigen::Matrix3d::Zero();
   bool is_first = true;
@@ -164,10 +169,11 @@ void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies
         point && !by_others && holder != work.the_case.bodies.end() ? by_body(f, false) : std::nullopt;
     const auto& check = by_others ? by_others : by_motion;
     const bool is_wrong =
-        check && (contradicts(*point, *check) ||
-                  (by_motion &&
-                   is_unsupported(work, *holder, bodies[std::size_t(holder - work.the_case.bodies.begin())],
-                                  m, f, *by_motion)));
+        (point && has_no_pose && stands_alone(work, *holder, m, f)) ||
+        (check && (contradicts(*point, *check) ||
+                   (by_motion &&
+                    is_unsupported(work, *holder, bodies[std::size_t(holder - work.the_case.bodies.begin())],
+                                   m, f, *by_motion))));
     if (is_wrong) seen.clear();
     for (std::size_t k = 0; k < work.views; ++k)
       if (work.sights[f][m][k] && !is_wrong) marker.views.push_back(k);

@@ -461,6 +461,18 @@ TEST(Sequence, WhereAllMarkersContradictTheFirstFrameNoneIsPlaced) {
     EXPECT_EQ(std::ranges::count(statuses_of(sequence, m), MarkerStatus::tracked), 1) << m;
 }
 
+TEST(Sequence, LoneDiscsOfABodyWithoutAPoseAreNoMarker) {
+  const TrackCase the_case = two_bodies();
+  auto sights = drawn(the_case, none);
+  for (std::size_t f = 1; f < sights.size(); ++f)
+    for (const std::size_t m : {0, 1, 2})
+      for (auto& image : sights[f].of[m]) image.reset();
+  const Sequence sequence = estimate_sequence(the_case, sights);
+  EXPECT_TRUE(warning_of(sequence, Reason::body_ill_conditioned));
+  EXPECT_EQ(std::ranges::count(statuses_of(sequence, 3), MarkerStatus::tracked), 1);
+  EXPECT_EQ(std::ranges::count(statuses_of(sequence, 4), MarkerStatus::tracked), frames);
+}
+
 TEST(Sequence, LooseMarkerIsNamed) {
   const TrackCase the_case = two_bodies();
   const Shift loose = [](std::size_t marker, int frame) {
