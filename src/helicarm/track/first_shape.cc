@@ -23,17 +23,28 @@ struct Located {
   Eigen::Vector3d first, now;
 };
 
+/// Those of the frame that are located in the first one too.
+std::vector<Located> located_in(const SequenceData& work, const BodyPlan& plan, std::size_t f) {
+  std::vector<Located> located;
+  for (std::size_t i = 0; i < plan.markers.size(); ++i) {
+    const auto &first = work.points[0][plan.markers[i]], &now = work.points[f][plan.markers[i]];
+    if (first && now) located.push_back({i, first->place, now->place});
+  }
+  return located;
+}
+
+bool agree(const Located& a, const Located& b, double limit_mm) {
+  return std::abs((a.first - b.first).norm() - (a.now - b.now).norm()) < limit_mm;
+}
+
 /// The largest set that is found whose distances are those of the first frame.
 std::vector<Located> agreeing(const std::vector<Located>& located, double limit_mm) {
-  const auto agree = [&](const Located& a, const Located& b) {
-    return std::abs((a.first - b.first).norm() - (a.now - b.now).norm()) < limit_mm;
-  };
   std::vector<Located> largest;
   for (const Located& seed : located) {
     std::vector<Located> set{seed};
     for (const Located& other : located)
       if (other.marker != seed.marker &&
-          std::ranges::all_of(set, [&](const Located& each) { return agree(each, other); }))
+          std::ranges::all_of(set, [&](const Located& each) { return agree(each, other, limit_mm); }))
         set.push_back(other);
     if (set.size() > largest.size()) largest = std::move(set);
   }
@@ -88,11 +99,7 @@ void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequ
   int untold = 0;
   std::optional<std::size_t> first_untold;
   for (std::size_t f = 1; f < work.frames; ++f) {
-    std::vector<Located> located;
-    for (std::size_t i = 0; i < plan.markers.size(); ++i) {
-      const auto &first = work.points[0][plan.markers[i]], &now = work.points[f][plan.markers[i]];
-      if (first && now) located.push_back({i, first->place, now->place});
-    }
+    const std::vector<Located> located = located_in(work, plan, f);
     if (located.empty()) continue;
     auto set = agreeing(located, farthest_mm(work, located.front().now));
     const bool is_told = set.size() >= 3;
@@ -136,17 +143,22 @@ void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequ
   }
 }
 
-bool stands_alone(const SequenceData& work, const BodyPlan& plan, std::size_t marker, std::size_t f) {
-  if (f == 0 || plan.markers.size() < 3 || !work.the_case.points.empty()) return false;
-  const auto &first = work.points[0][marker], &now = work.points[f][marker];
-  if (!first || !now) return false;
-  const double limit_mm = farthest_mm(work, now->place);
-  return std::ranges::none_of(plan.markers, [&](std::size_t other) {
-    const auto &other_first = work.points[0][other], &other_now = work.points[f][other];
-    return other != marker && other_first && other_now &&
-           std::abs((first->place - other_first->place).norm() - (now->place - other_now->place).norm()) <
-               limit_mm;
-  });
+void drop_lone_discs(SequenceData& work, const BodyPlan& plan) {
+  constexpr double rigid_mm = 1;
+  if (plan.markers.size() < 3 || !work.the_case.points.empty()) return;
+  for (std::size_t f = 1; f < work.frames; ++f) {
+    const std::vector<Located> located = located_in(work, plan, f);
+    const auto is_lone = [&](const Located& each) {
+      return std::ranges::none_of(located, [&](const Located& other) {
+        return other.marker != each.marker && agree(other, each, rigid_mm);
+      });
+    };
+    for (std::size_t i = 0; i < plan.markers.size(); ++i) {
+      const auto found = std::ranges::find(located, i, &Located::marker);
+      if (work.points[f][plan.markers[i]] && (found == located.end() || is_lone(*found)))
+        drop_sights(work, f, plan.markers[i]);
+    }
+  }
 }
 
 }  // namespace helicarm::track

@@ -24,8 +24,8 @@ std::optional<OddMarker> contradiction_of_first(const SequenceData& work, const 
 /// show none of the body.
 void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequence);
 
-/// Whether nothing but its own discs says that this is the marker, in a body of three markers or more that
-/// has no pose: no other of its markers is as far from it as in the first frame.
-bool stands_alone(const SequenceData& work, const BodyPlan& plan, std::size_t marker, std::size_t f);
+/// Of a body of three markers or more that has no pose, takes out the discs that nothing but themselves says
+/// to be the marker's: no other of its markers is as far away as in the first frame.
+void drop_lone_discs(SequenceData& work, const BodyPlan& plan);
 
 }  // namespace helicarm::track

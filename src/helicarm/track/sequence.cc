@@ -5,8 +5,6 @@
 #include <cmath>
 #include <set>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "helicarm/geometry/triangulation.h"
@@ -18,23 +16,16 @@
 #include "helicarm/track/exchanges.h"
 #include "helicarm/track/first_shape.h"
 #include "helicarm/track/image_errors.h"
+#include "helicarm/track/place_markers.h"
 #include "helicarm/track/view_map.h"
 
 namespace helicarm::track {
 namespace {
 
 constexpr double sight_floor_px = 0.02;
-constexpr double lost_mm = 5;  // a place that is less certain is none
 
-double largest_sigma(const Eigen::Matrix3d& covariance) {
-  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()[2]);
-}
-
-/// Covariance by the cameras' own, common to all frames.
-Eigen::Matrix3d by_cameras(const SequenceData& work, const Eigen::Vector3d& place) {
-  const Eigen::Matrix3Xd by = place_by_cameras(work, place);
-  if (by.cols() == 0) return Eigen::Matrix3d::Zero();
-  return by * work.the_case.camera_covariance * by.transpose();
+bool is_posed(const BodySequence& body) {
+  return std::ranges::any_of(body.frames, [](const TrackedBody& frame) { return frame.pose.has_value(); });
 }
 
 std::vector<MarkerDistance> distances_of(const SequenceData& work) {
@@ -82,130 +73,6 @@ SequenceData data_of(const TrackCase& the_case, const std::vector<FrameSights>& 
   }
   locate_all(work);
   return work;
-}
-
-/// A marker's places by its own images alone, smoothed between the first and the last frame in which two
-/// views show it; nothing where too few frames do so to know how it moves.
-std::vector<std::optional<FramePlace>> smoothed_alone(const SequenceData& work, std::size_t m) {
-  constexpr int fewest = 8;
-  std::vector<std::optional<FramePlace>> measured, made(work.frames);
-  int count = 0;
-  std::size_t first = work.frames, last = 0;
-  for (std::size_t f = 0; f < work.frames; ++f) {
-    auto& at = measured.emplace_back();
-    if (const auto& met = work.points[f][m]) {
-      at = FramePlace{met->place, met->covariance};
-      ++count;
-      first = std::min(first, f);
-      last = f;
-    }
-  }
-  if (count < fewest) return made;
-  const auto smooth = smooth_places(work.times, measured);
-  for (std::size_t f = first; smooth && f <= last; ++f) made[f] = (*smooth)[f];
-  return made;
-}
-
-/// Whether the images are of something else than the marker that its body places there.
-bool contradicts(const SightedPoint& point, const FramePlace& by_body) {
-  constexpr double farthest_mm = 0.5, farthest_chi2 = 60;
-  const Eigen::Vector3d off = point.place - by_body.place;
-  const Eigen::Matrix3d spread = point.covariance + by_body.covariance;
-  return off.norm() > farthest_mm && off.dot(spread.ldlt().solve(off)) > farthest_chi2;
-}
-
-/// Likewise for one image.
-bool contradicts(const Sight& sight, const FramePlace& by_body) {
-  constexpr double farthest_chi2 = 30;
-  if (!(sight.view->depth(by_body.place) > 1)) return true;
-  const auto slope = geometry::projection_jacobian(*sight.view, by_body.place);
-  Eigen::Matrix2d spread = slope * by_body.covariance * slope.transpose();
-  spread.diagonal().array() += sight.sigma_px * sight.sigma_px;
-  const Eigen::Vector2d off = sight.uv - sight.view->project(by_body.place);
-  return off.dot(spread.ldlt().solve(off)) > farthest_chi2;
-}
-
-/// Whether nothing but its own images says that this is the marker: its body has moved unseen for too long,
-/// and no other of its markers is at the right distance.
-bool is_unsupported(const SequenceData& work, const BodyPlan& body, const Estimated& at, std::size_t m,
-                    std::size_t f, const FramePlace& by_motion) {
-  constexpr double rigid_mm = 1;
-  if (largest_sigma(by_motion.covariance) < lost_mm) return false;
-  const auto i = std::size_t(std::ranges::find(body.markers, m) - body.markers.begin());
-  for (std::size_t k = 0; k < body.markers.size(); ++k) {
-    const auto& other = work.points[f][body.markers[k]];
-    if (k == i || !other || !at.shape.in_body[k] || !at.shape.in_body[i]) continue;
-    const double distance = (other->place - work.points[f][m]->place).norm(),
-                 known = (*at.shape.in_body[k] - *at.shape.in_body[i]).norm();
-    if (std::abs(distance - known) < rigid_mm) return false;
-  }
-  return true;
-}
-
-/// A marker in every frame: by two views, else by its body or its own smooth motion and what one view shows.
-void place_marker(const SequenceData& work, const std::vector<Estimated>& bodies, std::size_t m,
-                  Sequence& sequence) {
-  const auto holder = std::ranges::find_if(
-      work.the_case.bodies, [&](const BodyPlan& body) { return std::ranges::count(body.markers, m) > 0; });
-  const auto by_body = [&](std::size_t f, bool by_others) {
-    const auto b = std::size_t(holder - work.the_case.bodies.begin());
-    const auto i = std::size_t(std::ranges::find(holder->markers, m) - holder->markers.begin());
-    return place_by_body(work, *holder, bodies[b], sequence.bodies[b], i, f, by_others);
-  };
-  const bool has_no_pose =
-      holder != work.the_case.bodies.end() &&
-      std::ranges::none_of(sequence.bodies[std::size_t(holder - work.the_case.bodies.begin())].frames,
-                           [](const TrackedBody& frame) { return frame.pose.has_value(); });
-  std::vector<std::optional<FramePlace>> alone;
-  Eigen::Matrix3d of_cameras = Eigen::Matrix3d::Zero();
-  bool is_first = true;
-  for (std::size_t f = 0; f < work.frames; ++f) {
-    TrackedMarker& marker = sequence.markers[f][m];
-    auto seen = work.seen(f, m);
-    const auto& point = work.points[f][m];
-    std::optional<FramePlace> by_others;
-    if (point && holder != work.the_case.bodies.end()) by_others = by_body(f, true);
-    const auto by_motion =
-        point && !by_others && holder != work.the_case.bodies.end() ? by_body(f, false) : std::nullopt;
-    const auto& check = by_others ? by_others : by_motion;
-    const bool is_wrong =
-        (point && has_no_pose && stands_alone(work, *holder, m, f)) ||
-        (check && (contradicts(*point, *check) ||
-                   (by_motion &&
-                    is_unsupported(work, *holder, bodies[std::size_t(holder - work.the_case.bodies.begin())],
-                                   m, f, *by_motion))));
-    if (is_wrong) seen.clear();
-    for (std::size_t k = 0; k < work.views; ++k)
-      if (work.sights[f][m][k] && !is_wrong) marker.views.push_back(k);
-    if (point && !is_wrong) {
-      marker.status = MarkerStatus::tracked;
-      marker.place = FramePlace{point->place, point->covariance};
-      marker.ray_gap_mm = point->ray_gap_mm;
-      // What weak images leave open the others of the body say.
-      if (by_others) marker.place = with_sights(*by_others, seen);
-    } else {
-      std::optional<FramePlace> guess;
-      if (holder != work.the_case.bodies.end()) guess = by_body(f, false);
-      if (!guess) {
-        if (alone.empty()) alone = smoothed_alone(work, m);
-        guess = alone[f];
-      }
-      if (guess && seen.size() == 1 && contradicts(seen.front(), *guess)) {
-        seen.clear();
-        marker.views.clear();
-      }
-      if (guess) {
-        const FramePlace place = with_sights(*guess, seen);
-        if (largest_sigma(place.covariance) < lost_mm) {
-          marker.status = seen.empty() ? MarkerStatus::predicted : MarkerStatus::one_view;
-          marker.place = place;
-        }
-      }
-    }
-    if (!marker.place) continue;
-    if (is_first) of_cameras = by_cameras(work, marker.place->place), is_first = false;
-    marker.place->covariance += of_cameras;
-  }
 }
 
 void warn_of_lost_markers(const SequenceData& work, Sequence& sequence) {
@@ -320,9 +187,7 @@ std::optional<Failure> nothing_followed(const SequenceData& work, const Sequence
   for (const auto& frame : sequence.markers)
     lost += double(std::ranges::count(frame, MarkerStatus::lost, &TrackedMarker::status));
   const double share = lost / double(work.frames * work.markers);
-  const bool no_pose = std::ranges::none_of(sequence.bodies, [](const BodySequence& body) {
-    return std::ranges::any_of(body.frames, [](const TrackedBody& frame) { return frame.pose.has_value(); });
-  });
+  const bool no_pose = std::ranges::none_of(sequence.bodies, is_posed);
   if (!no_pose || (sequence.bodies.empty() && share <= most_lost)) return std::nullopt;
   const auto px = expected_diameter_px(work);
   return Failure{
@@ -363,8 +228,9 @@ Sequence estimate_sequence(const TrackCase& the_case, const std::vector<FrameSig
   sequence.bodies.resize(the_case.bodies.size());
   for (std::size_t b = 0; b < bodies.size(); ++b)
     estimate_body(work, the_case.bodies[b], bodies[b], sequence.bodies[b], sequence);
-  sequence.markers.assign(work.frames, std::vector<TrackedMarker>(work.markers));
-  for (std::size_t m = 0; m < work.markers; ++m) place_marker(work, bodies, m, sequence);
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+    if (!is_posed(sequence.bodies[b])) drop_lone_discs(work, the_case.bodies[b]);
+  place_markers(work, bodies, sequence);
   for (std::size_t f = 0; f < work.frames; ++f)
     sequence.complete += std::ranges::all_of(sequence.markers[f], [](const TrackedMarker& marker) {
       return marker.status == MarkerStatus::tracked;
