@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
@@ -38,6 +39,8 @@ SpdSolution solve_spd(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& righ
   const bool is_positive = factors.info() == Eigen::Success && factors.vectorD().minCoeff() > 0;
   return {factors.solve(right), is_positive ? factors.rcond() : 0.0};
 }
+
+Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix) { return matrix.inverse(); }
 
 Eigen::MatrixXd orthonormal_columns(const Eigen::MatrixXd& matrix) {
   return Eigen::HouseholderQR<Eigen::MatrixXd>(matrix).householderQ() *

@@ -48,6 +48,8 @@ struct SpdSolution {
 /// X of matrix X = right, with a symmetric positive definite matrix.
 SpdSolution solve_spd(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 
+Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix);
+
 /// Orthonormal columns that span those of a matrix with at least as many rows as columns.
 Eigen::MatrixXd orthonormal_columns(const Eigen::MatrixXd& matrix);
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
+#include "helicarm/geometry/small_matrix.h"
 #include "helicarm/track/body_rays.h"
 #include "helicarm/track/body_residuals.h"
 #include "helicarm/track/body_series.h"
@@ -171,10 +171,9 @@ void learn_deviations(const SequenceData& work, const BodyPlan& plan, const Sequ
     // Never less than the deviation alone; a marker with few frames has that of the body, twice.
     Eigen::Matrix3d spread = (at.counts[i] ? 4 * least : few_mm * few_mm) * Eigen::Matrix3d::Identity();
     if (at.counts[i] && own.count > int(few_frames)) {
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(
+      const geometry::SymmetricEigen3 parts = geometry::symmetric_eigen(
           (frames * (own.products - own.by_images) + prior_frames * spread) / (frames + prior_frames));
-      spread = parts.eigenvectors() * parts.eigenvalues().cwiseMax(least).asDiagonal() *
-               parts.eigenvectors().transpose();
+      spread = parts.vectors * parts.values.cwiseMax(least).asDiagonal() * parts.vectors.transpose();
     }
     spread *= (frames + prior_frames) / (frames + prior_frames - 2);  // Student: of few frames
     at.spread.push_back(spread);
@@ -289,8 +288,8 @@ void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, Body
   for (const auto& pose : at.poses)
     if (pose)
       turns.push_back(
-          std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(pose->covariance.topLeftCorner<3, 3>())
-                        .eigenvalues()[2]) *
+          std::sqrt(
+              geometry::symmetric_eigen(Eigen::Matrix3d(pose->covariance.topLeftCorner<3, 3>())).values[2]) *
           180 / EIGEN_PI);
   if (turns.empty()) {
     refuse("in no frame do three of its markers agree with one shape");
@@ -366,7 +365,7 @@ std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan
       of_all += by_step.transpose() * by_step;
       if (other.sights.size() >= 2) of_seen += by_step.transpose() * by_step;
     }
-    const RigidCovariance fewer = of_seen.inverse() - of_all.inverse();
+    const RigidCovariance fewer = geometry::inverse(of_seen) - geometry::inverse(of_all);
     if (!fewer.allFinite()) return std::nullopt;
     covariance += std::pow(body.deviation_mm, 2) * slope * fewer * slope.transpose();
   }

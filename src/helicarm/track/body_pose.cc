@@ -5,10 +5,11 @@
 #include <cmath>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/small_matrix.h"
 #include "helicarm/geometry/triangulation.h"
 
 namespace helicarm::track {
@@ -48,7 +49,7 @@ Eigen::Vector3d extents(std::span<const Eigen::Vector3d> points) {
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& point : points) squares += (point - mean) * (point - mean).transpose();
   const Eigen::Vector3d values =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(squares / double(points.size())).eigenvalues();
+      geometry::symmetric_eigen(Eigen::Matrix3d(squares / double(points.size()))).values;
   return values.reverse().cwiseMax(0).cwiseSqrt();
 }
 
@@ -75,7 +76,7 @@ std::optional<PoseFit> fit_pose(const geometry::RigidTransform& start, std::span
       // About the prior's centre; a step about another centre moves that one too.
       RigidCovariance moves = RigidCovariance::Identity();
       moves.bottomLeftCorner<3, 3>() = -geometry::cross_matrix(prior->centre - centre);
-      const RigidCovariance weight = prior->covariance.inverse();
+      const RigidCovariance weight = geometry::inverse(prior->covariance);
       const RigidStep left =
           registration::step_about(fit.world_from_body, prior->world_from_body, prior->centre);
       information += moves.transpose() * weight * moves;
@@ -102,9 +103,8 @@ std::optional<PoseFit> fit_pose(const geometry::RigidTransform& start, std::span
       gradient += fit.weight[k] * slope.transpose() * weighted;
       fit.determining += fit.weight[k] > 0.1;
     }
-    const Eigen::SelfAdjointEigenSolver<RigidCovariance> parts(information);
-    if (!(parts.eigenvalues()[0] > 1e-9)) return std::nullopt;
-    fit.covariance = information.inverse();
+    if (!(geometry::symmetric_eigenvalues(information)[0] > 1e-9)) return std::nullopt;
+    fit.covariance = geometry::inverse(information);
     const RigidStep step = fit.covariance * gradient;
     if (!step.allFinite()) return std::nullopt;
     fit.world_from_body = registration::moved_about(fit.world_from_body, centre, step);
@@ -132,10 +132,10 @@ RigidCovariance covariance_of(const PoseFit& fit, std::span<const SeenMarker> ma
     if (!rows) continue;
     part.rows = std::move(*rows);
     const Eigen::MatrixXd slope = part.rows.by_point * part.by_step;
-    part.pull = slope.transpose() * part.rows.covariance.inverse();
+    part.pull = slope.transpose() * geometry::inverse(part.rows.covariance);
     information += part.pull * slope;
   }
-  const RigidCovariance inverse = information.inverse(), inverse_of_all = all.inverse();
+  const RigidCovariance inverse = geometry::inverse(information), inverse_of_all = geometry::inverse(all);
   const double variance = loose_mm * loose_mm;
   for (const Part& part : parts) {
     Eigen::Matrix<double, 6, 3> by_deviation = -inverse_of_all * part.by_step.transpose();

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 #include "helicarm/geometry/ray.h"
+#include "helicarm/geometry/small_matrix.h"
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/track/view_map.h"
 
@@ -62,8 +61,8 @@ std::optional<Eigen::Vector3d> start_of(const std::vector<RayOfBody>& rays) {
       normal += across / (each.sigma_px * each.sigma_px);
       right += across * (back * ray.origin) / (each.sigma_px * each.sigma_px);
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(normal);
-    if (parts.eigenvalues()[0] > 1e-4 * parts.eigenvalues()[2]) return normal.inverse() * right;
+    const Eigen::Vector3d values = geometry::symmetric_eigen(normal).values;
+    if (values[0] > 1e-4 * values[2]) return normal.inverse() * right;
   }
   return std::nullopt;
 }
@@ -98,8 +97,7 @@ std::optional<PlaceByRays> place_by_rays(const SequenceData& work, const BodyPla
       right += weight * slope.transpose() * off;
       made.determining += !ray.is_click;
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(normal);
-    if (!(parts.eigenvalues()[0] > 1 / (widest_mm * widest_mm))) return std::nullopt;
+    if (!(geometry::symmetric_eigen(normal).values[0] > 1 / (widest_mm * widest_mm))) return std::nullopt;
     made.place.covariance = normal.inverse();
     made.place.place += made.place.covariance * right;
   }

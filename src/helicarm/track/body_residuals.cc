@@ -6,6 +6,8 @@
 
 #include <Eigen/LU>
 
+#include "helicarm/geometry/dense_matrix.h"
+#include "helicarm/geometry/small_matrix.h"
 #include "helicarm/geometry/triangulation.h"
 
 namespace helicarm::track {
@@ -43,7 +45,7 @@ std::vector<Residuals> residuals_of(const SequenceData& work, const BodyPlan& pl
     }
     Eigen::MatrixXd covariance = loose_mm * loose_mm * by_point * by_point.transpose();
     covariance.diagonal() += variance;
-    made.weight = covariance.inverse();
+    made.weight = geometry::inverse(covariance);
     made.by_step = by_point * point_by_step(point, centre);
     all.push_back(std::move(made));
   }
@@ -71,7 +73,7 @@ void raise_to_residuals(SequenceData& work, const BodyPlan& plan, const Estimate
     if (all.size() < least_markers) continue;
     RigidCovariance information = RigidCovariance::Zero();
     for (const Residuals& of : all) information += of.by_step.transpose() * of.weight * of.by_step;
-    const RigidCovariance covariance = information.inverse();
+    const RigidCovariance covariance = geometry::inverse(information);
     if (!covariance.allFinite()) continue;
     for (const Residuals& of : all) {
       const Eigen::VectorXd pull = of.weight * of.off;

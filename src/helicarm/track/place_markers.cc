@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-
+#include "helicarm/geometry/small_matrix.h"
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/track/camera_errors.h"
 
@@ -16,7 +14,7 @@ namespace {
 constexpr double lost_mm = 5;  // a place that is less certain is none
 
 double largest_sigma(const Eigen::Matrix3d& covariance) {
-  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()[2]);
+  return std::sqrt(geometry::symmetric_eigen(covariance).values[2]);
 }
 
 /// Covariance by the cameras' own, common to all frames.
@@ -53,7 +51,7 @@ bool contradicts(const SightedPoint& point, const FramePlace& by_body) {
   constexpr double farthest_mm = 0.5, farthest_chi2 = 60;
   const Eigen::Vector3d off = point.place - by_body.place;
   const Eigen::Matrix3d spread = point.covariance + by_body.covariance;
-  return off.norm() > farthest_mm && off.dot(spread.ldlt().solve(off)) > farthest_chi2;
+  return off.norm() > farthest_mm && geometry::squared_distance(off, spread) > farthest_chi2;
 }
 
 /// Likewise for one image.
@@ -64,7 +62,7 @@ bool contradicts(const Sight& sight, const FramePlace& by_body) {
   Eigen::Matrix2d spread = slope * by_body.covariance * slope.transpose();
   spread.diagonal().array() += sight.sigma_px * sight.sigma_px;
   const Eigen::Vector2d off = sight.uv - sight.view->project(by_body.place);
-  return off.dot(spread.ldlt().solve(off)) > farthest_chi2;
+  return geometry::squared_distance(off, spread) > farthest_chi2;
 }
 
 /// A marker and the body that holds it.

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
-
+#include "helicarm/geometry/small_matrix.h"
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/track/sighted_point.h"
 #include "helicarm/track/tracker.h"
@@ -82,7 +81,7 @@ std::optional<PoseFit> Tracker::pose_of(const BodyState& body, const BodyPlan& p
     const auto at = fit_pose(pose, seen, prior, {.loose_mm = body.loose_mm, .iterations = 1});
     if (!at) return std::numeric_limits<double>::infinity();
     const RigidStep off = registration::step_about(pose, prior->world_from_body, prior->centre);
-    double cost = off.dot(prior->covariance.ldlt().solve(off));
+    double cost = geometry::squared_distance(off, prior->covariance);
     for (const double chi2 : at->chi2) cost += std::min(cut, chi2);
     return cost;
   };
