@@ -74,6 +74,15 @@ TEST(BoneSurface, ABoneThatIsCutOffHasNoSurfaceThere) {
   EXPECT_EQ(bone->crossings({0, 0, 0}, {0, 0, -1}, 40).size(), 1u);
 }
 
+TEST(BoneSurface, ABoneBesideTheVolumesFaceHasItsSurface) {
+  for (const int top : {12, 13, 20}) {
+    const auto bone = bone_surface(shelled_cube(0, top), std::nullopt, HuWindow{200, 3000});
+    const auto found = bone->crossings({0, 0, 0}, {0, 0, 1}, 40);
+    ASSERT_EQ(found.size(), 1u) << top;
+    EXPECT_NEAR(found[0].at_mm, 10, 0.15) << top;
+  }
+}
+
 TEST(BoneSurface, AShellInsideASurfaceIsACavity) {
   const auto ball = [](double radius) {
     return phantom::surface_of([radius](const Vector3d& p) { return p.norm() - radius; },

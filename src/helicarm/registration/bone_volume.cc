@@ -88,12 +88,25 @@ ByteGrid extreme(ByteGrid grid, const Vector3i& reach, bool largest) {
   return grid;
 }
 
+/// With a frame of this many voxels that continue those on its faces.
+ByteGrid framed(const ByteGrid& grid, const Vector3i& frame) {
+  ByteGrid larger = volume::byte_grid(grid.size + 2 * frame);
+  std::size_t i = 0;
+  larger.each([&](const Vector3i& at) {
+    const Vector3i within = (at - frame).cwiseMax(0).cwiseMin(grid.size - Vector3i::Ones());
+    larger.values[i++] = grid.values[grid.index(within)];
+  });
+  return larger;
+}
+
 void close_gaps(ByteGrid& bone, const Vector3d& spacing) {
   const Vector3i reach = (0.5 * closed_gap_mm / spacing.array()).round().cast<int>();
-  ByteGrid closed = extreme(bone, reach, true);
+  // What grows as far as a face without going on there is to shrink from it again.
+  ByteGrid closed = extreme(framed(bone, reach), reach, true);
   fill_cavities(closed);
   closed = extreme(std::move(closed), reach, false);
-  for (std::size_t i = 0; i < bone.values.size(); ++i) bone.values[i] |= closed.values[i];
+  std::size_t i = 0;
+  bone.each([&](const Vector3i& at) { bone.values[i++] |= closed.values[closed.index(at + reach)]; });
 }
 
 /// Takes away the edge voxels of which the CT shows that less than half is bone: a mask that was grown by a
