@@ -10,6 +10,7 @@
 
 #include "helicarm/segmentation/bones.h"
 #include "helicarm/segmentation/contacts.h"
+#include "helicarm/volume/axis_order.h"
 #include "helicarm/volume/hounsfield.h"
 
 namespace helicarm::segmentation {
@@ -185,6 +186,35 @@ Segmentation labelled(const volume::Volume& ct, Parts& parts, std::span<const Se
   return made;
 }
 
+Segmentation segmented(const volume::Volume& ct, std::span<const Seed> seeds, const SegmentOptions& options,
+                       const pipeline::Progress& progress) {
+  Parts parts = parts_of(ct, options, progress);
+  check_on_bone(ct, parts, seeds, options.neck);
+  const auto of_seeds = regions_of(ct, parts.work, seeds, parts.regions);
+  const auto narrowest = join_regions(parts, of_seeds, options.neck);
+  check_apart(parts, seeds, of_seeds);
+  progress.begin("label");
+  std::vector<std::uint8_t> label_of(parts.regions.joined.size(), 0);
+  Segmentation made = labelled(ct, parts, seeds, of_seeds, label_of);
+  check_sizes(ct, parts, made);
+  const std::vector<std::size_t> sizes = sizes_of(parts.regions);
+  add_left_out(made, parts.regions, label_of, sizes);
+  add_contacts(made, parts, label_of, sizes);
+  add_narrow_joins(made, parts, of_seeds, narrowest, options.neck);
+  add_held_by_gaps(ct, made);
+  return made;
+}
+
+void put_onto_grid(Segmentation& made, const volume::Volume& ct, const volume::AxisOrder& order) {
+  made.labels = volume::reordered(made.labels, made.size, order, ct.size);
+  made.size = ct.size;
+  made.patient_from_voxel = ct.patient_from_voxel;
+  for (Bone& bone : made.bones) {
+    const Vector3i a = order.turn * bone.low + order.first, b = order.turn * bone.high + order.first;
+    bone.low = a.cwiseMin(b), bone.high = a.cwiseMax(b);
+  }
+}
+
 }  // namespace
 
 Expected<Segmentation> segment(const volume::Volume& ct, std::span<const Seed> seeds,
@@ -192,20 +222,16 @@ Expected<Segmentation> segment(const volume::Volume& ct, std::span<const Seed> s
   return guarded([&] {
     value_or_throw(check_fields<SegmentOptions>(segment_fields, options, "segment"));
     check_seeds(ct, seeds);
-    Parts parts = parts_of(ct, options, progress);
-    check_on_bone(ct, parts, seeds, options.neck);
-    const auto of_seeds = regions_of(ct, parts.work, seeds, parts.regions);
-    const auto narrowest = join_regions(parts, of_seeds, options.neck);
-    check_apart(parts, seeds, of_seeds);
-    progress.begin("label");
-    std::vector<std::uint8_t> label_of(parts.regions.joined.size(), 0);
-    Segmentation made = labelled(ct, parts, seeds, of_seeds, label_of);
-    check_sizes(ct, parts, made);
-    const std::vector<std::size_t> sizes = sizes_of(parts.regions);
-    add_left_out(made, parts.regions, label_of, sizes);
-    add_contacts(made, parts, label_of, sizes);
-    add_narrow_joins(made, parts, of_seeds, narrowest, options.neck);
-    add_held_by_gaps(ct, made);
+    // The order of memory decides between equal depths: let it be the patient's, not the file's.
+    const volume::AxisOrder order = volume::order_to_patient(ct);
+    if (order.is_same()) return segmented(ct, seeds, options, progress);
+    const Vector3i size = order.turn.cwiseAbs() * ct.size;
+    Segmentation made = segmented({size,
+                                   volume::reordered(ct.voxels, ct.size, order, size),
+                                   ct.patient_from_voxel * order.inverse().affine(),
+                                   {}},
+                                  seeds, options, progress);
+    put_onto_grid(made, ct, order.inverse());
     return made;
   });
 }

@@ -94,8 +94,9 @@ double usual_threshold(const volume::Volume& ct);
 
 /// The bones at the seeds: voxels from a threshold on with the cavities they enclose, separated by a
 /// watershed on the distance to their surface, in which every other bone competes: where the neck between two
-/// parts is narrow in comparison with both close by. Time grows with the number of voxels, memory is 11 bytes
-/// for each beside the CT. Warns of contacts that are nearly as wide as a bone and of bones that are nearly
+/// parts is narrow in comparison with both close by. The axes' order and sense in memory change nothing. Time
+/// grows with the number of voxels, memory is 11 bytes for each beside the CT, and 4 where its axes run
+/// otherwise than L, P, S. Warns of contacts that are nearly as wide as a bone and of bones that are nearly
 /// two (bones_in_contact), notes bones that the volume cuts off (bone_cut_off). Fails with bad_value (name,
 /// threshold, a seed outside the volume), name_clash, seed_off_bone, seeds_in_one_bone.
 Expected<Segmentation> segment(const volume::Volume& ct, std::span<const Seed> seeds,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/segmentation/segment.h"
 
+#include <algorithm>
+#include <array>
 #include <limits>
 #include <stdexcept>
 
@@ -9,6 +11,8 @@
 
 #include "helicarm/segmentation/scene_test.h"
 #include "helicarm/simulation/knee.h"
+#include "helicarm/volume/axis_order.h"
+#include "helicarm/volume/label_map.h"
 
 namespace helicarm::segmentation {
 namespace {
@@ -57,6 +61,44 @@ TEST(Segment, EachClickIsABone) {
   EXPECT_EQ(made->bones[0].contacts.at(0).with, "lower");
   EXPECT_EQ(made->bones[1].contacts.at(0).with, "upper");
   EXPECT_EQ(made->bones[0].left_out_cm3, 0);
+}
+
+/// The same voxels in memory in another order: `axis` and `sign` for each axis in turn.
+volume::Volume stored_otherwise(const volume::Volume& ct, const std::array<int, 3>& axis,
+                                const Vector3d& sign) {
+  volume::AxisOrder order;
+  order.turn.setZero();
+  for (int k = 0; k < 3; ++k) order.turn(axis[std::size_t(k)], k) = int(sign[k]);
+  order.first = (-(order.turn * (ct.size.array() - 1).matrix())).cwiseMax(0);
+  const Eigen::Vector3i size = order.turn.cwiseAbs() * ct.size;
+  return {size,
+          volume::reordered(ct.voxels, ct.size, order, size),
+          ct.patient_from_voxel * order.inverse().affine(),
+          {}};
+}
+
+TEST(Segment, TheOrderOfTheAxesInMemoryChangesNothing) {
+  const volume::Volume& ct = plain_ct().volume;
+  const std::vector<Seed> seeds{on_upper, on_lower};
+  const auto usual = segment(ct, seeds, {});
+  ASSERT_TRUE(usual) << usual.error().message;
+  for (const std::array<int, 3>& axis : {std::array{0, 1, 2}, std::array{2, 0, 1}, std::array{0, 2, 1}})
+    for (const Vector3d& sign :
+         {Vector3d(-1, 1, 1), Vector3d(1, -1, 1), Vector3d(1, 1, -1), Vector3d(-1, -1, -1)}) {
+      volume::Volume other = stored_otherwise(ct, axis, sign);
+      const auto made = segment(other, seeds, {});
+      ASSERT_TRUE(made) << made.error().message;
+      EXPECT_EQ(made->patient_from_voxel.matrix(), other.patient_from_voxel.matrix());
+      EXPECT_EQ(made->bones[0].voxels, usual->bones[0].voxels);
+      EXPECT_LT((made->bones[0].centre - usual->bones[0].centre).norm(), 1e-9);
+      const Bone& bone = made->bones[1];
+      const Eigen::AlignedBox3d box = Eigen::AlignedBox3d(bone.low.cast<double>(), bone.high.cast<double>())
+                                          .transformed(other.patient_from_voxel);
+      EXPECT_TRUE(box.isApprox(bone.box, 1e-9));
+      other.voxels.assign(made->labels.begin(), made->labels.end());
+      ASSERT_TRUE(volume::onto_grid(other, ct));
+      EXPECT_TRUE(std::ranges::equal(other.voxels, usual->labels));
+    }
 }
 
 TEST(Segment, TheWaistOfAShaftIsNoJoint) {

@@ -7,6 +7,8 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "helicarm/volume/axis_order.h"
+
 namespace helicarm::volume {
 namespace {
 
@@ -61,20 +63,7 @@ bool onto_grid(Volume& map, const Volume& ct, bool may_be_part) {
   if (!is_whole && !(may_be_part && low.minCoeff() >= 0 && (end - high).minCoeff() >= 0)) return false;
   map.patient_from_voxel = ct.patient_from_voxel;
   if (is_whole && turn.isIdentity()) return true;
-  const std::ptrdiff_t row = ct.size.x(), slice = row * ct.size.y();
-  const auto step = [&](int axis) {
-    return std::ptrdiff_t(turn(0, axis)) + row * std::ptrdiff_t(turn(1, axis)) +
-           slice * std::ptrdiff_t(turn(2, axis));
-  };
-  const std::ptrdiff_t origin =
-      std::ptrdiff_t(first.x()) + row * std::ptrdiff_t(first.y()) + slice * std::ptrdiff_t(first.z());
-  std::vector<float> ordered(std::size_t(slice) * std::size_t(ct.size.z()));
-  std::size_t i = 0;
-  for (int z = 0; z < map.size.z(); ++z)
-    for (int y = 0; y < map.size.y(); ++y)
-      for (int x = 0; x < map.size.x(); ++x)
-        ordered[std::size_t(origin + x * step(0) + y * step(1) + z * step(2))] = map.voxels[i++];
-  map.voxels = std::move(ordered);
+  map.voxels = reordered(map.voxels, map.size, {turn.cast<int>(), first.cast<int>()}, ct.size);
   map.size = ct.size;
   return true;
 }
