@@ -60,7 +60,9 @@ bool onto_grid(Volume& map, const Volume& ct, bool may_be_part) {
   const Eigen::Vector3d low = first.cwiseMin(turn * last + first), high = first.cwiseMax(turn * last + first);
   const Eigen::Vector3d end = (ct.size.cast<double>().array() - 1).matrix();
   const bool is_whole = low == Eigen::Vector3d::Zero() && high == end;
-  if (!is_whole && !(may_be_part && low.minCoeff() >= 0 && (end - high).minCoeff() >= 0)) return false;
+  // One that begins with the CT's first voxel may only lack its own origin.
+  const bool may_be_cut_out = may_be_part || low != Eigen::Vector3d::Zero();
+  if (!is_whole && !(may_be_cut_out && low.minCoeff() >= 0 && (end - high).minCoeff() >= 0)) return false;
   map.patient_from_voxel = ct.patient_from_voxel;
   if (is_whole && turn.isIdentity()) return true;
   map.voxels = reordered(map.voxels, map.size, {turn.cast<int>(), first.cast<int>()}, ct.size);

@@ -15,8 +15,9 @@ namespace helicarm::volume {
 std::optional<std::map<int, std::size_t>> labels_in(const Volume& volume);
 
 /// Puts the voxels of a map in the order of the CT's where its axes are only exchanged or reversed (a NIfTI
-/// of a DICOM series): then its grid is the CT's. A map that `may_be_part` of the grid is filled up with 0.
-/// False, and the map as it was, if it lies on another grid.
+/// of a DICOM series): then its grid is the CT's. A map of a part of the grid, as 3D Slicer saves segments,
+/// is filled up with 0, from the CT's first voxel on only if it `may_be_part`. False, and the map as it was,
+/// if it lies on another grid.
 bool onto_grid(Volume& map, const Volume& ct, bool may_be_part = false);
 
 /// Refuses (bad_value) labels that a map lacks, with those that there are, and a volume that is no label map;

@@ -45,6 +45,23 @@ TEST(OntoGrid, AnotherGridIsLeftAsItIs) {
   EXPECT_EQ(shifted.patient_from_voxel.translation().x(), 1);
 }
 
+TEST(OntoGrid, AMapOfAPartIsFilledUp) {
+  const Volume ct{{3, 2, 4}, std::vector<float>(24), Eigen::Affine3d::Identity(), {}};
+  Volume part{{2, 1, 2}, {5, 6, 7, 8}, Eigen::Affine3d(Eigen::Translation3d(1, 1, 2)), {}};
+  const Volume given = part;
+  ASSERT_TRUE(onto_grid(part, ct));
+  EXPECT_EQ(part.size, ct.size);
+  std::vector<float> expected(24);
+  expected[16] = 5, expected[17] = 6, expected[22] = 7, expected[23] = 8;
+  EXPECT_EQ(part.voxels, expected);
+  part = given;
+  part.patient_from_voxel.translation().z() = 3;  // beyond the CT's end
+  EXPECT_FALSE(onto_grid(part, ct));
+  part.patient_from_voxel.translation().setZero();
+  EXPECT_FALSE(onto_grid(part, ct));
+  EXPECT_TRUE(onto_grid(part, ct, true));
+}
+
 TEST(LabelMap, LabelsAreCounted) {
   const auto labels = labels_in(row_of({0, 2, 2, 0, 7, 2}));
   ASSERT_TRUE(labels);
