@@ -189,8 +189,13 @@ Expected<Model> model_from(const std::string& name, const volume::Volume& volume
     whole.hardening = bone_hardening;
   }
   const auto bounds = bounds_of(whole);
-  if (!bounds)
-    return fail(Reason::bad_value, fmt::format("{}: no voxel is within the mask and window", name));
+  if (!bounds) {
+    const auto [least, greatest] = std::ranges::minmax(volume.voxels);
+    return fail(
+        Reason::bad_value,
+        fmt::format("{}: no voxel is within the mask and window; the volume's values are {:g} to {:g}", name,
+                    least, greatest));
+  }
   Model model;
   model.name = name;
   model.outlined = mask.has_value();

@@ -11,6 +11,7 @@ namespace {
 
 constexpr float least_span = 100;  // marrow and muscle in fat span this without any bone
 constexpr float most_of_a_byte = 255;
+constexpr float most_hu = 32767;  // of 16 bits; metal on a scanner's extended scale reaches 20000
 
 bool is_mask(const Volume& volume, float least, float greatest) {
   if (least != 0 || greatest <= 0 || greatest > most_of_a_byte || std::floor(greatest) != greatest)
@@ -39,10 +40,12 @@ Expected<std::vector<Warning>> check_hounsfield(const Volume& volume, const std:
                     "volume, and this as the model's mask",
                     origin, greatest));
   const bool narrow = greatest - least < least_span;
-  if (least < 0 && !narrow) return {};
-  const std::string why = least >= 0
-                              ? "nothing is below 0, as air, fat and noise are; " + guess(least, greatest)
-                              : fmt::format("they span less than {:g}", least_span);
+  if (least < 0 && !narrow && greatest <= most_hu) return {};
+  const std::string why =
+      least >= 0 ? "nothing is below 0, as air, fat and noise are; " + guess(least, greatest)
+      : narrow
+          ? fmt::format("they span less than {:g}", least_span)
+          : fmt::format("a CT's end at {:g}, metal included; their factor (Rescale Slope) is wrong", most_hu);
   return std::vector<Warning>{
       {Reason::not_hounsfield,
        fmt::format(

@@ -47,6 +47,11 @@ TEST(Hounsfield, Attenuations) { EXPECT_THAT(only_message({0, 0.02F, 0.05F}), Ha
 
 TEST(Hounsfield, SixteenBits) { EXPECT_THAT(only_message({200, 40000, 65535}), HasSubstr("convert them")); }
 
+TEST(Hounsfield, AWrongFactor) {
+  EXPECT_THAT(only_message({-1024, 9216, 39926}), HasSubstr("Rescale Slope"));
+  EXPECT_THAT(warnings_of({-1024, 40, 30710}), IsEmpty());
+}
+
 TEST(Hounsfield, AnImageAroundZero) {
   EXPECT_THAT(only_message({-1, 0, 1}), HasSubstr("span less than 100"));
 }

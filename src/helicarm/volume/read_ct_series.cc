@@ -202,6 +202,10 @@ void decode_slice(const Slice& slice, float* voxels, std::vector<Warning>& warni
   check_rescale_type(slice, outline.elements, warnings);
   const double slope =
       outline.elements.numbers(xray::tags::rescale_slope, 1, -1e6, 1e6).value_or(std::vector{1.0})[0];
+  if (!(slope > 0))
+    outline.elements.refuse(
+        Reason::bad_value, xray::tags::rescale_slope,
+        fmt::format("is {:g}, must be over 0: a CT's values rise with the density", slope));
   const double shift =
       outline.elements.numbers(xray::tags::rescale_intercept, 1, -1e6, 1e6).value_or(std::vector{0.0})[0];
   const image::Image<float> pixels = value_or_throw(xray::decode_frame(outline, 0));

@@ -127,6 +127,8 @@ TEST_F(CtSeries, InvalidSlicesAreRefused) {
   EXPECT_EQ(with(slice(1).erase(0x00200032)), Reason::bad_value);
   EXPECT_EQ(with(slice(1).text(0x00280030, "DS", "0\\0")), Reason::bad_value);
   EXPECT_EQ(with(slice(1).text(0x00281053, "DS", "nan")), Reason::bad_value);
+  EXPECT_EQ(with(slice(1).text(0x00281053, "DS", "0")), Reason::bad_value);
+  EXPECT_EQ(with(slice(1).text(0x00281053, "DS", "-2")), Reason::bad_value);
   EXPECT_EQ(with(slice(1).word(0x00280011, 4)), Reason::bad_size);
   EXPECT_EQ(with(slice(1).word(0x00280010, 600)), Reason::truncated);
   xray::DicomBuilder cut = slice(1);
