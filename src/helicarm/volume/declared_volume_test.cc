@@ -133,7 +133,8 @@ TEST_F(DeclaredVolume, MetaImageDistanceUnitsAreConverted) {
 }
 
 TEST_F(DeclaredVolume, MetaImageThatStatesOneThingTwice) {
-  const std::string place = "ElementType = MET_SHORT\nTransformMatrix = 1 0 0 0 1 0 0 0 1\n";
+  const std::string place =
+      "ElementType = MET_SHORT\nElementSpacing = 1 1 1\nTransformMatrix = 1 0 0 0 1 0 0 0 1\n";
   const Warning letters = warning(meta(place + "AnatomicalOrientation = LPI\n", four));
   EXPECT_EQ(letters.reason, Reason::irregular_file);
   EXPECT_THAT(letters.message, HasSubstr("RAI"));
@@ -143,16 +144,23 @@ TEST_F(DeclaredVolume, MetaImageThatStatesOneThingTwice) {
             Reason::bad_value);
 }
 
+TEST_F(DeclaredVolume, MetaImageWithoutTheVoxelsSize) {
+  const std::string type = "ElementType = MET_SHORT\n";
+  EXPECT_EQ(warning(meta(type, four)).reason, Reason::spacing_missing);
+  EXPECT_TRUE(read("a", meta(type + "ElementSize = 1 2 3\n", four))->warnings.empty());
+}
+
 TEST_F(DeclaredVolume, MetaImageIntensityFunctionIsAppliedAndSaid) {
   const std::string bytes = meta(
-      "ElementType = MET_SHORT\nElementToIntensityFunctionSlope = 2\nElementToIntensityFunctionOffset = -1\n",
+      "ElementType = MET_SHORT\nElementSpacing = 1 1 1\nElementToIntensityFunctionSlope = "
+      "2\nElementToIntensityFunctionOffset = -1\n",
       four);
   EXPECT_EQ(warning(bytes).reason, Reason::irregular_file);
   EXPECT_THAT(read("a", bytes)->voxels, ElementsAre(1, 3, -7, 7));
 }
 
 TEST_F(DeclaredVolume, DataBehindTheVoxelsAreWarnedOf) {
-  const std::string type = "ElementType = MET_SHORT\n";
+  const std::string type = "ElementType = MET_SHORT\nElementSpacing = 1 1 1\n";
   const auto surplus = [&](const std::string& bytes) {
     const Warning said = warning(bytes);
     EXPECT_EQ(said.reason, Reason::surplus_data) << said.message;

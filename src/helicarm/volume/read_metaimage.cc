@@ -150,7 +150,11 @@ Eigen::Affine3d place_of(const MetaHeader& header, std::vector<Warning>& warning
                         fmt::format("{} is {}, but the matrix of the axes is that of {}: the matrix is used",
                                     header.field("AnatomicalOrientation"), xray::quote(letters),
                                     letters_of(patient_from_index.linear()))});
-  if (!spacing.empty()) patient_from_index.linear() *= Vector3d::Map(spacing.data()).asDiagonal();
+  if (spacing.empty())
+    warnings.push_back({Reason::spacing_missing,
+                        header.field("ElementSpacing") + " is missing: voxels of 1 mm are assumed"});
+  else
+    patient_from_index.linear() *= Vector3d::Map(spacing.data()).asDiagonal();
   if (!offset.empty()) patient_from_index.translation() = Vector3d::Map(offset.data());
   return Eigen::Scaling(millimetres(header)) * patient_from_index;
 }
