@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/guidance/tunnel.h"
+
 namespace helicarm::case_registration {
 namespace {
 
@@ -59,6 +61,21 @@ void name_lines(const pipeline::Case& the_case, const pipeline::CaseModel& model
   }
 }
 
+void check_lengths(const MarkupPlan& plan, const pipeline::CaseModel& model) {
+  using guidance::longest_tunnel_mm, guidance::shortest_tunnel_mm;
+  for (const MarkupLine& line : plan.tunnels) {
+    const double length = (plan.points[line.end].in_model - plan.points[line.start].in_model).norm();
+    if (length >= shortest_tunnel_mm && length <= longest_tunnel_mm) continue;
+    throw BadInput(
+        {Reason::bad_tunnel,
+         fmt::format("{}: {}: \"{}\" is {:.3g} mm long, must be {} to {} mm{}", model.name,
+                     model.plan->filename().string(), line.name, length, shortest_tunnel_mm,
+                     longest_tunnel_mm, length < shortest_tunnel_mm ? ": is the plan in cm or m?" : ""),
+         {},
+         {{"length_mm", length}, {"limit_mm", longest_tunnel_mm}}});
+  }
+}
+
 }  // namespace
 
 std::vector<std::optional<MarkupPlan>> read_plans(const pipeline::Case& the_case) {
@@ -70,6 +87,7 @@ std::vector<std::optional<MarkupPlan>> read_plans(const pipeline::Case& the_case
     plans.emplace_back();
     if (!model.plan) continue;
     plans.back() = value_or_throw(read_plan(*model.plan));
+    check_lengths(*plans.back(), model);
     name_lines(the_case, model, *plans.back());
     for (const MarkupLine& tunnel : plans.back()->tunnels) {
       const std::string owner =

@@ -10,16 +10,16 @@
 namespace helicarm::case_registration {
 namespace {
 
-using testing::HasSubstr;
+using testing::HasSubstr, testing::Not;
 
 class CasePlans : public testing::Test {
  protected:
   /// A model whose plan has one line and one point.
-  void add_model(const char* name, const char* line, const char* point) {
+  void add_model(const char* name, const char* line, const char* point, double length_mm = 30) {
     const auto at = [](const char* label, double z) {
       return Json{{"label", label}, {"position", {1, 2, z}}};
     };
-    const Json ends = Json::array({at("1", 0), at("2", 30)}), points = Json::array({at(point, 5)});
+    const Json ends = Json::array({at("1", 0), at("2", length_mm)}), points = Json::array({at(point, 5)});
     const Json tunnel = {{"type", "Line"}, {"name", line}, {"controlPoints", ends}};
     const Json list = {{"type", "Fiducial"}, {"controlPoints", points}};
     const Json plan = {{"markups", Json::array({tunnel, list})}};
@@ -94,6 +94,17 @@ TEST_F(CasePlans, ATunnelOfTheCaseNamesALineAndGivesItsDiameter) {
   EXPECT_EQ(tunnel.name, "ACL");
   EXPECT_EQ(tunnel.diameter_mm, 8);
   EXPECT_EQ(tunnel.bridge_mm, 3);
+}
+
+TEST_F(CasePlans, ALineInMetresIsRefusedAndItsUnitAskedFor) {
+  add_model("femur", "one", "F-1", 0.03);
+  EXPECT_EQ(plans().error().reason, Reason::bad_tunnel);
+  EXPECT_THAT(
+      plans().error().message,
+      HasSubstr("femur: femur.mrk.json: \"one\" is 0.03 mm long, must be 1 to 200 mm: is the plan in cm"));
+  given_.models.clear();
+  add_model("femur", "one", "F-1", 300);
+  EXPECT_THAT(plans().error().message, Not(HasSubstr("cm")));
 }
 
 TEST_F(CasePlans, ATunnelOfNoLineOrOfALineOfAnotherIsRefused) {
