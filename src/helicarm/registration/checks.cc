@@ -25,6 +25,7 @@ constexpr int xx = 0, xy = 3, xz = 4;                            // of a strain
 constexpr int least_patches = 8, least_contour_points = 12;      // of a view
 constexpr double least_patch_score = 0.4;
 constexpr double least_contour_score = 0.6;
+constexpr double clearly_mirrored_ratio = 0.9;
 constexpr double least_mirrored_ratio = 1.02;  // of a nearly symmetric bone 1.05 to 1.1
 constexpr double least_runner_up_ratio = 1.1;
 constexpr double most_strain = 0.012;
@@ -297,6 +298,13 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
   const double reach = std::hypot(std::sqrt(3.0) * options.search.shift_mm,
                                   1.5 * model.radius_mm * options.search.turn_deg * EIGEN_PI / 180);
   const std::string wider = wider_search(options, result, nearest, reach);
+  const bool is_mirrored = result.mirrored_ratio && *result.mirrored_ratio < clearly_mirrored_ratio;
+  const std::string mirrored =
+      is_mirrored ? fmt::format(
+                        "; its mirror image fits better (cost ratio {:.2f}): left and right may be "
+                        "exchanged, or slices or an axis reversed",
+                        *result.mirrored_ratio)
+                  : "";
   const double least = model.surface ? least_contour_score : least_patch_score;
   for (const RegisteredView& view : result.views)
     if (view.score < least)
@@ -304,8 +312,8 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
              fmt::format(
                  "{}: the model explains {:.2f} of its edges in {}, at least {:.2f} are required: another "
                  "bone, patient or unit, exchanged cameras or images, a start too far away, or the model is "
-                 "hidden{}",
-                 model.name, view.score, view.name, least, wider),
+                 "hidden{}{}",
+                 model.name, view.score, view.name, least, mirrored, wider),
              {{"score", view.score}, {"limit", least}});
   if (!starts.empty() && nearest > reach)
     refuse(
@@ -318,7 +326,7 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
     refuse(Reason::wrong_model,
            fmt::format(
                "{}: the mirror image of the model fits {} (cost ratio {:.2f}, at least {:.2f} is required): "
-               "left and right may be exchanged",
+               "left and right may be exchanged, or slices or an axis reversed",
                model.name, *result.mirrored_ratio < 1 ? "better" : "almost as well", *result.mirrored_ratio,
                least_mirrored_ratio),
            {{"mirrored_ratio", *result.mirrored_ratio}, {"limit", least_mirrored_ratio}});

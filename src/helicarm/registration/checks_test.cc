@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "helicarm/core/random.h"
 
@@ -11,6 +11,7 @@ namespace helicarm::registration {
 namespace checks_test {
 
 using Eigen::Vector3d;
+using testing::HasSubstr, testing::Not;
 
 constexpr double radius_mm = 40;
 constexpr EdgeSigma stated{0.08, 0.04};
@@ -107,6 +108,26 @@ TEST(EdgeVariance, ASizeInCommonIsNoDifferenceBetweenTheViews) {
 
 TEST(EdgeVariance, AStrainThatTheSizeExplainsIsNoneOfTheEdges) {
   EXPECT_LT(ratio_of(0.15, 0.01), ratio_of(0.15));
+}
+
+/// Why a model is refused that explains a quarter of the edges, and whose mirror image's cost is this.
+std::string refusal_by(double mirrored_ratio) {
+  Model model;
+  model.name = "bone";
+  Registration result;
+  result.covariance = 1e-4 * RigidCovariance::Identity();
+  result.anywhere = true;
+  result.mirrored_ratio = mirrored_ratio;
+  result.views = {{"AP", 0.25, 0.5, {}, 100}};
+  decide(model, {}, {}, result);
+  return result.failure ? result.failure->message : "";
+}
+
+TEST(Decide, AMirroredModelThatExplainsLittleIsNamed) {
+  EXPECT_THAT(refusal_by(0.6), HasSubstr("explains 0.25 of its edges in AP"));
+  EXPECT_THAT(refusal_by(0.6), HasSubstr("its mirror image fits better (cost ratio 0.60)"));
+  // By chance the mirror image of another bone fits a little better.
+  EXPECT_THAT(refusal_by(0.97), Not(HasSubstr("mirror")));
 }
 
 }  // namespace checks_test
