@@ -162,6 +162,12 @@ Vector3d even_step(const std::vector<Slice>& slices, const std::string& origin) 
   std::ranges::sort(sorted);
   const double usual = sorted[sorted.size() / 2];
   const double allowed = std::max(uneven_mm, uneven_part * usual);
+  if (usual < 1e-3)
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("{}: most of the {} slices lie where another one does: copies of files, or several "
+                    "series or phases under one Series Instance UID; keep one of them in the folder",
+                    origin, slices.size()));
   for (std::size_t i = 0; i < gaps.size(); ++i)
     if (std::abs(gaps[i] - usual) > allowed || gaps[i] < 1e-3)
       throw BadInput(

@@ -61,6 +61,14 @@ TEST_F(CtSeries, MissingOrDuplicateSliceIsRefusedWithFigures) {
   EXPECT_EQ(read().error().reason, Reason::bad_value);
 }
 
+TEST_F(CtSeries, AllSlicesTwiceAreNamed) {
+  for (const double z : {0.0, 1.0, 2.0, 0.0, 1.0, 2.0}) put(slice(z));
+  const auto twice = read();
+  ASSERT_FALSE(twice.has_value());
+  EXPECT_EQ(twice.error().reason, Reason::bad_value);
+  EXPECT_THAT(twice.error().message, testing::HasSubstr("copies of files"));
+}
+
 TEST_F(CtSeries, LargestOfSeveralSeriesIsUsedWithAWarning) {
   for (const double z : {0.0, 1.0, 2.0}) put(slice(z));
   put(slice(0, "2.25.8"));
