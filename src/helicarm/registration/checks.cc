@@ -29,6 +29,7 @@ constexpr double clearly_mirrored_ratio = 0.9;
 constexpr double least_mirrored_ratio = 1.02;  // of a nearly symmetric bone 1.05 to 1.1
 constexpr double least_runner_up_ratio = 1.1;
 constexpr double most_strain = 0.012;
+constexpr double doubtful_strain = 0.008;         // of two or more views
 constexpr double most_strain_of_one_view = 0.05;  // what is not modelled passes for 3 to 4 % there
 constexpr double strain_sigmas = 2;
 constexpr double most_disagreement_mm = 0.5;
@@ -348,6 +349,14 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
                        model.name, 100 * std::abs(shape.strain), shape.strain > 0 ? "larger" : "smaller",
                        100 * shape.sigma, 100 * strain_limit),
            {{"strain", shape.strain}, {"sigma", shape.sigma}, {"limit", strain_limit}});
+  else if (result.views.size() > 1 && std::abs(shape.strain) > doubtful_strain &&
+           std::abs(shape.strain) > strain_sigmas * shape.sigma)
+    warn(Reason::scale_disagrees,
+         fmt::format("{}: the images ask for a model {:.1f} % {} along one direction (sigma {:.1f} %): check "
+                     "its voxel size, also the distance of the slices, and that it is this patient's",
+                     model.name, 100 * std::abs(shape.strain), shape.strain > 0 ? "larger" : "smaller",
+                     100 * shape.sigma),
+         {{"strain", shape.strain}, {"sigma", shape.sigma}, {"limit", doubtful_strain}});
   if (result.disagreement && result.disagreement->distance_mm > most_disagreement_mm &&
       result.disagreement->distance_mm > disagreement_sigmas * result.disagreement->sigma_mm)
     refuse(Reason::registration_disagrees,

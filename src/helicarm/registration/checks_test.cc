@@ -130,5 +130,26 @@ TEST(Decide, AMirroredModelThatExplainsLittleIsNamed) {
   EXPECT_THAT(refusal_by(0.97), Not(HasSubstr("mirror")));
 }
 
+Registration with_strain(const Deformation& deformation, std::size_t views) {
+  Registration result;
+  result.covariance = 1e-4 * RigidCovariance::Identity();
+  result.starts = result.agree = 2;
+  result.deformation = deformation;
+  result.views.assign(views, {"AP", 0.8, 0.5, {}, 100});
+  decide({}, {}, {}, result);
+  return result;
+}
+
+TEST(Decide, AStrainThatIsNotRefusedIsWarnedOf) {
+  const Registration warned = with_strain({-0.011, 0.0044}, 2);
+  ASSERT_EQ(warned.warnings.size(), 1U);
+  EXPECT_EQ(warned.decision, Decision::warn);
+  EXPECT_EQ(warned.warnings[0].reason, Reason::scale_disagrees);
+  EXPECT_THAT(warned.warnings[0].message, HasSubstr("1.1 % smaller along one direction"));
+  EXPECT_EQ(with_strain({-0.011, 0.0058}, 2).decision, Decision::accept);
+  EXPECT_EQ(with_strain({-0.0077, 0.003}, 2).decision, Decision::accept);
+  EXPECT_EQ(with_strain({-0.011, 0.0044}, 1).decision, Decision::accept);
+}
+
 }  // namespace checks_test
 }  // namespace helicarm::registration
