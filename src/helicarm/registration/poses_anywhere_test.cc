@@ -67,7 +67,13 @@ TEST(PosesAnywhere, OfASymmetricBodyAreRefusedAndListed) {
   const Model model = bone_of(volume);
   RigidTransform pose = true_pose();
   pose.translation = -(pose.rotation * model.centre);
-  const auto result = register_model(model, two_views(volume, pose), {}, two_threads());
+  RegistrationOptions options = two_threads();
+  std::vector<std::string> searches;
+  options.on_step = [&](std::string_view step) {
+    if (step.starts_with("search")) searches.emplace_back(step);
+  };
+  const auto result = register_model(model, two_views(volume, pose), {}, options);
+  EXPECT_THAT(searches, testing::ElementsAre("search anywhere", "search")) << "about what was found";
   ASSERT_TRUE(result.failure);
   EXPECT_THAT(result.failure->reason, testing::AnyOf(Reason::registration_ambiguous, Reason::wrong_model));
   ASSERT_EQ(result.alternatives.size(), 2U);

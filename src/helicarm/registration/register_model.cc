@@ -239,10 +239,11 @@ double worst_error_mm(const Model& model, const Registration& registration) {
 
 namespace {
 
-/// `anywhere`: `starts` limit only where the solution may lie; none: nowhere.
-Registration registered(const Model& model, const std::vector<RegistrationView>& views,
-                        const std::vector<RigidTransform>& starts, const RegistrationOptions& options,
-                        bool anywhere) {
+using Poses = std::vector<RigidTransform>;
+
+/// Searched about `from`, else over all poses. `starts` limit where the solution may lie; none: nowhere.
+Registration registered(const Model& model, const std::vector<RegistrationView>& views, const Poses& starts,
+                        const RegistrationOptions& options, const std::optional<Poses>& from, bool anywhere) {
   const auto begun = std::chrono::steady_clock::now();
   const auto step = [&](std::string_view name) {
     if (options.search.interrupt) options.search.interrupt();
@@ -250,9 +251,9 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
   };
   step("prepare");
   RegistrationProblem scene(model, views, options.threads);
-  step(anywhere ? "search anywhere" : "search");
+  step(from ? "search" : "search anywhere");
   const auto [stages, found] =
-      anywhere ? searched_anywhere(scene, options.search) : searched_about(scene, starts, options.search);
+      from ? searched_about(scene, *from, options.search) : searched_anywhere(scene, options.search);
   const Estimate& best = found.solutions.front();
   Registration result;
   result.name = model.name;
@@ -303,15 +304,31 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
   return result;
 }
 
+/// A search about a pose reaches farther than the last levels of one over all poses: what these missed lies
+/// about the poses that they found.
+Registration registered_anywhere(const Model& model, const std::vector<RegistrationView>& views,
+                                 const Poses& starts, const RegistrationOptions& options) {
+  Registration found = registered(model, views, starts, options, std::nullopt, true);
+  if (views.size() < 2 || options.search.candidates == 0 || !may_have_missed(found)) return found;
+  Poses from{found.world_from_model};
+  for (const Alternative& other : found.alternatives) from.push_back(other.world_from_model);
+  Registration again = registered(model, views, starts, options, from, true);
+  again.seconds += found.seconds;
+  if (!again.failure) return again;
+  found.seconds = again.seconds;
+  return found;
+}
+
 }  // namespace
 
 Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
                             const std::vector<RigidTransform>& starts, const RegistrationOptions& options) {
-  Registration result = registered(model, views, starts, options, starts.empty());
-  if (result.anywhere || views.size() < 2 || options.search.candidates == 0 ||
-      !options.search.anywhere_after_refusal || !may_have_missed(result))
+  if (starts.empty()) return registered_anywhere(model, views, starts, options);
+  Registration result = registered(model, views, starts, options, starts, false);
+  if (views.size() < 2 || options.search.candidates == 0 || !options.search.anywhere_after_refusal ||
+      !may_have_missed(result))
     return result;
-  Registration wider = registered(model, views, starts, options, true);
+  Registration wider = registered_anywhere(model, views, starts, options);
   wider.seconds += result.seconds;
   if (wider.failure) {
     result.seconds = wider.seconds;
