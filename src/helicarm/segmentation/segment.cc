@@ -188,6 +188,7 @@ Segmentation labelled(const volume::Volume& ct, Parts& parts, std::span<const Se
 
 Segmentation segmented(const volume::Volume& ct, std::span<const Seed> seeds, const SegmentOptions& options,
                        const pipeline::Progress& progress) {
+  check_seeds(ct, seeds);
   Parts parts = parts_of(ct, options, progress);
   check_on_bone(ct, parts, seeds, options.neck);
   const auto of_seeds = regions_of(ct, parts.work, seeds, parts.regions);
@@ -221,7 +222,6 @@ Expected<Segmentation> segment(const volume::Volume& ct, std::span<const Seed> s
                                const SegmentOptions& options, const pipeline::Progress& progress) {
   return guarded([&] {
     value_or_throw(check_fields<SegmentOptions>(segment_fields, options, "segment"));
-    check_seeds(ct, seeds);
     // The order of memory decides between equal depths: let it be the patient's, not the file's.
     const volume::AxisOrder order = volume::order_to_patient(ct);
     if (order.is_same()) return segmented(ct, seeds, options, progress);

@@ -101,6 +101,21 @@ TEST(Segment, TheOrderOfTheAxesInMemoryChangesNothing) {
     }
 }
 
+TEST(Segment, ASeedOnAFaceIsWithinOrNotWhateverTheOrderOfTheAxes) {
+  const volume::Volume& ct = plain_ct().volume;
+  const volume::Volume other = stored_otherwise(ct, {0, 1, 2}, {-1, -1, -1});
+  const Vector3d middle = 0.5 * (ct.size.cast<double>().array() - 1).matrix();
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double at : {-0.5, ct.size[axis] - 0.5}) {
+      Vector3d face = middle;
+      face[axis] = at;
+      const std::vector<Seed> seeds{{"face", ct.patient_from_voxel * face}};
+      const auto usual = segment(ct, seeds, {}), made = segment(other, seeds, {});
+      ASSERT_FALSE(usual || made);
+      EXPECT_EQ(usual.error().reason, made.error().reason) << axis << " " << at;
+    }
+}
+
 TEST(Segment, TheWaistOfAShaftIsNoJoint) {
   std::vector<TestBone> spheres;
   for (int z = -40; z <= 40; z += 4)
