@@ -61,18 +61,18 @@ void name_lines(const pipeline::Case& the_case, const pipeline::CaseModel& model
   }
 }
 
+/// Longer ones may be lines of a sequence's bodies.
 void check_lengths(const MarkupPlan& plan, const pipeline::CaseModel& model) {
-  using guidance::longest_tunnel_mm, guidance::shortest_tunnel_mm;
+  using guidance::shortest_tunnel_mm;
   for (const MarkupLine& line : plan.tunnels) {
     const double length = (plan.points[line.end].in_model - plan.points[line.start].in_model).norm();
-    if (length >= shortest_tunnel_mm && length <= longest_tunnel_mm) continue;
+    if (length >= shortest_tunnel_mm) continue;
     throw BadInput(
         {Reason::bad_tunnel,
-         fmt::format("{}: {}: \"{}\" is {:.3g} mm long, must be {} to {} mm{}", model.name,
-                     model.plan->filename().string(), line.name, length, shortest_tunnel_mm,
-                     longest_tunnel_mm, length < shortest_tunnel_mm ? ": is the plan in cm or m?" : ""),
+         fmt::format("{}: {}: \"{}\" is {:.3g} mm long, must be at least {} mm: is the plan in m?",
+                     model.name, model.plan->filename().string(), line.name, length, shortest_tunnel_mm),
          {},
-         {{"length_mm", length}, {"limit_mm", longest_tunnel_mm}}});
+         {{"length_mm", length}, {"limit_mm", shortest_tunnel_mm}}});
   }
 }
 
