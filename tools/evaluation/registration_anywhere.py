@@ -5,12 +5,13 @@
   tools/evaluation/registration_anywhere.py --cases 20 --rows anywhere.jsonl
   tools/evaluation/registration_anywhere.py --head --cases 20 --rows head.jsonl
 
-Knees, head and images are those of tools/evaluation/registration_protocol.py. Each case's volume and mask are turned by a rotation
-that is uniform over all of them, so that any orientation occurs. Right kinds: femur, tibia, head. Wrong ones: `mirrored` (femur),
-`mirrored_tibia`, `mirrored_head`, `patient` (the femur of one of twelve other knees), `patient_tibia`, `absent_femur` (images of the same knee
-without its femur: the other bone is all there is), `absent_tibia`. Error: rms over the corners of a box of 40 mm about the bone's
-end, of the head over points of the skull. False accept: not refused, and the error over 2 mm or the kind wrong. Exit code 1 if there is
-one. --rows keeps what is done; the same command goes on after an interruption. Needs NumPy."""
+Knees, head and images are those of tools/evaluation/registration_protocol.py. Each case's volume and mask are
+turned by a rotation that is uniform over all of them, so that any orientation occurs. Right kinds: femur, tibia,
+head. Wrong ones: `mirrored` (femur), `mirrored_tibia`, `mirrored_head`, `patient` (the femur of one of twelve other
+knees), `patient_tibia`, `absent_femur` (images of the same knee without its femur: the other bone is all there is),
+`absent_tibia`. Error: rms over the corners of a box of 40 mm about the bone's end, of the head over points of the
+skull. False accept: not refused, and the error over 2 mm or the kind wrong. Exit code 1 if there is one. --rows keeps
+what is done; the same command goes on after an interruption. Needs NumPy."""
 import argparse
 import json
 import math

@@ -21,6 +21,7 @@ SymmetricEigen3 symmetric_eigen(const Eigen::Matrix3d& matrix);
 /// Likewise, ascending.
 Vector6d symmetric_eigenvalues(const Matrix6d& matrix);
 
+/// Of any regular matrix.
 Matrix6d inverse(const Matrix6d& matrix);
 
 /// Squared Mahalanobis distance: offset^T covariance^-1 offset.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "helicarm/core/random.h"
 #include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::geometry {
@@ -11,8 +12,9 @@ namespace small_matrix_test {
 /// Symmetric, positive definite.
 template <int n>
 Eigen::Matrix<double, n, n> drawn() {
-  std::srand(5);
-  const Eigen::Matrix<double, n, n> any = Eigen::Matrix<double, n, n>::Random();
+  RandomStream random(5, n);
+  Eigen::Matrix<double, n, n> any;
+  for (double& value : any.reshaped()) value = random.normal();
   return any * any.transpose() + 0.1 * Eigen::Matrix<double, n, n>::Identity();
 }
 

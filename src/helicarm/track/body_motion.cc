@@ -171,8 +171,8 @@ void learn_deviations(const SequenceData& work, const BodyPlan& plan, const Sequ
     // Never less than the deviation alone; a marker with few frames has that of the body, twice.
     Eigen::Matrix3d spread = (at.counts[i] ? 4 * least : few_mm * few_mm) * Eigen::Matrix3d::Identity();
     if (at.counts[i] && own.count > int(few_frames)) {
-      const geometry::SymmetricEigen3 parts = geometry::symmetric_eigen(
-          (frames * (own.products - own.by_images) + prior_frames * spread) / (frames + prior_frames));
+      const geometry::SymmetricEigen3 parts = geometry::symmetric_eigen(Eigen::Matrix3d(
+          (frames * (own.products - own.by_images) + prior_frames * spread) / (frames + prior_frames)));
       spread = parts.vectors * parts.values.cwiseMax(least).asDiagonal() * parts.vectors.transpose();
     }
     spread *= (frames + prior_frames) / (frames + prior_frames - 2);  // Student: of few frames
@@ -231,30 +231,34 @@ void learn_shape(SequenceData& work, const BodyPlan& plan, Estimated& at, BodySe
 void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
                    Sequence& sequence) {
   constexpr double worst_turn_deg = 5, condition_limit = 150;
-  const auto sights = work.sights;
-  const auto warnings = std::ptrdiff_t(sequence.warnings.size());
-  learn_shape(work, plan, at, body, sequence);
-  pose_frames(work, plan, at, body);
-  auto odd = contradiction_of_first(work, plan, at, body);
-  if (odd) {
-    sequence.warnings.erase(sequence.warnings.begin() + warnings, sequence.warnings.end());
-    for (const std::size_t marker : plan.markers) {
-      for (std::size_t f = 0; f < work.frames; ++f) work.sights[f][marker] = sights[f][marker];
-      locate_marker(work, marker);
-    }
-    drop_contradicting(work, plan, sequence);
+  const auto first_warning = std::ptrdiff_t(sequence.warnings.size());
+  // Learning raises the sights' standard deviations.
+  std::vector<std::vector<std::vector<std::optional<Sight>>>> sights;  // [marker][frame][view]
+  for (const std::size_t marker : plan.markers)
+    for (auto& of = sights.emplace_back(); const auto& frame : work.sights) of.push_back(frame[marker]);
+  const auto learn = [&] {
     at = {};
     body = {};
     learn_shape(work, plan, at, body, sequence);
     pose_frames(work, plan, at, body);
-    odd = contradiction_of_first(work, plan, at, body);
+    return contradiction_of_first(work, plan, at, body);
+  };
+  auto odd = learn();
+  if (odd) {
+    sequence.warnings.erase(sequence.warnings.begin() + first_warning, sequence.warnings.end());
+    for (std::size_t i = 0; i < plan.markers.size(); ++i) {
+      for (std::size_t f = 0; f < work.frames; ++f) work.sights[f][plan.markers[i]] = sights[i][f];
+      locate_marker(work, plan.markers[i]);
+    }
+    drop_contradicting(work, plan, sequence);
+    odd = learn();
   }
   std::vector<Eigen::Vector3d> points;
   for (std::size_t i = 0; i < plan.markers.size(); ++i)
     if (at.counts[i] && at.shape.in_body[i]) points.push_back(*at.shape.in_body[i]);
   body.smoothed.assign(work.frames, {});
-  if (std::ranges::all_of(work.refused, [](const auto& reason) { return reason.has_value(); })) {
-    for (std::size_t f = 0; f < work.frames; ++f) body.smoothed[f].reason = work.refused[f];
+  if (sequence.failure) {
+    for (TrackedBody& frame : body.smoothed) frame.reason = sequence.failure->reason;
     return;
   }
   const auto refuse = [&](const std::string& why) {

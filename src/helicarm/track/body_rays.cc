@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/LU>
+
 #include "helicarm/geometry/ray.h"
 #include "helicarm/geometry/small_matrix.h"
 #include "helicarm/geometry/triangulation.h"

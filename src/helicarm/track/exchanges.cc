@@ -85,6 +85,26 @@ void take_first_names(SequenceData& work, std::vector<Shape>& shapes) {
   }
 }
 
+/// How far a body's markers are from one shape, rms, in all frames and in the first.
+struct Rigidity {
+  double rms_mm = 0, first_mm = 0;
+};
+
+Rigidity rigidity_of(const SequenceData& work, const BodyPlan& plan) {
+  const Shape shape = shape_of(work, plan, std::vector<char>(plan.markers.size(), 1));
+  double squares = 0, first = 0;
+  int count = 0, of_first = 0;
+  for (std::size_t f = 0; f < work.frames; ++f)
+    for (std::size_t i = 0; i < plan.markers.size(); ++i)
+      if (const auto& point = work.points[f][plan.markers[i]]; point && shape.poses[f] && shape.in_body[i]) {
+        squares +=
+            std::min(cut_mm * cut_mm, (point->place - *shape.poses[f] * *shape.in_body[i]).squaredNorm());
+        ++count;
+        if (f == 0) first = squares, of_first = count;
+      }
+  return {std::sqrt(squares / std::max(1, count)), std::sqrt(first / std::max(1, of_first))};
+}
+
 }  // namespace
 
 void repair_exchanges(SequenceData& work, Sequence& sequence) {
@@ -115,52 +135,48 @@ void repair_exchanges(SequenceData& work, Sequence& sequence) {
 std::optional<ExchangedNames> exchanged_names(const SequenceData& work) {
   constexpr double suspect_rms_mm = 0.1, explained_share = 0.15;  // of the mean squares
   constexpr std::size_t fewest = 4;  // of a body's markers: three fit many shapes
-  const auto rms_of = [&](const BodyPlan& plan) {
-    const std::vector<char> all(plan.markers.size(), 1);
-    const Shape shape = shape_of(work, plan, all);
-    double squares = 0;
-    int count = 0;
-    for (std::size_t f = 0; f < work.frames; ++f)
-      for (std::size_t i = 0; i < plan.markers.size(); ++i)
-        if (const auto& point = work.points[f][plan.markers[i]];
-            point && shape.poses[f] && shape.in_body[i]) {
-          squares +=
-              std::min(cut_mm * cut_mm, (point->place - *shape.poses[f] * *shape.in_body[i]).squaredNorm());
-          ++count;
-        }
-    return std::sqrt(squares / std::max(1, count));
-  };
   const auto& plans = work.the_case.bodies;
-  std::vector<double> now;
-  for (const BodyPlan& plan : plans) now.push_back(plan.markers.size() < fewest ? 0 : rms_of(plan));
+  std::vector<Rigidity> now;
+  for (const BodyPlan& plan : plans)
+    now.push_back(plan.markers.size() < fewest ? Rigidity{} : rigidity_of(work, plan));
+  const auto is_explained = [](const Rigidity& before, const Rigidity& after) {
+    // In the first frame too, whose discs lie at their picks: else others were followed later.
+    return after.rms_mm * after.rms_mm < explained_share * before.rms_mm * before.rms_mm &&
+           after.first_mm < before.first_mm;
+  };
+  std::optional<ExchangedNames> best;
+  double least = 0;
   for (std::size_t a = 0; a < plans.size(); ++a)
     for (std::size_t b = a + 1; b < plans.size(); ++b) {
-      if (now[a] < suspect_rms_mm || now[b] < suspect_rms_mm) continue;
+      if (now[a].rms_mm < suspect_rms_mm || now[b].rms_mm < suspect_rms_mm) continue;
       for (std::size_t i = 0; i < plans[a].markers.size(); ++i)
         for (std::size_t k = 0; k < plans[b].markers.size(); ++k) {
           BodyPlan first = plans[a], second = plans[b];
           std::swap(first.markers[i], second.markers[k]);
-          const double of_first = rms_of(first);
-          if (of_first * of_first > explained_share * now[a] * now[a]) continue;
-          const double of_second = rms_of(second);
-          if (of_second * of_second > explained_share * now[b] * now[b]) continue;
+          const Rigidity of_first = rigidity_of(work, first);
+          if (!is_explained(now[a], of_first)) continue;
+          const Rigidity of_second = rigidity_of(work, second);
+          if (!is_explained(now[b], of_second) || (best && of_first.rms_mm + of_second.rms_mm > least))
+            continue;
           const std::size_t one = plans[a].markers[i], other = plans[b].markers[k];
-          return ExchangedNames{
+          least = of_first.rms_mm + of_second.rms_mm;
+          best = {
               one,
               other,
               {Reason::markers_swapped,
-               fmt::format("\"{}\" of the body \"{}\" and \"{}\" of \"{}\" have each other's names in all "
-                           "frames: their markers "
-                           "move against each other by {:.2f} and {:.2f} mm rms, with the names exchanged by "
-                           "{:.2f} and {:.2f} "
-                           "mm: correct the names",
-                           work.the_case.markers[one], plans[a].name, work.the_case.markers[other],
-                           plans[b].name, now[a], now[b], of_first, of_second),
+               fmt::format(
+                   "\"{}\" of the body \"{}\" and \"{}\" of \"{}\" have each other's names in all frames: "
+                   "their "
+                   "markers move against each other by {:.2f} and {:.2f} mm rms, with the names exchanged by "
+                   "{:.2f} and {:.2f} mm: correct the names",
+                   work.the_case.markers[one], plans[a].name, work.the_case.markers[other], plans[b].name,
+                   now[a].rms_mm, now[b].rms_mm, of_first.rms_mm, of_second.rms_mm),
                {},
-               {{"rms_mm", std::max(now[a], now[b])}, {"exchanged_mm", std::max(of_first, of_second)}}}};
+               {{"rms_mm", std::max(now[a].rms_mm, now[b].rms_mm)},
+                {"exchanged_mm", std::max(of_first.rms_mm, of_second.rms_mm)}}}};
         }
     }
-  return std::nullopt;
+  return best;
 }
 
 }  // namespace helicarm::track

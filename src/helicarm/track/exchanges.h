@@ -10,6 +10,7 @@ namespace helicarm::track {
 /// `Sequence::repaired` and names them in a warning.
 void repair_exchanges(SequenceData& work, Sequence& sequence);
 
+/// Two markers, and why the sequence is refused.
 struct ExchangedNames {
   std::size_t first, second;
   Failure failure;

@@ -33,6 +33,13 @@ std::vector<Located> located_in(const SequenceData& work, const BodyPlan& plan, 
   return located;
 }
 
+/// By a person.
+bool is_corrected(const TrackCase& the_case, int frame, std::size_t marker) {
+  return std::ranges::any_of(the_case.corrections, [&](const MarkerPick& pick) {
+    return pick.marker == marker && pick.frame == frame;
+  });
+}
+
 bool agree(const Located& a, const Located& b, double limit_mm) {
   return std::abs((a.first - b.first).norm() - (a.now - b.now).norm()) < limit_mm;
 }
@@ -100,8 +107,8 @@ void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequ
   std::optional<std::size_t> first_untold;
   for (std::size_t f = 1; f < work.frames; ++f) {
     const std::vector<Located> located = located_in(work, plan, f);
-    if (located.empty()) continue;
-    auto set = agreeing(located, farthest_mm(work, located.front().now));
+    if (located.size() < 3) continue;  // the body's motion judges so few
+    const auto set = agreeing(located, farthest_mm(work, located.front().now));
     const bool is_told = set.size() >= 3;
     if (!is_told) {
       ++untold;
@@ -110,6 +117,7 @@ void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequ
     for (const Located& each : located) {
       if (is_told) ++odd[each.marker].seen;
       if (is_told && std::ranges::count(set, each.marker, &Located::marker) > 0) continue;
+      if (is_corrected(work.the_case, sequence.frames[f], plan.markers[each.marker])) continue;
       if (is_told && odd[each.marker].frames++ == 0) odd[each.marker].first = f;
       drop_sights(work, f, plan.markers[each.marker]);
     }
@@ -117,11 +125,11 @@ void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequ
   if (untold > 0)
     sequence.warnings.push_back(
         {Reason::marker_lost,
-         fmt::format("in {} frames, first in frame {}, fewer than three markers of the body \"{}\" are where "
-                     "frame {} has "
-                     "them beside each other: discs of other markers are followed there, and none counts; "
-                     "pick them there",
-                     untold, sequence.frames[*first_untold], plan.name, sequence.frames.front()),
+         fmt::format(
+             "in {} frames, first in frame {}, fewer than three markers of the body \"{}\" are where frame "
+             "{} "
+             "has them beside each other: other discs are followed there, and none counts; pick them there",
+             untold, sequence.frames[*first_untold], plan.name, sequence.frames.front()),
          {},
          {{"frames", double(untold)}, {"first", double(sequence.frames[*first_untold])}}});
   for (std::size_t i = 0; i < plan.markers.size(); ++i) {
@@ -131,13 +139,13 @@ void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequ
       for (std::size_t f = 0; f < work.frames; ++f) drop_sights(work, f, plan.markers[i]);
     sequence.warnings.push_back(
         {Reason::marker_lost,
-         fmt::format("the disc of \"{}\" is another's in {} of {} frames, first in frame {}: it is not where "
-                     "the body \"{}\" of frame {} has it, and does not count{}",
-                     work.the_case.markers[plan.markers[i]], odd[i].frames, odd[i].seen,
-                     sequence.frames[odd[i].first], plan.name, sequence.frames.front(),
-                     is_unknown ? "; nor do the others, as the pick in the first frame may be wrong as well: "
-                                  "pick it in these frames too"
-                                : "; pick it there"),
+         fmt::format("the disc of \"{}\" is not where frame {} has it in the body \"{}\" in {} of {} frames, "
+                     "first in frame {}, {}",
+                     work.the_case.markers[plan.markers[i]], sequence.frames.front(), plan.name,
+                     odd[i].frames, odd[i].seen, sequence.frames[odd[i].first],
+                     is_unknown ? "and counts in none: its pick may be wrong as well; correct it, or pick "
+                                  "the marker in these frames"
+                                : "and does not count there: pick it there"),
          {},
          {{"frames", double(odd[i].frames)}, {"first", double(sequence.frames[odd[i].first])}}});
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "helicarm/track/body_motion.h"
@@ -19,9 +20,9 @@ std::optional<OddMarker> contradiction_of_first(const SequenceData& work, const 
                                                 const Estimated& at, const BodySequence& body);
 
 /// Takes out the discs of later frames that are not where the first frame's shape has them beside the body's
-/// other markers, and warns of them. A marker of which most frames show another disc than the first does not
-/// count at all: either may be the right one. Frames in which fewer than three markers agree with the first
-/// show none of the body.
+/// other markers, unless a person picked them there, and warns of them. A marker of which most frames show
+/// another disc than the first does not count at all: either may be the right one. Where three or more are
+/// located and fewer agree with the first frame, none counts.
 void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequence);
 
 /// Of a body of three markers or more that has no pose, takes out the discs that nothing but themselves says

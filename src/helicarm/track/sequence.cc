@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/geometry/triangulation.h"
 #include "helicarm/track/body_motion.h"
 #include "helicarm/track/body_series.h"
 #include "helicarm/track/camera_errors.h"
@@ -87,12 +86,12 @@ void warn_of_lost_markers(const SequenceData& work, Sequence& sequence) {
     if (!lost.empty())
       sequence.warnings.push_back(
           {Reason::marker_lost,
-           fmt::format(
-               "\"{}\" is lost in {} of {} frames, first in frame {}: {}", work.the_case.markers[m],
-               lost.size(), work.frames, lost.front(),
-               never_placed
-                   ? "it is picked in one view only, which places nothing"
-                   : "hidden in both views for too long, or outside the images or their distortion maps"),
+           fmt::format("\"{}\" is lost in {} of {} frames, first in frame {}: {}", work.the_case.markers[m],
+                       lost.size(), work.frames, lost.front(),
+                       never_placed ? "it is picked in one view only, which places nothing"
+                                    : "hidden in both views for too long, outside the images or their "
+                                      "distortion maps, or its discs are "
+                                      "those of others"),
            {},
            {{"frames", double(lost.size())}, {"first", double(lost.front())}}});
   }

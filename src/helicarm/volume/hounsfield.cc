@@ -45,7 +45,8 @@ Expected<std::vector<Warning>> check_hounsfield(const Volume& volume, const std:
       least >= 0 ? "nothing is below 0, as air, fat and noise are; " + guess(least, greatest)
       : narrow
           ? fmt::format("they span less than {:g}", least_span)
-          : fmt::format("a CT's end at {:g}, metal included; their factor (Rescale Slope) is wrong", most_hu);
+          : fmt::format("a CT's end at {:g}, metal included: is their factor (in DICOM Rescale Slope) right?",
+                        most_hu);
   return std::vector<Warning>{
       {Reason::not_hounsfield,
        fmt::format(

@@ -152,7 +152,8 @@ Eigen::Affine3d place_of(const MetaHeader& header, std::vector<Warning>& warning
                                     letters_of(patient_from_index.linear()))});
   if (spacing.empty())
     warnings.push_back({Reason::spacing_missing,
-                        header.field("ElementSpacing") + " is missing: voxels of 1 mm are assumed"});
+                        header.field("ElementSpacing") +
+                            " is missing: 1 is assumed, in the file's unit (mm unless it says so)"});
   else
     patient_from_index.linear() *= Vector3d::Map(spacing.data()).asDiagonal();
   if (!offset.empty()) patient_from_index.translation() = Vector3d::Map(offset.data());
