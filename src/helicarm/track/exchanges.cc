@@ -164,13 +164,11 @@ std::optional<ExchangedNames> exchanged_names(const SequenceData& work) {
               one,
               other,
               {Reason::markers_swapped,
-               fmt::format(
-                   "\"{}\" of the body \"{}\" and \"{}\" of \"{}\" have each other's names in all frames: "
-                   "their "
-                   "markers move against each other by {:.2f} and {:.2f} mm rms, with the names exchanged by "
-                   "{:.2f} and {:.2f} mm: correct the names",
-                   work.the_case.markers[one], plans[a].name, work.the_case.markers[other], plans[b].name,
-                   now[a].rms_mm, now[b].rms_mm, of_first.rms_mm, of_second.rms_mm),
+               fmt::format("\"{}\" of the body \"{}\" and \"{}\" of \"{}\" have each other's names in all "
+                           "frames: their markers move against each other by {:.2f} and {:.2f} mm rms, with "
+                           "the names exchanged by {:.2f} and {:.2f} mm: correct the names",
+                           work.the_case.markers[one], plans[a].name, work.the_case.markers[other],
+                           plans[b].name, now[a].rms_mm, now[b].rms_mm, of_first.rms_mm, of_second.rms_mm),
                {},
                {{"rms_mm", std::max(now[a].rms_mm, now[b].rms_mm)},
                 {"exchanged_mm", std::max(of_first.rms_mm, of_second.rms_mm)}}}};

@@ -125,11 +125,10 @@ void drop_contradicting(SequenceData& work, const BodyPlan& plan, Sequence& sequ
   if (untold > 0)
     sequence.warnings.push_back(
         {Reason::marker_lost,
-         fmt::format(
-             "in {} frames, first in frame {}, fewer than three markers of the body \"{}\" are where frame "
-             "{} "
-             "has them beside each other: other discs are followed there, and none counts; pick them there",
-             untold, sequence.frames[*first_untold], plan.name, sequence.frames.front()),
+         fmt::format("in {} frames, first in frame {}, fewer than three markers of the body \"{}\" are where "
+                     "frame {} has them beside each other: other discs are followed there, and none counts; "
+                     "pick them there",
+                     untold, sequence.frames[*first_untold], plan.name, sequence.frames.front()),
          {},
          {{"frames", double(untold)}, {"first", double(sequence.frames[*first_untold])}}});
   for (std::size_t i = 0; i < plan.markers.size(); ++i) {
