@@ -103,6 +103,18 @@ def jpeg_2000(frame):
     return stream.getvalue()
 
 
+def compared(path, labels, place):
+    """Of a file of labels (i, j, k) that lie at `place`: largest distance in mm, voxels that differ. Slices may be read in either order."""
+    volume = helicarm.read_volume(path)
+    flipped = volume.affine[:3, 2] @ place[:3, 2] < 0
+    expected = place.copy()
+    if flipped:
+        expected[:3, 3] += place[:3, 2] * (labels.shape[2] - 1)
+        expected[:3, 2] *= -1
+    differ = volume.array != (labels[:, :, ::-1] if flipped else labels)
+    return apart(labels.shape, volume.affine, expected), int(differ.sum())
+
+
 def pydicom_writes_segmentations(folder, count=COUNT):
     """(files, largest distance in mm, voxels that differ): DICOM segmentations of one to four segments, without empty frames. A
     half of them compressed: packed bits in pydicom's RLE or deflated by zlib, pixels in JPEG 2000 by Pillow."""
@@ -157,14 +169,8 @@ def pydicom_writes_segmentations(folder, count=COUNT):
         if n % 6 >= 3:
             compressed_bits(pydicom, dataset, bits, n % 6 - 3)
             dataset.save_as(path, write_like_original=False)
-        volume = helicarm.read_volume(path)
-        flipped = volume.affine[:3, 2] @ place[:3, 2] < 0
-        expected = place.copy()
-        if flipped:
-            expected[:3, 3] += place[:3, 2] * (shape[2] - 1)
-            expected[:3, 2] *= -1
-        far = max(far, apart(shape, volume.affine, expected))
-        off = max(off, int((volume.array != (labels[:, :, ::-1] if flipped else labels)).sum()))
+        here, differing = compared(path, labels, place)
+        far, off = max(far, here), max(off, differing)
     return count, far, off
 
 
@@ -223,14 +229,8 @@ def pydicom_writes_label_maps(folder, count=70):
             plain, path = path, folder / f"c{n}.dcm"
             subprocess.run((["dcmcjpeg"], ["dcmcjpls"])[n % 7 - 4] + [str(plain), str(path)], check=True, capture_output=True)
             assert pydicom.dcmread(path).file_meta.TransferSyntaxUID != meta.TransferSyntaxUID
-        volume = helicarm.read_volume(path)
-        flipped = volume.affine[:3, 2] @ place[:3, 2] < 0
-        expected = place.copy()
-        if flipped:
-            expected[:3, 3] += place[:3, 2] * (shape[2] - 1)
-            expected[:3, 2] *= -1
-        far = max(far, apart(shape, volume.affine, expected))
-        off = max(off, int((volume.array != (labels[:, :, ::-1] if flipped else labels)).sum()))
+        here, differing = compared(path, labels, place)
+        far, off = max(far, here), max(off, differing)
     return count, far, off
 
 
