@@ -4,11 +4,11 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Cholesky>
 #include <Eigen/SparseCore>
 #include <opencv2/imgproc.hpp>
 
 #include "helicarm/core/random_vectors.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/image/opencv.h"
 
 namespace helicarm::study {
@@ -237,8 +237,8 @@ double centre_bound_px(const BallScene& scene, const BallTile& tile, const simul
       share.valueRef() *= std::sqrt(mean(share.col() % side, share.col() / side));
   const Eigen::SparseMatrix<double, Eigen::RowMajor> common = spread * spread.transpose();
   const Eigen::MatrixXd covariance = white * Eigen::MatrixXd::Identity(n, n) + Eigen::MatrixXd(common);
-  const Eigen::MatrixXd white_seen = covariance.llt().matrixL().solve(seen);
-  const Eigen::MatrixXd bound = (white_seen.transpose() * white_seen).inverse();
+  const Eigen::MatrixXd bound =
+      geometry::inverse(seen.transpose() * geometry::solve_spd(covariance, seen).solution);
   return std::sqrt(0.5 * (bound(0, 0) + bound(1, 1)));
 }
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "studies/cramer_rao.h"
 
-#include <Eigen/Cholesky>
-
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::study {
@@ -54,7 +53,7 @@ Eigen::Matrix<double, 2, 3> by_point(const geometry::View& view, const Vector3d&
 void accept(Eigen::MatrixXd& information, const std::vector<Numbers>& combination,
             const Eigen::MatrixXd& covariance) {
   if (covariance.size() == 0) return;
-  const Eigen::MatrixXd inverse = covariance.inverse();
+  const Eigen::MatrixXd inverse = geometry::inverse(covariance);
   for (Eigen::Index i = 0; i < inverse.rows(); ++i)
     for (Eigen::Index j = 0; j < inverse.cols(); ++j)
       information.block<numbers, numbers>(numbers * i, numbers * j) +=
@@ -101,10 +100,7 @@ Eigen::Matrix3d least_covariance(std::span<const geometry::View> views, std::spa
   accept(information, aspect, each(prior.aspect_sigma));
   accept(information, skew, each(prior.skew_sigma));
   const Eigen::VectorXd root = information.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd inverse =
-      (root.asDiagonal() * information * root.asDiagonal())
-          .ldlt()
-          .solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+  const Eigen::MatrixXd inverse = geometry::inverse(root.asDiagonal() * information * root.asDiagonal());
   return (root.asDiagonal() * inverse * root.asDiagonal()).bottomRightCorner<3, 3>();
 }
 

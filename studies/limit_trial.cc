@@ -5,13 +5,13 @@
 #include <numbers>
 #include <optional>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
 #include "helicarm/calibration/c_arm_history.h"
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/core/random_vectors.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/small_matrix.h"
 #include "helicarm/localization/locate.h"
 #include "helicarm/phantom/conical_helix.h"
 #include "helicarm/pipeline/prior.h"
@@ -198,7 +198,7 @@ LimitOutcomes try_once(const LimitSetting& setting, const std::vector<Vector3d>&
       const Vector3d error = point->point_in_anchor - truth;
       outcome.located = 1;
       outcome.error2 = error.squaredNorm();
-      outcome.covered = error.dot(point->covariance_in_anchor.ldlt().solve(error)) < chi2_95;
+      outcome.covered = geometry::squared_distance(error, point->covariance_in_anchor) < chi2_95;
     }
     if (const auto point = located(pixels, sigma, dlt))
       outcome.dlt2 = (point->point_in_anchor - truth).squaredNorm();

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "gui/scene/simulated_result_test.h"
+#include "helicarm/geometry/rotation.h"
 
 namespace helicarm::gui {
 namespace {
@@ -98,8 +99,7 @@ std::vector<LiveScene> flights() {
   const auto& points = simulated().truth.navigation->points;
   for (std::size_t start = 0; start + 1 < points.size(); start += 2) {
     const Vector3d from = points[start].in_calibrator, way = points[start + 1].in_calibrator - from;
-    const Eigen::Matrix3d turn =
-        Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), way).toRotationMatrix();
+    const Eigen::Matrix3d turn = geometry::rotation_between(Vector3d::UnitZ(), way);
     for (const double base_y : {520.0, -520.0})
       for (double depth = -250; depth <= way.norm(); depth += 25) {
         LiveScene live;

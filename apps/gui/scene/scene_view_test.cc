@@ -12,6 +12,7 @@
 
 #include "gui/scene/simulated_result_test.h"
 #include "helicarm/core/random.h"
+#include "helicarm/geometry/rotation.h"
 
 namespace helicarm::gui {
 namespace {
@@ -37,8 +38,7 @@ class ShownScene : public testing::Test {
     LiveScene live;
     const auto& points = simulated().truth.navigation->points;
     const Eigen::Vector3d end = points[1].in_calibrator, start = points[0].in_calibrator;
-    const Eigen::Matrix3d turn =
-        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), end - start).toRotationMatrix();
+    const Eigen::Matrix3d turn = geometry::rotation_between(Eigen::Vector3d::UnitZ(), end - start);
     live.calibrator_from_tip = geometry::RigidTransform{turn, start};
     live.calibrator_from_base = geometry::RigidTransform{
         (Eigen::Matrix3d() << 0, 1, 0, -1, 0, 0, 0, 0, 1).finished(), {60, 520, -160}};

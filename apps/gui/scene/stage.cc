@@ -14,6 +14,7 @@
 #include <vtk_glew.h>
 
 #include "gui/scene/palette.h"
+#include "helicarm/geometry/rotation.h"
 
 namespace helicarm::gui {
 namespace {
@@ -43,7 +44,7 @@ void add_triad(ShapeBuilder& shapes, double length_mm) {
 /// Maps the unit tube along z onto a link.
 geometry::RigidTransform along(const Segment& link) {
   const Vector3d way = link.to - link.from;
-  return {Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), way).toRotationMatrix(), link.from};
+  return {geometry::rotation_between(Vector3d::UnitZ(), way), link.from};
 }
 
 }  // namespace

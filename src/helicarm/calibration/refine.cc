@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/least_squares.h"
 
 namespace helicarm::calibration {

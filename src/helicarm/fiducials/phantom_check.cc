@@ -10,6 +10,7 @@
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/fiducials/label.h"
+#include "helicarm/geometry/rotation.h"
 
 namespace helicarm::fiducials {
 namespace {
@@ -27,8 +28,7 @@ Eigen::Vector3d direction(std::size_t index, std::size_t count) {
 geometry::View view_along(const phantom::Calibrator& calibrator, const Eigen::Vector3d& beam,
                           const PhantomCheckOptions& options) {
   const double focal = options.source_detector_mm / options.pixel_mm, middle = 0.5 * (options.size_px - 1);
-  const Eigen::Matrix3d rotation =
-      Eigen::Quaterniond::FromTwoVectors(beam, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Eigen::Matrix3d rotation = geometry::rotation_between(beam, Eigen::Vector3d::UnitZ());
   return {{focal, focal, middle, middle, 0},
           {rotation,
            Eigen::Vector3d(0, 0, options.source_calibrator_mm) - rotation * phantom::middle_of(calibrator)}};

@@ -40,6 +40,12 @@ SpdSolution solve_spd(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& righ
   return {factors.solve(right), is_positive ? factors.rcond() : 0.0};
 }
 
+std::optional<double> log_determinant(const Eigen::MatrixXd& matrix) {
+  const Eigen::LLT<Eigen::MatrixXd> root(matrix);
+  if (root.info() != Eigen::Success) return std::nullopt;
+  return 2 * root.matrixLLT().diagonal().array().log().sum();
+}
+
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix) { return matrix.inverse(); }
 
 Eigen::MatrixXd orthonormal_columns(const Eigen::MatrixXd& matrix) {

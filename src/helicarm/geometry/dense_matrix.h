@@ -48,6 +48,9 @@ struct SpdSolution {
 /// X of matrix X = right, with a symmetric positive definite matrix.
 SpdSolution solve_spd(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 
+/// Of a symmetric positive definite matrix; nothing if it is not.
+std::optional<double> log_determinant(const Eigen::MatrixXd& matrix);
+
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix);
 
 /// Orthonormal columns that span those of a matrix with at least as many rows as columns.

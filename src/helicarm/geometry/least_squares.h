@@ -6,8 +6,9 @@
 #include <type_traits>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
+
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::geometry {
 
@@ -25,7 +26,7 @@ struct NormalEquations {
   Step step(double damping) const {
     auto damped = information;
     damped.diagonal() *= 1 + damping;
-    return damped.ldlt().solve(gradient);
+    return solve_spd(damped, gradient).solution;
   }
   /// Decrease of chi2 that the undamped step predicts.
   double decrease(const Step& step) const { return gradient.dot(step); }

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double rigid_tolerance = 1e-3;
 constexpr double locked_cos_beta = 1e-9;
+constexpr double opposite = 1e-9;  // length of the sum of two unit vectors
 
 }  // namespace
 
@@ -59,6 +60,16 @@ Eigen::Vector3d vector_from_rotation(const Eigen::Matrix3d& rotation) {
   const double sine = q.vec().norm();
   const double scale = sine < 1e-8 ? 2 : 2 * std::atan2(sine, q.w()) / sine;
   return scale * q.vec();
+}
+
+Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  // Half a turn about `from`, then one about the direction between the two.
+  const auto half_turn = [](const Eigen::Vector3d& about) -> Eigen::Matrix3d {
+    return 2 * about * about.transpose() - Eigen::Matrix3d::Identity();
+  };
+  const Eigen::Vector3d start = from.normalized(), sum = start + to.normalized();
+  if (sum.norm() < opposite) return half_turn(start.unitOrthogonal());
+  return half_turn(sum.normalized()) * half_turn(start);
 }
 
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {

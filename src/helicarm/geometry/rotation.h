@@ -32,6 +32,10 @@ Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& vector);
 Eigen::Matrix3d rotation_from_vector(const Eigen::Vector3d& vector);
 Eigen::Vector3d vector_from_rotation(const Eigen::Matrix3d& rotation);
 
+/// The least rotation that turns the direction of `from` into that of `to`; of opposite ones, half a turn
+/// about any axis across them. Of any length but 0.
+Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 /// Nearest proper rotation (least squares).
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);
 

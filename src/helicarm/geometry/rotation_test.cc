@@ -74,6 +74,28 @@ TEST(RotationVector, FirstOrderIsTheCrossMatrix) {
   EXPECT_LT((rotation_from_vector(small) - Eigen::Matrix3d::Identity() - cross_matrix(small)).norm(), 2e-11);
 }
 
+TEST(RotationBetween, TurnsOneDirectionIntoTheOtherAboutWhatIsAcrossBoth) {
+  RandomStream random(8, 0);
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector3d from = random_vector(random, 3), to = random_vector(random, 0.2);
+    const Eigen::Matrix3d rotation = rotation_between(from, to);
+    expect_rotation(rotation);
+    EXPECT_LT((rotation * from.normalized() - to.normalized()).norm(), 1e-12);
+    EXPECT_LT((rotation * from.cross(to) - from.cross(to)).norm(), 1e-12);
+  }
+}
+
+TEST(RotationBetween, OfOneDirectionIsNoneAndOfOppositeOnesHalfATurn) {
+  const Eigen::Vector3d from(1, -2, 0.5);
+  EXPECT_LT((rotation_between(from, 3 * from) - Eigen::Matrix3d::Identity()).norm(), 1e-12);
+  for (const double aside : {0.0, 1e-12, 1e-8, 1e-5}) {
+    const Eigen::Vector3d to = -from.normalized() + aside * Eigen::Vector3d(2, 1, 0).normalized();
+    const Eigen::Matrix3d rotation = rotation_between(from, to);
+    expect_rotation(rotation);
+    EXPECT_LT((rotation * from.normalized() - to.normalized()).norm(), 1e-6);
+  }
+}
+
 Eigen::Matrix4d some_pose() {
   return RigidTransform{rotation_from_euler(0.3, -0.4, 2), Eigen::Vector3d(10, -20, 800)}.matrix();
 }

@@ -7,9 +7,10 @@
 #include <optional>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
+
+#include "helicarm/geometry/small_matrix.h"
 
 namespace helicarm::measures {
 namespace {
@@ -87,8 +88,8 @@ Expected<Measure> projected(Kind kind, std::span<const Landmark> landmarks, cons
 
 /// Square root of a covariance, by columns.
 Eigen::Matrix3d root_of(const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
-  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  const auto principal = geometry::symmetric_eigen(covariance);
+  return principal.vectors * principal.values.cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
 /// Adds what the error of the axis' ends contributes, by central differences over a standard deviation.

@@ -6,6 +6,8 @@
 
 #include <Eigen/Dense>
 
+#include "helicarm/geometry/dense_matrix.h"
+
 namespace helicarm::measures {
 namespace {
 
@@ -19,17 +21,16 @@ constexpr double in_degrees = 180 / std::numbers::pi;
 std::optional<Circle> algebraic_circle(std::span<const Vector2d> points) {
   Vector2d mean = Vector2d::Zero();
   for (const Vector2d& point : points) mean += point / double(points.size());
-  Eigen::MatrixX3d design(points.size(), 3);
+  Eigen::MatrixXd design(points.size(), 3);
   Eigen::VectorXd right(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vector2d p = points[i] - mean;
     design.row(Eigen::Index(i)) << 2 * p.x(), 2 * p.y(), 1;
     right[Eigen::Index(i)] = p.squaredNorm();
   }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixX3d> solver(design);
-  solver.setThreshold(1e-9);
-  if (solver.rank() < 3) return std::nullopt;
-  const Eigen::Vector3d found = solver.solve(right);
+  const auto solved = geometry::linear_least_squares(design, right);
+  if (!(solved.last_pivot > 1e-9)) return std::nullopt;
+  const Eigen::Vector3d found = solved.solution;
   const double square = found[2] + found.head<2>().squaredNorm();
   if (!(square > 0)) return std::nullopt;
   return Circle{mean + found.head<2>(), std::sqrt(square), 0};
@@ -50,10 +51,10 @@ std::optional<Eigen::Vector3d> step_of(Circle& circle, std::span<const Vector2d>
     sum += residual * residual;
   }
   circle.residual_rms = std::sqrt(sum / double(points.size()));
-  const Eigen::LDLT<Eigen::Matrix3d> solver(information);
+  const geometry::SpdSolution solved = geometry::solve_spd(information, gradient);
   constexpr double least_condition = 1e-12;
-  if (!(solver.rcond() > least_condition)) return std::nullopt;
-  return solver.solve(gradient);
+  if (!(solved.rcond > least_condition)) return std::nullopt;
+  return solved.solution;
 }
 
 }  // namespace

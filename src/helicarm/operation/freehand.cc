@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/reason_code.h"
+#include "helicarm/geometry/rotation.h"
 #include "helicarm/operation/guidance_description.h"
 
 namespace helicarm::operation {
@@ -62,7 +63,7 @@ geometry::RigidTransform mean_tip(std::span<const geometry::RigidTransform> tips
     direction += tip.rotation.col(2);
   }
   const Eigen::Matrix3d& newest = tips.back().rotation;
-  return {Eigen::Quaterniond::FromTwoVectors(newest.col(2), direction).toRotationMatrix() * newest, position};
+  return {geometry::rotation_between(newest.col(2), direction) * newest, position};
 }
 
 /// Of the mean of `averaged` poses.

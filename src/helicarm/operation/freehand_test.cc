@@ -86,8 +86,7 @@ TEST(FreehandGuide, DrillOnTheAxisIsOnTarget) {
 TEST(FreehandGuide, CorrectionByTheAimBringsTheDrillOnTheAxis) {
   const RigidTransform tip = femur_from_tip(3, 10, 0.1);
   const TunnelAim aim = *guide().at(at_rest(tip)).aim;
-  const RigidTransform correction{
-      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), aim.axis).toRotationMatrix(), aim.to_axis_mm};
+  const RigidTransform correction{geometry::rotation_between(Vector3d::UnitZ(), aim.axis), aim.to_axis_mm};
   const Guidance corrected = guide().at(at_rest(tip * correction));
   EXPECT_NEAR(corrected.aim->distance_mm, 0, 1e-6);
   EXPECT_NEAR(corrected.aim->angle_deg, 0, 1e-6);

@@ -80,8 +80,8 @@ TrackedTool tracked_tool(const tracker::HandEye& hand_eye, const robot::RobotToo
 
 TrackedTool tracked_tool(const HandDrill& drill) {
   const Vector3d along = drill.tip_in_tool - drill.back_in_tool;
-  const geometry::RigidTransform marker_from_tip{
-      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), along).toRotationMatrix(), drill.tip_in_tool};
+  const geometry::RigidTransform marker_from_tip{geometry::rotation_between(Vector3d::UnitZ(), along),
+                                                 drill.tip_in_tool};
   // Errors e_t, e_b of tip and back along the tip's axes turn the axis by w = z x (e_t - e_b) / length and
   // move a point x of the tip's frame by -e_t - w x x.
   const Eigen::Matrix3d turn = geometry::cross_matrix(Vector3d::UnitZ()) / along.norm();

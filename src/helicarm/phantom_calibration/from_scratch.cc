@@ -8,7 +8,7 @@
 #include <numbers>
 #include <tuple>
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
@@ -161,12 +161,12 @@ double orthographic_residual(const std::vector<std::array<Vector2d, 3>>& images,
   Eigen::Matrix<double, 6, 3> rows;
   for (Eigen::Index v = 0; v < 3; ++v)
     rows.middleRows<2>(2 * v) = scales[std::size_t(v)] * rotations[std::size_t(v)].topRows<2>();
-  const Eigen::LDLT<Matrix3d> solver(rows.transpose() * rows);
+  const Eigen::Matrix<double, 3, 6> inverse = (rows.transpose() * rows).inverse() * rows.transpose();
   double sum = 0;
   for (std::size_t i = 0; i < images.size(); ++i) {
     Eigen::Vector<double, 6> seen;
     seen << images[i][0], images[i][1], images[i][2];
-    const Vector3d point = solver.solve(rows.transpose() * seen);
+    const Vector3d point = inverse * seen;
     sum += (rows * point - seen).squaredNorm();
     if (points) points->col(Eigen::Index(i)) = point;
   }

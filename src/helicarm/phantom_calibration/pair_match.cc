@@ -7,8 +7,8 @@
 #include <set>
 #include <tuple>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include "helicarm/geometry/dense_matrix.h"
+#include "helicarm/geometry/small_matrix.h"
 
 namespace helicarm::phantom_calibration {
 namespace {
@@ -112,7 +112,7 @@ Eigen::Vector3d plane_of(const Turned& a, const Turned& b, const std::vector<std
     normal += row * row.transpose();
     right += row * b.across[k];
   }
-  return normal.ldlt().solve(right);
+  return geometry::solve_spd(normal, right).solution;
 }
 
 void assign_pairs(PairHypothesis& h, const std::vector<PlainCandidate>& a,
@@ -150,8 +150,8 @@ bool refit(PairHypothesis& h, const std::vector<PlainCandidate>& a, const std::v
   };
   for (const auto& m : h.matches) mean += row(m) / double(h.matches.size());
   for (const auto& m : h.matches) spread += (row(m) - mean) * (row(m) - mean).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(spread);
-  Eigen::Vector4d n = eigen.eigenvectors().col(0);  // n_a . a - n_b . b = constant
+  const auto eigen = geometry::symmetric_eigen(Eigen::MatrixXd(spread));
+  Eigen::Vector4d n = eigen.vectors.col(0);  // n_a . a - n_b . b = constant
   Vector2d n_a = n.head<2>(), n_b = -n.tail<2>();
   if (n_a.dot(along(h.angle_a)) < 0) n_a = -n_a, n_b = -n_b;
   if (n_a.norm() < 0.2 || n_b.norm() < 0.2 || n_b.dot(along(h.angle_b)) < 0) return false;
@@ -159,7 +159,7 @@ bool refit(PairHypothesis& h, const std::vector<PlainCandidate>& a, const std::v
   h.angle_b = std::atan2(n_b.y(), n_b.x());
   h.scale = n_a.norm() / n_b.norm();
   h.offset = (n_b.dot(mean.tail<2>()) - n_a.dot(mean.head<2>())) / n_b.norm();
-  h.rms_px = std::sqrt(std::max(0.0, eigen.eigenvalues()[0]) / double(h.matches.size()));
+  h.rms_px = std::sqrt(std::max(0.0, eigen.values[0]) / double(h.matches.size()));
   return std::abs(std::log(h.scale)) < 2 * largest_log_scale;
 }
 

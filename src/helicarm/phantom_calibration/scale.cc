@@ -3,10 +3,10 @@
 
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/phantom_calibration/gauge.h"
 
 namespace helicarm::phantom_calibration {
@@ -64,10 +64,10 @@ Expected<ScaledPoints> scaled_by(const std::vector<Vector3d>& centres, const Eig
   Eigen::MatrixXd covariance = factor * factor * rows * covariance_mm2 * rows.transpose();
   for (Eigen::Index k = 0; k < count; ++k)
     covariance(k, k) += distances[std::size_t(k)].sigma_mm * distances[std::size_t(k)].sigma_mm;
-  const Eigen::LDLT<Eigen::MatrixXd> weight(covariance);
-  factor = reckoned.dot(weight.solve(measured)) / reckoned.dot(weight.solve(reckoned));
+  const Eigen::MatrixXd weight = geometry::inverse(covariance);
+  factor = reckoned.dot(weight * measured) / reckoned.dot(weight * reckoned);
   const Eigen::VectorXd residual = measured - factor * reckoned;
-  const double chi2 = residual.dot(weight.solve(residual));
+  const double chi2 = residual.dot(weight * residual);
   const double limit = count > 1 ? chi2_quantile(double(count) - 1, normal_at_999) : 0;
   if (count > 1 && chi2 > limit) {
     Eigen::Index worst = 0;
@@ -86,11 +86,11 @@ Expected<ScaledPoints> scaled_by(const std::vector<Vector3d>& centres, const Eig
   Eigen::MatrixXd innovation = rows * gain_rows;
   for (Eigen::Index k = 0; k < count; ++k)
     innovation(k, k) += distances[std::size_t(k)].sigma_mm * distances[std::size_t(k)].sigma_mm;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(innovation);
-  const Eigen::VectorXd change = gain_rows * solver.solve(residual);
+  const Eigen::MatrixXd gain = gain_rows * geometry::inverse(innovation);
+  const Eigen::VectorXd change = gain * residual;
   for (std::size_t i = 0; i < centres.size(); ++i)
     scaled.centres[i] += change.segment<3>(3 * Eigen::Index(i));
-  scaled.covariance_mm2 -= gain_rows * solver.solve(gain_rows.transpose());
+  scaled.covariance_mm2 -= gain * gain_rows.transpose();
   scaled.covariance_mm2 = (scaled.covariance_mm2 + scaled.covariance_mm2.transpose()).eval() / 2;
   scaled.scale_sigma = scale_sigma_of(scaled.centres, scaled.covariance_mm2);
   scaled.chi2 = chi2;

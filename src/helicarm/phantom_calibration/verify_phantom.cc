@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/core/statistics.h"
 #include "helicarm/fiducials/candidates.h"
+#include "helicarm/geometry/small_matrix.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
 #include "helicarm/phantom_calibration/diameter_scale.h"
@@ -112,7 +112,7 @@ std::optional<Place> place_of(const BundleProblem& problem, std::size_t ball, st
   const double inflation = fit->dof > 0 ? std::max(1.0, fit->chi2 / fit->dof) : 1;
   Place place{fit->centres[ball] - problem.centres[ball], inflation * fit->covariance_mm2 + file_covariance,
               0, 0, shows_move(problem, fit->views, ball)};
-  place.chi2 = place.off.dot(place.covariance.ldlt().solve(place.off));
+  place.chi2 = geometry::squared_distance(place.off, place.covariance);
   for (const auto& [gap, image] : residuals_of(problem, fit->views, ball, fit->centres[ball]))
     place.gap_px = std::max(place.gap_px, gap);
   return place;

@@ -8,6 +8,7 @@
 #include <Eigen/Dense>
 
 #include "helicarm/core/statistics.h"
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::rectification {
 namespace {
@@ -80,7 +81,7 @@ std::optional<RoundField> ellipse_through(const RimPoints& points, const Eigen::
     normal += weights[Eigen::Index(i)] * row * row.transpose();
     right += weights[Eigen::Index(i)] * row;
   }
-  const Eigen::Vector4d k = normal.ldlt().solve(right);
+  const Eigen::Vector4d k = geometry::solve_spd(normal, right).solution;
   const Eigen::Array2d a(k[0], k[1]), b(k[2], k[3]);
   if (!(a.minCoeff() > 0)) return std::nullopt;
   const Eigen::Array2d centre = -b / (2 * a);

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <optional>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "helicarm/geometry/dense_matrix.h"
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/small_matrix.h"
 #include "helicarm/registration/covariance.h"
 
 namespace helicarm::registration {
@@ -76,25 +76,17 @@ struct PoseAndSize {
 /// The standard deviations of the model's size by which the own solutions agree best.
 double common_scale(const std::vector<OwnSolution>& own) { return PoseAndSize(own).solution()[6]; }
 
-/// Nothing where it is not positive definite.
-template <class Matrix>
-std::optional<double> log_determinant(const Matrix& matrix) {
-  const Eigen::LLT<Matrix> root(matrix);
-  if (root.info() != Eigen::Success) return std::nullopt;
-  return 2 * root.matrixLLT().diagonal().array().log().sum();
-}
-
 /// Log density of the differences between own solutions of one pose and size (restricted likelihood), up to a
 /// constant.
 std::optional<double> log_density_of_differences(const std::vector<OwnSolution>& own) {
   const PoseAndSize one(own);
   double doubled = one.squares - one.sum.dot(one.solution());
   for (const OwnSolution& each : own) {
-    const auto spread = log_determinant(each.covariance);
+    const auto spread = geometry::log_determinant(each.covariance);
     if (!spread) return std::nullopt;
     doubled += *spread;
   }
-  const auto known = log_determinant(one.information);
+  const auto known = geometry::log_determinant(one.information);
   return known ? std::optional(-(doubled + *known) / 2) : std::nullopt;
 }
 
@@ -158,7 +150,7 @@ Problem pose_and_strain(const Observation& observation, const ErrorModel& errors
   problem.prior.bottomRightCorner<6, 6>().diagonal().setConstant(unit / (strain_prior * strain_prior));
   if (errors.views.size() == 1) {
     const Vector3d ray = centre - errors.views.front().view.source_in_world();
-    axes = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitX(), ray).toRotationMatrix();
+    axes = geometry::rotation_between(Vector3d::UnitX(), ray);
     for (const int along_ray : {xx, xy, xz})
       problem.prior(6 + along_ray, 6 + along_ray) = unit / (no_strain * no_strain);
   }
@@ -187,15 +179,15 @@ double edge_variance_ratio(const Observation& observation, const ErrorModel& err
   std::vector<double> ratios, logs;
   for (int i = 0; i <= steps; ++i) {
     const double ratio = least_edge_ratio * std::pow(most_edge_ratio / least_edge_ratio, double(i) / steps);
-    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> root(other + ratio * edges);
-    if (root.info() != Eigen::Success) return 1;
-    const Eigen::Matrix<double, 6, 1> white = root.matrixL().solve(strain);
+    const geometry::Matrix6d covariance = other + ratio * edges;
+    const auto spread = geometry::log_determinant(covariance);
+    if (!spread) return 1;
     std::vector<OwnSolution> by_ratio;
     for (const OwnSolution& each : own) by_ratio.push_back(each.with_edges(ratio));
     const auto differences = log_density_of_differences(by_ratio);
     if (!differences) return 1;
     ratios.push_back(ratio);
-    logs.push_back(*differences - root.matrixLLT().diagonal().array().log().sum() - white.squaredNorm() / 2);
+    logs.push_back(*differences - (*spread + geometry::squared_distance(strain, covariance)) / 2);
   }
   double sum = 0, weights = 0;
   for (std::size_t i = 0; i < logs.size(); ++i) {
@@ -213,17 +205,17 @@ Deformation deformation_of(const Observation& observation, const ErrorModel& err
   Eigen::Matrix3d strain;
   const auto e = step.tail<6>();
   strain << e[0], e[3] / 2, e[4] / 2, e[3] / 2, e[1], e[5] / 2, e[4] / 2, e[5] / 2, e[2];
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(strain);
+  const auto principal = geometry::symmetric_eigen(strain);
   Eigen::Index largest = 0;
-  principal.eigenvalues().cwiseAbs().maxCoeff(&largest);
-  const Vector3d a = principal.eigenvectors().col(largest);
+  principal.values.cwiseAbs().maxCoeff(&largest);
+  const Vector3d a = principal.vectors.col(largest);
   Eigen::Matrix<double, 6, 1> along;
   along << a[0] * a[0], a[1] * a[1], a[2] * a[2], a[0] * a[1], a[0] * a[2], a[1] * a[2];
   const MatrixXd covariance = errors.covariance(observation, centre, problem, both);
   // A shift common to a view's edges is no strain; one of some of them is.
   const double floor = errors.edge.shift_mm / errors.radius_mm;
   return {
-      principal.eigenvalues()[largest],
+      principal.values[largest],
       std::hypot(std::sqrt(std::max(0.0, along.dot(covariance.bottomRightCorner<6, 6>() * along))), floor)};
 }
 

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 #include "helicarm/geometry/dense_matrix.h"
+#include "helicarm/geometry/small_matrix.h"
 
 namespace helicarm::registration {
 namespace {
@@ -170,10 +169,10 @@ double local_shift_px(const ViewObservation& view, const geometry::View& camera,
     const Eigen::Matrix2d information =
         shifts.transpose() * comparison.information.topLeftCorner<12, 12>() * shifts;
     const Eigen::Vector2d gradient = shifts.transpose() * comparison.gradient.head<12>();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(information);
-    const double strength = axes.eigenvalues()[1];
+    const auto axes = geometry::symmetric_eigen(information);
+    const double strength = axes.values[1];
     if (!(strength > 0)) continue;
-    const double shift = axes.eigenvectors().col(1).dot(gradient) / strength;
+    const double shift = axes.vectors.col(1).dot(gradient) / strength;
     sum += strength * shift * shift;
     weights += strength;
   }

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
 #include "helicarm/core/parallel.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/registration/contour.h"
 #include "helicarm/registration/patches.h"
 
@@ -136,7 +135,7 @@ Estimate refine(const RegistrationProblem& scene, const Level& level, const geom
     damped.diagonal() *= 1 + damping;
     // Without information along a direction there is no step along it.
     damped.diagonal().array() += 1e-9 * damped.diagonal().maxCoeff() + 1e-30;
-    RigidStep step = damped.ldlt().solve(equations.gradient);
+    RigidStep step = geometry::solve_spd(damped, equations.gradient).solution;
     if (!step.allFinite()) break;
     const double length = std::hypot(step.tail<3>().norm(), model.radius_mm * step.head<3>().norm());
     const double longest = 4 * (level.contour ? level.reach * level.spacing_mm / 4 : level.spacing_mm);

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <numeric>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
 #include "helicarm/geometry/absolute_pose.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/small_matrix.h"
 
 namespace helicarm::registration {
 namespace {
@@ -142,7 +142,7 @@ std::pair<Vector3d, Vector3d> plane_of(const std::vector<Vector3d>& points) {
   const Vector3d middle = geometry::mean_of(points);
   Matrix3d spread = Matrix3d::Zero();
   for (const Vector3d& point : points) spread += (point - middle) * (point - middle).transpose();
-  return {middle, Eigen::SelfAdjointEigenSolver<Matrix3d>(spread).eigenvectors().col(0)};
+  return {middle, geometry::symmetric_eigen(spread).vectors.col(0)};
 }
 
 }  // namespace

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/small_matrix.h"
 
 namespace helicarm::registration {
 namespace {
@@ -38,8 +38,7 @@ Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& l
     spread += (landmark.in_model - model_mean) * (landmark.in_model - model_mean).transpose() / n;
     world_spread += (landmark.in_world - world_mean).squaredNorm() / n;
   }
-  const double aside =
-      std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Matrix3d>(spread).eigenvalues()[1]));
+  const double aside = std::sqrt(std::max(0.0, geometry::symmetric_eigen(spread).values[1]));
   if (aside < least_spread_mm) {
     const double ratio = std::sqrt(world_spread / spread.trace());
     return fail(
@@ -73,7 +72,7 @@ Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& l
   result.fre_mm = std::sqrt(result.fre_mm);
   // <FRE^2> = (1 - 2/n) <FLE^2>.
   result.fle_mm = std::sqrt(std::max(stated, result.fre_mm * result.fre_mm / (1 - 2 / n)));
-  const RigidCovariance inverse = information.inverse();
+  const RigidCovariance inverse = geometry::inverse(information);
   const Eigen::MatrixXd gain = inverse * by_cameras;
   result.covariance =
       result.fle_mm * result.fle_mm / 3 * inverse + gain * camera_covariance * gain.transpose();

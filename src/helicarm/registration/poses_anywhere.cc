@@ -6,13 +6,13 @@
 #include <cmath>
 #include <optional>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/core/statistics.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/ray.h"
 
 namespace helicarm::registration {
@@ -234,7 +234,7 @@ Vector3d middle_of(const std::vector<RegistrationView>& views) {
     across += off;
     sum += off * ray.origin;
   }
-  return across.ldlt().solve(sum);
+  return geometry::solve_spd(across, sum).solution;
 }
 
 /// From the views' middle, along each axis: the places of a small model lie closer together, and their number

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/random_vectors.h"
+#include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/rehearsal/ct_plan.h"
@@ -182,7 +183,7 @@ void drill_by_guidance(operation::Operation& operation, virtual_devices::HeldDri
       throw BadInput(Reason::off_target, fmt::format("the tunnel was not drilled in {} s; last decision: {}",
                                                      drilling_patience.count(), shown.decision()));
     if (const auto& aim = shown.aim) {
-      const Eigen::AngleAxisd turn(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), aim->axis));
+      const Eigen::AngleAxisd turn(geometry::rotation_between(Eigen::Vector3d::UnitZ(), aim->axis));
       const double way_mm = shown.why_not ? 0 : advance_mm;
       drill.correct({Eigen::AngleAxisd(part * turn.angle(), turn.axis()).toRotationMatrix(),
                      part * aim->to_axis_mm + way_mm * aim->axis},

@@ -2,8 +2,9 @@
 #include "helicarm/sweep/chain.h"
 
 #include <cmath>
+#include <limits>
 
-#include <Eigen/Cholesky>
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::sweep {
 
@@ -12,9 +13,10 @@ Chain::Chain(std::vector<ChainMatrix> diagonal, std::vector<ChainMatrix> next) :
     if (i > 0) diagonal[i] -= next_[i - 1].transpose() * inverse_[i - 1] * next_[i - 1];
     // Scaled to a unit diagonal: the parameters' units differ by many orders.
     const ChainVector root = diagonal[i].diagonal().cwiseSqrt().cwiseInverse();
-    const Eigen::LLT<ChainMatrix> llt(root.asDiagonal() * diagonal[i] * root.asDiagonal());
-    inverse_.push_back(root.asDiagonal() * llt.solve(ChainMatrix::Identity()) * root.asDiagonal());
-    log_determinant_ += 2 * (llt.matrixLLT().diagonal().array().log().sum() - root.array().log().sum());
+    const Eigen::MatrixXd unit = root.asDiagonal() * diagonal[i] * root.asDiagonal();
+    inverse_.emplace_back(root.asDiagonal() * geometry::inverse(unit) * root.asDiagonal());
+    log_determinant_ += geometry::log_determinant(unit).value_or(std::numeric_limits<double>::quiet_NaN()) -
+                        2 * root.array().log().sum();
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/triangulation.h"
 
 namespace helicarm::sweep {
@@ -14,7 +15,7 @@ namespace {
 using geometry::View;
 
 geometry::RigidTransform box_at(const Eigen::Vector3d& middle, const Eigen::Vector3d& along) {
-  return {Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), along).toRotationMatrix(), middle};
+  return {geometry::rotation_between(Eigen::Vector3d::UnitZ(), along), middle};
 }
 
 /// A ball's box, without its neighbours.

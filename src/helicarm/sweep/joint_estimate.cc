@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numeric>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "helicarm/calibration/view_problem.h"
@@ -253,7 +252,7 @@ void set_best(SweepFrame& frame, const Joint& joint, std::size_t i, const Camera
   calibration::CalibratedView best = *frame.alone;
   best.view = view_of(joint.at[i], detector);
   best.dlt = geometry::factors_from_projection(best.view.projection());
-  const auto by = parameters_by_deviation(joint.at[i], reference, detector);
+  const Eigen::MatrixXd by = parameters_by_deviation(joint.at[i], reference, detector);
   best.covariance = by * covariance * by.transpose();
   const FramePoints& points = joint.points[i];
   Eigen::MatrixX2d off(points.points.size(), 2);
@@ -290,7 +289,7 @@ Eigen::Vector3d nearest_to_rays(const std::vector<PlacedCamera>& cameras, std::s
     sum += across;
     right += across * cameras[i].source;
   }
-  return sum.ldlt().solve(right);
+  return geometry::solve_spd(sum, right).solution;
 }
 
 /// Isocentre with the standard deviation of a jackknife over blocks of neighbouring frames.

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include "helicarm/calibration/centred_view.h"
@@ -75,7 +74,7 @@ Vector3d centre_of_turn(const std::vector<PlacedCamera>& cameras, const Vector3d
       gradient += by.transpose() * (weighted * ((is_source ? camera.source : camera.detector) - near));
     }
   }
-  const Vector3d shift = information.ldlt().solve(gradient).head<3>();
+  const Vector3d shift = geometry::solve_spd(information, gradient).solution.topRows<3>();
   return near + shift - axis * axis.dot(shift);
 }
 
@@ -124,7 +123,7 @@ Eigen::MatrixXd pixels_by_deviation(const FramePoints& frame, const PlacedCamera
 Eigen::MatrixXd solved(const CameraMatrix& information, const Eigen::MatrixXd& right) {
   const CameraVector root = information.diagonal().cwiseSqrt().cwiseInverse();
   const CameraMatrix unit = root.asDiagonal() * information * root.asDiagonal();
-  return root.asDiagonal() * unit.ldlt().solve(root.asDiagonal() * right);
+  return root.asDiagonal() * geometry::solve_spd(unit, root.asDiagonal() * right).solution;
 }
 
 /// Change of the frame's value by errors of its pixels, 2 x `columns` of each.

@@ -4,10 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/sweep/chain.h"
 
 namespace helicarm::sweep {
@@ -16,6 +15,7 @@ namespace {
 // Of a step along the path: frames of a gantry that rests share a node, as shorter steps are all but rigid,
 // and their information would hide the frames'.
 constexpr double least_step_deg = 0.05;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 // Of the path's first value (mm, mm, rad) and rate per degree: far beyond any C-arm's flex.
 constexpr std::array first_sigma{100.0, 100.0, 0.5};
 constexpr std::array rate_sigma{5.0, 5.0, 0.05};
@@ -26,14 +26,14 @@ CameraVector by_group(const Eigen::Vector3d& of_group) {
 
 CameraMatrix inverse_of(const CameraMatrix& matrix) {
   const CameraVector root = matrix.diagonal().cwiseSqrt().cwiseInverse();
-  const CameraMatrix unit = root.asDiagonal() * matrix * root.asDiagonal();
-  return root.asDiagonal() * unit.ldlt().solve(CameraMatrix::Identity()) * root.asDiagonal();
+  const Eigen::MatrixXd unit = root.asDiagonal() * matrix * root.asDiagonal();
+  return root.asDiagonal() * geometry::inverse(unit) * root.asDiagonal();
 }
 
 double log_determinant(const CameraMatrix& matrix) {
   const CameraVector root = matrix.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::LLT<CameraMatrix> llt(root.asDiagonal() * matrix * root.asDiagonal());
-  return 2 * (llt.matrixLLT().diagonal().array().log().sum() - root.array().log().sum());
+  const CameraMatrix unit = root.asDiagonal() * matrix * root.asDiagonal();
+  return geometry::log_determinant(unit).value_or(nan) - 2 * root.array().log().sum();
 }
 
 /// A frame's jitter about the path: its information, without any on the turn.
@@ -246,16 +246,17 @@ SmoothPath smooth_path(const std::vector<PathObservation>& frames, const PathPri
     point.camera = about * frame.information * frame.value + to_path * point.path;
     point.camera_covariance = about + to_path * point.path_covariance * to_path.transpose();
     // The others' path: this frame's information taken from the node.
-    ChainMatrix without = covariance.inverse();
+    const ChainMatrix information = geometry::inverse(Eigen::MatrixXd(covariance));
+    ChainMatrix without = information;
     without.topLeftCorner<camera_size, camera_size>() -= problem.on_path[i];
-    const ChainMatrix of_others = without.inverse();
-    const ChainVector at = of_others * (covariance.inverse() * path[i].col(0) -
-                                        on_chain(problem.on_path[i] * frame.value).col(0));
+    const ChainMatrix of_others = geometry::inverse(Eigen::MatrixXd(without));
+    const ChainVector at =
+        of_others * (information * path[i].col(0) - on_chain(problem.on_path[i] * frame.value).col(0));
     const CameraVector off = frame.value - at.head<camera_size>();
     // Residual's information, the turn left free: (path's^-1 + on_path^-1)^-1 without an inverse of on_path.
     const CameraMatrix of_path = of_others.topLeftCorner<camera_size, camera_size>();
     const CameraMatrix mixed = CameraMatrix::Identity() + of_path * problem.on_path[i];
-    point.off_path_chi2 = off.dot(problem.on_path[i] * mixed.partialPivLu().solve(off));
+    point.off_path_chi2 = off.dot(problem.on_path[i] * (geometry::inverse(Eigen::MatrixXd(mixed)) * off));
   }
   return smooth;
 }
@@ -299,7 +300,8 @@ std::optional<PhantomStep> best_step(const std::vector<PathObservation>& frames,
       information += weighted * (frames[i].motion - followed[i].topRows<camera_size>());
       gradient += weighted * (frames[i].value - path[i].topRows<camera_size>());
     }
-    const Eigen::Matrix<double, 6, 1> motion = (information + plausible).ldlt().solve(gradient);
+    const Eigen::Matrix<double, 6, 1> motion =
+        geometry::solve_spd(information + plausible, gradient).solution;
     const double chi2 = gradient.dot(motion);
     if (std::isfinite(chi2) && (!best || chi2 > best->chi2)) best = PhantomStep{first, motion, chi2};
   }

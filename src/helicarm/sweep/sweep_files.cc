@@ -11,6 +11,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/exchange/itk_transform.h"
 #include "helicarm/exchange/run_geometry.h"
+#include "helicarm/geometry/rotation.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/sweep/sweep.h"
 
@@ -49,8 +50,7 @@ geometry::RigidTransform about_y_from_calibrator(const SweepPath& path, const ex
   for (const exchange::RunGeometry::Image& image : run.images)
     up -= image.view.camera_from_world.rotation.row(1);
   const Eigen::Vector3d axis = path.axis->dot(up) < 0 ? Eigen::Vector3d(-*path.axis) : *path.axis;
-  const Eigen::Matrix3d turn =
-      Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  const Eigen::Matrix3d turn = geometry::rotation_between(axis, Eigen::Vector3d::UnitY());
   return {turn, -turn * path.isocentre};
 }
 

@@ -3,11 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
-#include <Eigen/Cholesky>
-
+#include "helicarm/geometry/dense_matrix.h"
+#include "helicarm/geometry/small_matrix.h"
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/track/contrast_model.h"
 
@@ -71,7 +72,7 @@ std::vector<Hypothesis> hypotheses_of(std::span<const geometry::View> views, con
       Eigen::Matrix2d covariance = spread;
       covariance.diagonal().array() += variance_of(disc.image, marker.images[k]);
       const Eigen::Vector2d off = disc.uv - places[k];
-      const double chi2 = off.dot(covariance.inverse() * off);
+      const double chi2 = geometry::squared_distance(off, covariance);
       const double appearance = appearance_cost(disc.image, marker.images[k]);
       if (chi2 < gate && appearance < 6) options[k].push_back({int(c), 0.5 * chi2 + appearance});
     }
@@ -106,10 +107,10 @@ std::vector<Hypothesis> hypotheses_of(std::span<const geometry::View> views, con
       }
       Eigen::MatrixXd covariance = slope * marker.covariance * slope.transpose();
       covariance.diagonal() += noise;
-      const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
-      const Eigen::MatrixXd triangle = factor.matrixL();
-      hypothesis.cost += 0.5 * off.dot(factor.solve(off)) + triangle.diagonal().array().log().sum() +
-                         double(m) * std::log(2 * std::numbers::pi);
+      const auto white = geometry::whitening(covariance);
+      hypothesis.cost += white ? 0.5 * (*white * off).squaredNorm() - white->diagonal().array().log().sum() +
+                                     double(m) * std::log(2 * std::numbers::pi)
+                               : std::numeric_limits<double>::infinity();
     }
     made.push_back(std::move(hypothesis));
     more = false;

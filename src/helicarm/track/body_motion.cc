@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/small_matrix.h"
 #include "helicarm/track/body_rays.h"
 #include "helicarm/track/body_residuals.h"
@@ -171,7 +172,7 @@ void learn_deviations(const SequenceData& work, const BodyPlan& plan, const Sequ
     // Never less than the deviation alone; a marker with few frames has that of the body, twice.
     Eigen::Matrix3d spread = (at.counts[i] ? 4 * least : few_mm * few_mm) * Eigen::Matrix3d::Identity();
     if (at.counts[i] && own.count > int(few_frames)) {
-      const geometry::SymmetricEigen3 parts = geometry::symmetric_eigen(Eigen::Matrix3d(
+      const auto parts = geometry::symmetric_eigen(Eigen::Matrix3d(
           (frames * (own.products - own.by_images) + prior_frames * spread) / (frames + prior_frames)));
       spread = parts.vectors * parts.values.cwiseMax(least).asDiagonal() * parts.vectors.transpose();
     }

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include "helicarm/geometry/dense_matrix.h"
@@ -91,16 +90,17 @@ std::optional<PoseFit> fit_pose(const geometry::RigidTransform& start, std::span
       const Eigen::Vector3d point = fit.world_from_body * markers[k].in_body;
       const auto rows = stacked(markers[k], point, options.loose_mm);
       if (!rows) return std::nullopt;
-      const Eigen::LLT<Eigen::MatrixXd> factor(rows->covariance);
-      const Eigen::VectorXd weighted = factor.solve(rows->residual);
-      fit.chi2[k] = rows->residual.dot(weighted);
+      const auto white = geometry::whitening(rows->covariance);
+      if (!white) return std::nullopt;
+      const Eigen::VectorXd residual = *white * rows->residual;
+      fit.chi2[k] = residual.squaredNorm();
       if (options.robust) {
         const double t = fit.chi2[k] / (double(rows->residual.size()) * cut * cut);
         fit.weight[k] = t < 1 ? (1 - t) * (1 - t) : 0;
       }
-      const Eigen::MatrixXd slope = rows->by_point * point_by_step(point, centre);
-      information += fit.weight[k] * slope.transpose() * factor.solve(slope);
-      gradient += fit.weight[k] * slope.transpose() * weighted;
+      const Eigen::MatrixXd slope = *white * rows->by_point * point_by_step(point, centre);
+      information += fit.weight[k] * slope.transpose() * slope;
+      gradient += fit.weight[k] * slope.transpose() * residual;
       fit.determining += fit.weight[k] > 0.1;
     }
     if (!(geometry::symmetric_eigenvalues(information)[0] > 1e-9)) return std::nullopt;

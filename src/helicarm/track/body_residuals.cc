@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "helicarm/geometry/dense_matrix.h"
-#include "helicarm/geometry/small_matrix.h"
 #include "helicarm/geometry/triangulation.h"
 
 namespace helicarm::track {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/track/camera_errors.h"
 
-#include <Eigen/Cholesky>
-
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/localization/locate.h"
@@ -41,7 +39,7 @@ PoseErrors errors_of(const TrackedBody& frame, const std::vector<Vector3d>& firs
     information += by_pose.transpose() * by_pose;
     sum += by_pose.transpose() * (by_cameras * errors - frame.pose->pose.rotation * in_first[k]);
   }
-  return information.ldlt().solve(sum);
+  return geometry::solve_spd(information, sum).solution;
 }
 
 /// The pose after a step about its body's centre.

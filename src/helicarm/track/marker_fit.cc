@@ -5,10 +5,11 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include "helicarm/detection/robust.h"
+#include "helicarm/geometry/dense_matrix.h"
+#include "helicarm/geometry/small_matrix.h"
 
 namespace helicarm::track {
 namespace {
@@ -127,14 +128,14 @@ class WindowFit {
     Eigen::MatrixXd normal = rows.transpose() * weighted;
     normal.diagonal().array() += 1e-9;
     normal.diagonal().segment<3>(3).array() += bend_pull();
-    const Eigen::VectorXd best = normal.ldlt().solve(weighted.transpose() * grey);
+    const Eigen::VectorXd best = geometry::solve_spd(normal, weighted.transpose() * grey).solution;
     return (weight_.array() * (grey - rows * best).array().square()).sum() +
            bend_pull() * best.segment<3>(3).squaredNorm();
   }
 
   /// Covariance of contrast and place.
   Eigen::Matrix3d covariance() const {
-    const Matrix inverse = normal(false).inverse();
+    const Eigen::MatrixXd inverse = geometry::inverse(normal(false));
     return noise() * inverse.block<3, 3>(contrast_at, contrast_at);
   }
 
@@ -142,7 +143,7 @@ class WindowFit {
   /// one side of the marker alone, as the rim of a bone.
   double jackknife_variance() const {
     constexpr std::size_t octants = 8;
-    const Matrix inverse = normal(false).inverse();
+    const Eigen::MatrixXd inverse = geometry::inverse(normal(false));
     Eigen::Matrix<double, 2, octants> moved = Eigen::Matrix<double, 2, octants>::Zero(), shares = moved;
     for (Eigen::Index i = 0; i < count_; ++i) {
       const double x = pixels_.x[std::size_t(i)] - p_[place_at],
@@ -235,8 +236,7 @@ class WindowFit {
           noise() / (prior_sigma() * prior_sigma()) * (appearance_.polarity * expected() - p_[contrast_at]);
     right.segment<3>(3) -= bend_pull() * p_.segment<3>(3);
     if (linear) right.segment<2>(place_at).setZero();
-    const Eigen::LDLT<Matrix> factor(normal(linear));
-    Vector moved = factor.solve(right);
+    Vector moved = geometry::solve_spd(normal(linear), right).solution;
     if (!moved.allFinite()) return false;
     if (!linear) moved *= std::min(1.0, longest_px / std::max(1e-12, moved.segment<2>(place_at).norm()));
     p_ += moved;
@@ -270,10 +270,6 @@ double evidence_of(const WindowFit& fit) {
          0.5 * fit.prior_off() * fit.prior_off();
 }
 
-double mahalanobis(const Eigen::Vector2d& off, const Eigen::Matrix2d& covariance) {
-  return off.dot(covariance.inverse() * off);
-}
-
 }  // namespace
 
 std::optional<EvidentMarker> fit_known_marker(const image::Image<float>& grey, const KnownMarker& marker,
@@ -295,7 +291,7 @@ std::optional<EvidentMarker> fit_known_marker(const image::Image<float>& grey, c
     for (int j = -reach; j <= reach; ++j)
       for (int i = -reach; i <= reach; ++i) {
         const Eigen::Vector2d off(i * step_px, j * step_px);
-        const double distance = mahalanobis(off, marker.covariance);
+        const double distance = geometry::squared_distance(off, marker.covariance);
         if (distance > sigmas * sigmas) continue;
         const auto pixels = pixels_around(grey, marker.at + off, window);
         if (!pixels) continue;
@@ -326,7 +322,7 @@ std::optional<EvidentMarker> fit_known_marker(const image::Image<float>& grey, c
     // The place is one of many in the window.
     const Eigen::Matrix2d spread = marker.covariance + of_place;
     made.evidence += 0.5 * std::log(of_place.determinant() / spread.determinant()) -
-                     0.5 * mahalanobis(fit.place() - marker.at, spread);
+                     0.5 * geometry::squared_distance(fit.place() - marker.at, spread);
   }
   return made;
 }

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
-#include <Eigen/Cholesky>
-
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::track {
@@ -127,12 +127,11 @@ Filtered filter(std::span<const double> times, std::span<const std::optional<Mea
     if (measured[i]) {
       const Vector6 off = between(state, measured[i]->at).head<6>();
       const Matrix6 spread = covariance.topLeftCorner<6, 6>() + measured[i]->covariance;
-      const Eigen::LLT<Matrix6> factor(spread);
-      const Vector6 weighted = factor.solve(off);
-      const Eigen::Matrix<double, state_size, 6> gain = factor.solve(covariance.topRows<6>()).transpose();
-      const Matrix6 triangle = factor.matrixL();
-      result.squares += off.dot(weighted);
-      result.log_widths += triangle.diagonal().array().log().sum();
+      const Matrix6 weight = geometry::inverse(spread);
+      const Eigen::Matrix<double, state_size, 6> gain = covariance.leftCols<6>() * weight;
+      result.squares += off.dot(weight * off);
+      result.log_widths +=
+          0.5 * geometry::log_determinant(spread).value_or(std::numeric_limits<double>::quiet_NaN());
       ++result.updates;
       state = moved(state, gain * off);
       covariance -= gain * covariance.topRows<6>();
@@ -212,8 +211,8 @@ std::vector<Smoothed> smoothed(const Filtered& filtered) {
   result.back() = {state, covariance.topLeftCorner<6, 6>()};
   for (std::size_t i = count - 1; i-- > 0;) {
     const Step &here = filtered.steps[i], &next = filtered.steps[i + 1];
-    const StateMatrix gain =
-        next.predicted_covariance.ldlt().solve(next.transition * here.covariance).transpose();
+    const StateMatrix gain = geometry::solve_spd(next.predicted_covariance, next.transition * here.covariance)
+                                 .solution.transpose();
     state = moved(here.filtered, gain * between(next.predicted, state));
     covariance = here.covariance + gain * (covariance - next.predicted_covariance) * gain.transpose();
     covariance = (0.5 * (covariance + covariance.transpose())).eval();

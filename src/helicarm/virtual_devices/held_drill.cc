@@ -50,8 +50,7 @@ geometry::RigidTransform HeldDrill::on_tunnel(const std::string& bone, double de
   const geometry::RigidTransform bone_from_tracker = scene_.tracker_from(bone).inverse();
   const Vector3d enter = bone_from_tracker * scene_.point_in_tracker(outer);
   const Vector3d axis = (bone_from_tracker * scene_.point_in_tracker(inner) - enter).normalized();
-  const Eigen::Matrix3d along =
-      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis).toRotationMatrix();
+  const Eigen::Matrix3d along = geometry::rotation_between(Vector3d::UnitZ(), axis);
   const Eigen::AngleAxisd tilt(tilt_deg * std::numbers::pi / 180, Vector3d::UnitX());
   return {along * tilt.toRotationMatrix(), enter + depth_mm * axis + off_mm * along.col(0)};
 }

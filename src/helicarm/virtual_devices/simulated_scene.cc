@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/geometry/rotation.h"
+
 namespace helicarm::virtual_devices {
 namespace {
 
@@ -20,7 +22,7 @@ const geometry::RigidTransform calibrator_from_base{
 
 /// Rotates z onto the direction.
 Eigen::Matrix3d facing(const Vector3d& direction) {
-  return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), direction).toRotationMatrix();
+  return geometry::rotation_between(Vector3d::UnitZ(), direction);
 }
 
 const phantom::CalibratorBall* ball_named(const phantom::Calibrator& calibrator, const std::string& label) {

@@ -4,12 +4,14 @@
 #include <numbers>
 #include <optional>
 
+#include "helicarm/geometry/rotation.h"
+
 namespace helicarm::robot {
 namespace {
 
 /// Shortest rotation of the z axis of `from` onto `axis`.
 Eigen::Matrix3d aligned(const Eigen::Matrix3d& from, const Eigen::Vector3d& axis) {
-  return Eigen::Quaterniond::FromTwoVectors(from.col(2), axis).toRotationMatrix() * from;
+  return geometry::rotation_between(from.col(2), axis) * from;
 }
 
 }  // namespace

@@ -5,10 +5,10 @@
 #include <numbers>
 #include <optional>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/least_squares.h"
 #include "helicarm/geometry/pose_step.h"
 
@@ -36,8 +36,8 @@ std::vector<SeenFacet> match(std::span<const Facet> facets, std::span<const Face
     const double body_rad = std::max(options.body_deg, facet->sigma_deg) * std::numbers::pi / 180;
     covariance.diagonal().head<3>().array() += body_mm * body_mm;
     covariance.diagonal().tail<3>().array() += body_rad * body_rad;
-    matched.push_back({pose.name, facet->calibrator_from_facet, pose.tracker_from_facet,
-                       covariance.llt().solve(PoseCovariance::Identity())});
+    matched.push_back(
+        {pose.name, facet->calibrator_from_facet, pose.tracker_from_facet, geometry::inverse(covariance)});
   }
   return matched;
 }
@@ -62,7 +62,7 @@ FusedPose fuse(const std::vector<SeenFacet>& seen) {
     throw BadInput(Reason::uncertain, "the mean pose of the calibrator's facets does not converge");
   FusedPose fused;
   fused.tracker_from_calibrator = fit->state;
-  fused.covariance = fit->equations.information.llt().solve(PoseCovariance::Identity());
+  fused.covariance = geometry::inverse(fit->equations.information);
   fused.chi2 = fit->equations.chi2;
   for (const SeenFacet& facet : seen) fused.used.push_back(facet.name);
   return fused;

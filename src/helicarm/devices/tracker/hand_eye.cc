@@ -6,8 +6,6 @@
 #include <optional>
 #include <vector>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <fmt/format.h>
 
 #include "helicarm/geometry/dense_matrix.h"
@@ -66,14 +64,14 @@ geometry::RigidTransform start_of_x(const std::vector<Motion>& motions) {
   geometry::RigidTransform x;
   x.rotation = geometry::nearest_rotation(together);
   const auto rows = static_cast<Eigen::Index>(3 * motions.size());
-  Eigen::MatrixX3d left(rows, 3);
+  Eigen::MatrixXd left(rows, 3);
   Eigen::VectorXd right(rows);
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(3 * i);
     left.middleRows<3>(row) = motions[i].a.rotation - Eigen::Matrix3d::Identity();
     right.segment<3>(row) = x.rotation * motions[i].b.translation - motions[i].a.translation;
   }
-  x.translation = left.colPivHouseholderQr().solve(right);
+  x.translation = geometry::linear_least_squares(left, right).solution;
   return x;
 }
 
@@ -133,7 +131,7 @@ Expected<HandEye> refined(std::span<const HandEyePair> pairs, double sigma_mm, d
   };
   auto fit = geometry::fit_least_squares(start, linearise, stepped);
   if (!fit->converged) return fail(Reason::uncertain, "the hand-eye calibration does not converge");
-  fit->state.covariance = fit->equations.information.ldlt().solve(Matrix12::Identity());
+  fit->state.covariance = geometry::inverse(Eigen::MatrixXd(fit->equations.information));
   return fit->state;
 }
 

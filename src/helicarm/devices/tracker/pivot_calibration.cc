@@ -5,12 +5,12 @@
 #include <numbers>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
 #include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/small_matrix.h"
 
 namespace helicarm::tracker {
 namespace {
@@ -58,9 +58,8 @@ PivotFit fit_pivot(const std::vector<geometry::RigidTransform>& poses, double si
       information += weighted * jacobian;
       gradient -= weighted * pose.translation;
     }
-    const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> solver(information);
-    fit.tip_and_pivot = solver.solve(gradient);
-    fit.covariance = solver.solve(Eigen::Matrix<double, 6, 6>::Identity());
+    fit.covariance = geometry::inverse(information);
+    fit.tip_and_pivot = fit.covariance * gradient;
     if (sigma_rad == 0) break;
   }
   for (const geometry::RigidTransform& pose : poses) fit.square_sum += miss(pose, fit).squaredNorm();
