@@ -12,89 +12,12 @@
 
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/track/half_map_test.h"
-#include "helicarm/track/two_cameras_test.h"
+#include "helicarm/track/two_bodies_test.h"
 
 namespace helicarm::track {
 namespace sequence_test {
 
-constexpr double noise_px = 0.05;
-constexpr int frames = 40;
-
-const std::vector<std::vector<Eigen::Vector3d>> bodies{
-    {{10, 0, 3}, {-8, 7, -4}, {2, -9, 8}, {-5, -6, -9}},
-    {{9, 12, 25}, {-12, 3, 31}, {4, -11, 22}, {-3, 14, 36}}};
-
-TrackCase two_bodies() {
-  TrackCase the_case;
-  for (const geometry::View& camera : two_cameras()) {
-    TrackView& view = the_case.views.emplace_back();
-    view.images.name = the_case.views.size() == 1 ? "A" : "B";
-    view.camera = camera;
-  }
-  for (const auto& body : bodies) {
-    BodyPlan& plan = the_case.bodies.emplace_back();
-    plan.name = the_case.bodies.size() == 1 ? "jaw" : "skull";
-    for (std::size_t i = 0; i < body.size(); ++i) {
-      plan.markers.push_back(the_case.markers.size());
-      the_case.markers.push_back(plan.name[0] + std::to_string(i + 1));
-    }
-  }
-  return the_case;
-}
-
-geometry::RigidTransform pose_at(std::size_t body, int frame) {
-  const double t = 0.1 * frame, sign = body == 0 ? 1 : -1;
-  return {geometry::rotation_from_vector({0.1 * std::sin(t), sign * 0.05 * t, 0}),
-          {3 * std::sin(t), sign * 2 * t, std::cos(t)}};
-}
-
-using Shift = std::function<Eigen::Vector3d(std::size_t marker, int frame)>;
-
-Eigen::Vector3d place_of(std::size_t marker, int frame, const Shift& shift) {
-  const std::size_t body = marker / 4;
-  return pose_at(body, frame) * (bodies[body][marker % 4] + shift(marker, frame));
-}
-
-Eigen::Vector2d normal_pair(std::normal_distribution<double>& normal, std::mt19937& random) {
-  const double y = normal(random), x = normal(random);
-  return {x, y};
-}
-
-std::vector<FrameSights> drawn(const TrackCase& the_case, const Shift& shift) {
-  std::mt19937 random(4);
-  std::normal_distribution<double> normal;
-  std::vector<FrameSights> made;
-  for (int f = 1; f <= frames; ++f) {
-    FrameSights& sights = made.emplace_back();
-    sights.frame = f;
-    for (std::size_t m = 0; m < the_case.markers.size(); ++m) {
-      auto& of = sights.of.emplace_back();
-      for (const TrackView& view : the_case.views)
-        of.push_back(
-            MarkerImage{view.camera.project(place_of(m, f, shift)) + noise_px * normal_pair(normal, random),
-                        noise_px, 2, 60, 120});
-    }
-  }
-  return made;
-}
-
-Eigen::Vector3d none(std::size_t, int) { return Eigen::Vector3d::Zero(); }
-
-/// Of all places; infinite where one is missing, but of a marker that is to have none.
-double farthest(const Sequence& sequence, const Shift& shift, std::optional<std::size_t> lost = {}) {
-  double most = 0;
-  for (std::size_t f = 0; f < sequence.frames.size(); ++f)
-    for (std::size_t m = 0; m < sequence.markers[f].size(); ++m)
-      if (const auto& place = sequence.markers[f][m].place; m != lost)
-        most = std::max(most, place ? (place->place - place_of(m, int(f) + 1, shift)).norm()
-                                    : std::numeric_limits<double>::infinity());
-  return most;
-}
-
-const Warning* warning_of(const Sequence& sequence, Reason reason) {
-  const auto found = std::ranges::find(sequence.warnings, reason, &Warning::reason);
-  return found == sequence.warnings.end() ? nullptr : &*found;
-}
+using namespace two_bodies_test;
 
 TEST(Sequence, PlacesAndPosesAreWithinTheirBands) {
   const TrackCase the_case = two_bodies();
@@ -304,45 +227,6 @@ TEST(Sequence, MarkerSeenInFewFramesIsNotCarriedOn) {
     }
 }
 
-TEST(Sequence, SwapOfTwoMarkersIsRepaired) {
-  const TrackCase the_case = two_bodies();
-  for (const std::size_t other : {std::size_t(2), std::size_t(6)}) {  // of the same body, of the other
-    auto sights = drawn(the_case, none);
-    std::swap(sights[19].of[1], sights[19].of[other]);
-    const Sequence sequence = estimate_sequence(the_case, sights);
-    EXPECT_EQ(sequence.repaired, 1);
-    EXPECT_LT(farthest(sequence, none), 0.3);
-    const Warning* warning = warning_of(sequence, Reason::markers_swapped);
-    ASSERT_TRUE(warning);
-    EXPECT_NE(warning->message.find("frame 20: the images of \"j2\" and"), std::string::npos);
-  }
-}
-
-TEST(Sequence, NamesOfTheFirstFrameCountWhereMostFramesAreSwapped) {
-  constexpr std::size_t begin = 11;
-  const TrackCase the_case = two_bodies();
-  auto sights = drawn(the_case, none);
-  for (std::size_t f = begin; f < sights.size(); ++f) std::swap(sights[f].of[1], sights[f].of[3]);
-  const Sequence sequence = estimate_sequence(the_case, sights);
-  EXPECT_EQ(sequence.repaired, int(sights.size() - begin));
-  EXPECT_LT(farthest(sequence, none), 0.2);
-  const Warning* warning = warning_of(sequence, Reason::markers_swapped);
-  ASSERT_TRUE(warning);
-  EXPECT_TRUE(warning->message.starts_with("frame 12: ")) << warning->message;
-}
-
-TEST(Sequence, SwapInOneViewIsRepaired) {
-  const TrackCase the_case = two_bodies();
-  auto sights = drawn(the_case, none);
-  std::swap(sights[11].of[4][1], sights[11].of[7][1]);
-  const Sequence sequence = estimate_sequence(the_case, sights);
-  EXPECT_EQ(sequence.repaired, 1);
-  EXPECT_LT(farthest(sequence, none), 0.3);
-  const Warning* warning = warning_of(sequence, Reason::markers_swapped);
-  ASSERT_TRUE(warning);
-  EXPECT_EQ(warning->view, "B");
-}
-
 TEST(Sequence, FrameWithoutAnImageOfItsMomentHasNoPose) {
   const TrackCase the_case = two_bodies();
   auto sights = drawn(the_case, none);
@@ -365,51 +249,6 @@ TEST(Sequence, FrameWithoutAnImageOfItsMomentHasNoPose) {
       << warning->message;
 }
 
-/// The second view's images from a frame on are those of later frames; earlier ones for negative numbers.
-std::vector<FrameSights> with_dropped(const std::vector<FrameSights>& sights, std::size_t from, int dropped) {
-  auto made = sights;
-  for (std::size_t f = from; f < sights.size(); ++f)
-    for (std::size_t m = 0; m < sights[f].of.size(); ++m) {
-      const int moment = int(f) + dropped;
-      made[f].of[m][1] = moment < int(sights.size()) ? sights[std::size_t(moment)].of[m][1] : std::nullopt;
-    }
-  return made;
-}
-
-TEST(Sequence, FrameThatOneCameraDroppedIsNamedAndTakenIntoAccount) {
-  const TrackCase the_case = two_bodies();
-  for (const int dropped : {1, -2}) {
-    const Sequence sequence = estimate_sequence(the_case, with_dropped(drawn(the_case, none), 21, dropped));
-    const Warning* warning = warning_of(sequence, Reason::cameras_not_in_step);
-    ASSERT_TRUE(warning) << dropped;
-    EXPECT_EQ(warning->view, "B");
-    EXPECT_NEAR(warning->figures.at("frame"), 22, 1) << warning->message;
-    EXPECT_NEAR(warning->figures.at("jump_frames"), dropped, 0.2) << warning->message;
-    EXPECT_NE(warning->message.find(dropped > 0 ? "B dropped a frame" : "A dropped a frame"),
-              std::string::npos)
-        << warning->message;
-    EXPECT_LT(farthest(sequence, none), 0.5) << dropped;
-    EXPECT_LT(std::abs(sequence.delays[1].frames), 0.1) << dropped;
-  }
-}
-
-TEST(Sequence, AfterAFrameDroppedBetweenThoseThatAreFollowedNoBodyHasAPose) {
-  const TrackCase the_case = two_bodies();
-  const auto all = with_dropped(drawn(the_case, none), 20, 1);
-  std::vector<FrameSights> every_second;
-  for (std::size_t f = 0; f < all.size(); f += 2) every_second.push_back(all[f]);
-  const Sequence sequence = estimate_sequence(the_case, every_second);
-  ASSERT_TRUE(warning_of(sequence, Reason::cameras_not_in_step));
-  EXPECT_EQ(sequence.bodies[0].frames[5].decision, PoseDecision::accept);
-  EXPECT_EQ(sequence.bodies[0].frames[15].reason, Reason::cameras_not_in_step);
-  EXPECT_FALSE(sequence.bodies[0].frames[15].pose);
-}
-
-TEST(Sequence, FilmsInStepHaveNoDroppedFrame) {
-  const TrackCase the_case = two_bodies();
-  EXPECT_FALSE(warning_of(estimate_sequence(the_case, drawn(the_case, none)), Reason::cameras_not_in_step));
-}
-
 TEST(Sequence, DiscThatIsNotTheMarkersIsNotItsPlace) {
   const TrackCase the_case = two_bodies();
   auto sights = drawn(the_case, none);
@@ -420,79 +259,6 @@ TEST(Sequence, DiscThatIsNotTheMarkersIsNotItsPlace) {
   EXPECT_EQ(sequence.markers[24][3].status, MarkerStatus::predicted);
   EXPECT_LT(farthest(sequence, none), 0.5);
   EXPECT_EQ(sequence.bodies[0].frames[24].decision, PoseDecision::warn);
-}
-
-std::vector<MarkerStatus> statuses_of(const Sequence& sequence, std::size_t marker) {
-  std::vector<MarkerStatus> made;
-  for (const auto& frame : sequence.markers) made.push_back(frame[marker].status);
-  return made;
-}
-
-TEST(Sequence, MarkerThatContradictsItsPickInMostFramesDoesNotCount) {
-  const TrackCase the_case = two_bodies();
-  const Shift to_another = [](std::size_t marker, int frame) {
-    return marker == 3 && frame > 1 ? Eigen::Vector3d(8, -6, 9) : Eigen::Vector3d(0, 0, 0);
-  };
-  const auto sights = drawn(the_case, to_another);
-  const Sequence sequence = estimate_sequence(the_case, sights);
-  const Warning* warning = warning_of(sequence, Reason::marker_lost);
-  ASSERT_TRUE(warning);
-  EXPECT_NE(warning->message.find("\"j4\" is not where frame 1 has it in the body \"jaw\" in 39 of 39 "
-                                  "frames, first in frame 2, and counts in none"),
-            std::string::npos)
-      << warning->message;
-  EXPECT_EQ(std::ranges::count(statuses_of(sequence, 3), MarkerStatus::lost), frames);
-  EXPECT_EQ(std::ranges::count(statuses_of(sequence, 0), MarkerStatus::tracked), frames);
-  EXPECT_LT(farthest(sequence, none, 3), 0.5);
-  for (const BodySequence& body : sequence.bodies)
-    EXPECT_EQ(body.smoothed[20].decision, PoseDecision::accept);
-  TrackCase of_file = the_case;  // whose first row is no surer than others
-  of_file.points.assign(sights.size(), {});
-  EXPECT_FALSE(warning_of(estimate_sequence(of_file, sights), Reason::marker_lost));
-}
-
-TEST(Sequence, HiddenMarkersContradictNothing) {
-  const TrackCase the_case = two_bodies();
-  const Shift to_another = [](std::size_t marker, int frame) {
-    return marker == 3 && frame > 1 ? Eigen::Vector3d(8, -6, 9) : Eigen::Vector3d(0, 0, 0);
-  };
-  auto sights = drawn(the_case, to_another);
-  for (const std::size_t f : {20, 21, 22})
-    for (const std::size_t m : {0, 1})
-      for (auto& image : sights[f].of[m]) image.reset();
-  const Sequence sequence = estimate_sequence(the_case, sights);
-  EXPECT_EQ(sequence.markers[21][2].status, MarkerStatus::tracked);
-  EXPECT_EQ(sequence.markers[21][0].status, MarkerStatus::predicted);
-  EXPECT_LT(farthest(sequence, none, 3), 0.5);
-}
-
-TEST(Sequence, CorrectedMarkersAreNotTakenOut) {
-  TrackCase the_case = two_bodies();
-  const Shift to_another = [](std::size_t marker, int frame) {
-    return marker == 3 && frame > 1 ? Eigen::Vector3d(8, -6, 9) : Eigen::Vector3d(0, 0, 0);
-  };
-  for (int f = 2; f <= frames; ++f) the_case.corrections.push_back({3, 0, {0, 0}, f});
-  const Sequence sequence = estimate_sequence(the_case, drawn(the_case, to_another));
-  const Warning* warning = warning_of(sequence, Reason::body_ill_conditioned);
-  ASSERT_TRUE(warning);
-  EXPECT_NE(warning->message.find("frame 1: \"j4\" is 13."), std::string::npos) << warning->message;
-}
-
-TEST(Sequence, WhereAllMarkersContradictTheFirstFrameNoneIsPlaced) {
-  const TrackCase the_case = two_bodies();
-  // A rigid body of other discs, in the frames behind the first.
-  const Shift to_others = [](std::size_t marker, int frame) {
-    static const std::vector<Eigen::Vector3d> others{{8, -6, 9}, {-9, 7, 5}, {6, 8, -9}, {-7, -8, 6}};
-    return marker < 4 && frame > 1 ? others[marker] : Eigen::Vector3d(0, 0, 0);
-  };
-  const Sequence sequence = estimate_sequence(the_case, drawn(the_case, to_others));
-  const Warning* warning = warning_of(sequence, Reason::body_ill_conditioned);
-  ASSERT_TRUE(warning);
-  EXPECT_NE(warning->message.find("of its markers are located"), std::string::npos) << warning->message;
-  EXPECT_EQ(sequence.bodies[0].smoothed[20].decision, PoseDecision::refuse);
-  EXPECT_EQ(sequence.bodies[1].smoothed[20].decision, PoseDecision::accept);
-  for (std::size_t m = 0; m < 4; ++m)
-    EXPECT_EQ(std::ranges::count(statuses_of(sequence, m), MarkerStatus::tracked), 1) << m;
 }
 
 TEST(Sequence, LoneDiscsOfABodyWithoutAPoseAreNoMarker) {
@@ -519,23 +285,6 @@ TEST(Sequence, LooseMarkerIsNamed) {
   EXPECT_EQ(sequence.bodies[1].markers[1].moved_at, 22);
   EXPECT_LT(farthest(sequence, loose), 0.3);
   EXPECT_EQ(sequence.repaired, 0);
-}
-
-TEST(Sequence, NamesExchangedBetweenBodiesAreRefusedByName) {
-  TrackCase the_case = two_bodies();
-  std::swap(the_case.bodies[0].markers[2], the_case.bodies[1].markers[1]);
-  const Sequence sequence = estimate_sequence(the_case, drawn(the_case, none));
-  ASSERT_TRUE(sequence.failure);
-  EXPECT_EQ(sequence.failure->reason, Reason::markers_swapped);
-  EXPECT_TRUE(sequence.failure->message.starts_with(
-      "\"s2\" of the body \"jaw\" and \"j3\" of \"skull\" have each other's names"))
-      << sequence.failure->message;
-  for (const BodySequence& body : sequence.bodies) {
-    EXPECT_EQ(body.frames[20].decision, PoseDecision::refuse);
-    EXPECT_EQ(body.smoothed[20].decision, PoseDecision::refuse);
-  }
-  EXPECT_EQ(sequence.markers[20][2].status, MarkerStatus::lost);
-  EXPECT_EQ(sequence.markers[20][0].status, MarkerStatus::tracked);
 }
 
 TEST(Sequence, MarkersThatMoveAgainstEachOtherAllTheTimeAreNoBody) {
