@@ -28,6 +28,7 @@ auto median(Values values) {
   return value_of_rank(values, std::ranges::size(values) / 2);
 }
 
+inline constexpr double normal_at_975 = 1.9599639845400545;  ///< two-sided 95 %
 inline constexpr double normal_at_999 = 3.0902323061678132;
 
 /// Quantile of chi-square for the normal distribution's quantile of the same probability (Wilson and Hilferty

@@ -7,10 +7,11 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
+
 namespace helicarm::measures {
 namespace {
 
-constexpr double sigmas_at_95 = 1.96;
 constexpr double far_outside = 10;  // per cent; anatomical positions lie inside
 
 bool is_inside(const Eigen::VectorXd& percent) {
@@ -54,7 +55,7 @@ std::vector<Warning> reference_warnings(const PercentAxes& axes, const Position&
   for (std::size_t i = 0; i < components.size(); ++i) {
     const auto at = Eigen::Index(i);
     const double percent = position.percent[at];
-    const double error = sigmas_at_95 * std::sqrt(position.covariance(at, at));
+    const double error = normal_at_975 * std::sqrt(position.covariance(at, at));
     if (percent >= -error && percent <= 100 + error) continue;
     const bool is_far = percent < -far_outside || percent > 100 + far_outside;
     warnings.push_back(

@@ -7,10 +7,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "helicarm/core/statistics.h"
+
 namespace helicarm::measures {
 namespace {
 
-constexpr double sigmas_of_95 = 1.96;
 constexpr Range per_cent{-100, 200};
 
 Zone::Extent extent_from(JsonReader& zone, const char* component) {
@@ -80,7 +81,7 @@ std::vector<ZoneFit> zone_fits(Kind kind, const Position& position, std::span<co
       const auto at = Eigen::Index(i);
       const Zone::Extent& extent = zone.extents[i];
       const double percent = position.percent[at];
-      const double error = sigmas_of_95 * std::sqrt(position.covariance(at, at));
+      const double error = normal_at_975 * std::sqrt(position.covariance(at, at));
       fit.from_centre.push_back(extent.centre ? std::optional(percent - *extent.centre) : std::nullopt);
       if ((extent.low && percent + error < *extent.low) || (extent.high && percent - error > *extent.high))
         fit.is_outside = true;

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/xray/view_of.h"
 
 namespace helicarm::pipeline {
@@ -26,9 +27,8 @@ std::optional<guidance::LineError> error_at(const PointResult& point,
 
 /// 95 % error of a point by that of the calibrator's scale, along the line from its middle.
 double scale_error_95_mm(const phantom::Calibrator& calibrator, const Eigen::Vector3d& point_in_calibrator) {
-  constexpr double normal_at_95 = 1.96;  // two-sided
   if (calibrator.scale_sigma == 0) return 0;
-  return normal_at_95 * calibrator.scale_sigma *
+  return normal_at_975 * calibrator.scale_sigma *
          (point_in_calibrator - phantom::middle_of(calibrator)).norm();
 }
 

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/csv.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/core/text.h"
 #include "helicarm/pipeline/c_arm.h"
 
@@ -55,7 +56,7 @@ std::string drift_text(const std::optional<calibration::CArmDrift>& drift) {
   std::string text = "  drift, mm a year (95 %):";
   for (int axis = 0; axis < 3; ++axis)
     text += fmt::format("{} {} {:+.2f} ±{:.2f}", axis == 0 ? "" : ",", intrinsic_names[std::size_t(axis)],
-                        drift->mm_a_year[axis], sigmas_at_95 * drift->sigma[axis]);
+                        drift->mm_a_year[axis], normal_at_975 * drift->sigma[axis]);
   return text + "\n";
 }
 

@@ -15,7 +15,6 @@
 namespace helicarm::report {
 
 inline constexpr std::array<const char*, 3> intrinsic_names{"focal", "u0", "v0"};
-inline constexpr double sigmas_at_95 = 1.96;  // two-sided
 
 /// A recorded distortion map beside the prediction by all others.
 struct LeftOutMap {

@@ -12,6 +12,7 @@
 
 #include "helicarm/core/earlier_files.h"
 #include "helicarm/core/files.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/report/chart.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/pdf_document.h"
@@ -46,7 +47,7 @@ std::vector<ColumnOf<AcquisitionCheck>> columns() {
           "from the prediction by the other acquisitions, with half the width of its 95 % interval", true},
          [axis](const AcquisitionCheck& a) {
            return Cell{fmt::format("{:+.2f} ±{:.2f}", a.entry.estimate_mm[axis] - a.predicted_mm[axis],
-                                   sigmas_at_95 * a.sigma_mm[axis])};
+                                   normal_at_975 * a.sigma_mm[axis])};
          }});
   }
   all.push_back(
@@ -81,7 +82,7 @@ std::vector<Chart> charts_of(const CArmModel& model) {
     seen.scattered = true;
     for (std::size_t i = 0; i < at.size(); ++i) {
       const Eigen::Index k = 3 * Eigen::Index(i) + axis;
-      const double width = sigmas_at_95 * std::sqrt(predicted.covariance_mm2(k, k));
+      const double width = normal_at_975 * std::sqrt(predicted.covariance_mm2(k, k));
       middle.points.push_back({*at[i].primary_deg, predicted.mean_mm[k]});
       above.points.push_back({*at[i].primary_deg, predicted.mean_mm[k] + width});
       below.points.push_back({*at[i].primary_deg, predicted.mean_mm[k] - width});
@@ -115,9 +116,9 @@ std::string summary(const CArmFindings& findings) {
            std::string(intrinsic_titles[std::size_t(axis)]) + ", predicted at the recorded positions");
   if (const auto& drift = findings.drift)
     for (int axis = 0; axis < 3; ++axis)
-      card(
-          fmt::format("{:+.2f} ±{:.2f} mm a year", drift->mm_a_year[axis], sigmas_at_95 * drift->sigma[axis]),
-          std::string(intrinsic_titles[std::size_t(axis)]) + ", drift (95 %)");
+      card(fmt::format("{:+.2f} ±{:.2f} mm a year", drift->mm_a_year[axis],
+                       normal_at_975 * drift->sigma[axis]),
+           std::string(intrinsic_titles[std::size_t(axis)]) + ", drift (95 %)");
   card(fmt::format("{} of {}", inside_95(findings.left_out), findings.left_out.size()),
        "inside the 95 % region predicted by all others");
   return html + "</div>\n";
