@@ -78,8 +78,8 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
       "the surface's middle");
   codec.file(
       "mask", model.mask, folder,
-      "path of a volume on the same grid; what is not 0 is the body. Of a TIFF stack: another stack, or "
-      "a volume with as many voxels of `voxel_mm`");
+      "path of a volume on the CT's grid, or on a part of it (beyond which nothing is of the body); what is "
+      "not 0 is the body. Of a TIFF stack: another stack, or a volume with as many voxels of `voxel_mm`");
   codec.integer("mask_label", model.mask_label, 1, volume_label_limit,
                 "label of the body where the mask is a label map, or the segment's number in a DICOM "
                 "segmentation; with several of them it must be given");
