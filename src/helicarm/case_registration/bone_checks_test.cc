@@ -87,6 +87,19 @@ TEST(JudgeTunnels, ALineBesideTheBoneIsRefused) {
   EXPECT_THAT(result.failure->message, HasSubstr("does not pass through the bone"));
 }
 
+TEST(JudgeTunnels, ALineThatEntersWhereTheCtEndsIsRefusedAsSuch) {
+  volume::Volume ct;
+  ct.size = {30, 30, 30};
+  ct.patient_from_voxel = Eigen::Translation3d(-15, -15, -15);
+  ct.voxels.assign(30 * 30 * 30, 1000);
+  Registration result = registered(0.1);
+  const MarkupPlan plan = plan_at({0});
+  auto checks = bone_checks(plan, registration::bone_surface(ct, ct, {}).get());
+  judge_tunnels(plan, checks, result);
+  ASSERT_TRUE(result.failure);
+  EXPECT_THAT(result.failure->message, HasSubstr("enters the bone where the CT ends"));
+}
+
 TEST(JudgeTunnels, TwoTunnelsTooNearToEachOtherAreWarnedOf) {
   const Registration result = judged(plan_at({-4, 3}), 0.1);
   EXPECT_FALSE(result.failure);

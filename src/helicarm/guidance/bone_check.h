@@ -28,7 +28,7 @@ struct BoneCheck {
   std::optional<double> at_mm = {};                    ///< depth of the bridge
   Eigen::Vector3d thinnest = Eigen::Vector3d::Zero();  ///< on the axis at that depth
   Eigen::Vector3d outward = Eigen::Vector3d::Zero();   ///< normal of the surface nearest to it
-  double length_in_bone_mm = 0;
+  double length_in_bone_mm = 0;  ///< without an entry: the line enters where the volume ends
   std::optional<Eigen::Vector3d> entry =
       {};  ///< on the bone's surface; nothing: the line does not meet the bone
   std::optional<Eigen::Vector3d> exit = {};  ///< likewise; nothing: a blind tunnel

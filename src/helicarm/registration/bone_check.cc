@@ -65,7 +65,10 @@ class Check {
     BoneCheck check;
     check.diameter_mm = diameter_;
     if (!find_openings()) return std::nullopt;
-    if (!entry_) return check;
+    if (!entry_) {
+      if (bone_.holds(at(length_ / 2))) check.length_in_bone_mm = length_;
+      return check;
+    }
     const double to = exit_ ? exit_->at_mm : length_;
     check.entry = at(entry_->at_mm);
     check.end = at(to);
