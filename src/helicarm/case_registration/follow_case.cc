@@ -13,7 +13,6 @@
 #include "helicarm/case_registration/start_poses.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/registration/follow.h"
-#include "helicarm/xray/run_polarity.h"
 
 namespace helicarm::case_registration {
 
@@ -140,8 +139,9 @@ Expected<CaseFollower> CaseFollower::begin(const pipeline::Case& first, const Re
     made.warnings_ = first.warnings;
     // The polarity of a run is not that of its first image.
     std::ranges::copy_if(
-        made.loaded_.warnings, std::back_inserter(made.warnings_),
-        [](const Warning& warning) { return !warning.message.ends_with(xray::inverted_note); });
+        made.loaded_.warnings, std::back_inserter(made.warnings_), [&](const Warning& warning) {
+          return std::ranges::find(made.loaded_.inverted, warning) == made.loaded_.inverted.end();
+        });
     made.models_ = followed_models(first, options, progress, made.loaded_, made.warnings_);
     for (const auto& body : made.models_)
       made.warnings_.insert(made.warnings_.end(), body->model.warnings.begin(), body->model.warnings.end());

@@ -135,6 +135,7 @@ void add_view(LoadedViews& loaded, xray::XrayImage image, const exchange::Import
   // The camera states what the pixels measure.
   std::ranges::copy_if(image.warnings, std::back_inserter(loaded.warnings),
                        [](const Warning& warning) { return warning.reason != Reason::spacing_missing; });
+  if (image.inverted) loaded.inverted.push_back(*image.inverted);
 }
 
 LoadedViews views_of_cameras(const pipeline::Case& the_case) {

@@ -146,6 +146,8 @@ struct Failure {
   std::string message;
   std::string view = {};
   std::map<std::string, double> figures = {};
+
+  bool operator==(const Failure&) const = default;
 };
 
 using Warning = Failure;

@@ -103,37 +103,36 @@ void SequenceImages::decide_polarity(const case_registration::FrameRange& frames
     for (int i = 0; i < looked_at; ++i) {
       const int at = i * (frames.count() - 1) / std::max(1, looked_at - 1);
       const xray::XrayImage image = as_read(view, frames.first + at * frames.step);
-      bright[view] += xray::was_inverted(image);
+      bright[view] += image.inverted.has_value();
       const auto found = std::ranges::find(image.warnings, Reason::lossy_image, &Warning::reason);
       if (found != image.warnings.end() && !lossy[view]) lossy[view] = *found;
     }
   });
   for (std::size_t view = 0; view < views_.size(); ++view) {
     if (lossy[view]) warnings_.push_back(*std::move(lossy[view]));
-    inverted_.push_back(2 * bright[view] > looked_at);
+    inverted_.emplace_back();
+    if (2 * bright[view] <= looked_at) continue;
     const std::string& name = views_[view].images.name;
-    if (inverted_.back())
-      warnings_.push_back({Reason::tag_disagrees,
-                           fmt::format("{}: in {} of {} frames {}, those of all its frames", name,
-                                       bright[view], looked_at, xray::inverted_note),
-                           name,
-                           {}});
+    inverted_.back() = {Reason::tag_disagrees,
+                        fmt::format("{}: in {} of {} frames metal is bright; the grey values were inverted, "
+                                    "those of all its frames",
+                                    name, bright[view], looked_at),
+                        name,
+                        {}};
+    warnings_.push_back(*inverted_.back());
   }
 }
 
 void SequenceImages::undo_inversion(std::size_t view) {
-  inverted_[view] = false;
-  std::erase_if(warnings_, [&](const Warning& warning) {
-    return warning.view == views_[view].images.name &&
-           warning.message.find(xray::inverted_note) != std::string::npos;
-  });
+  if (inverted_[view]) std::erase(warnings_, *inverted_[view]);
+  inverted_[view].reset();
 }
 
 Expected<xray::XrayImage> SequenceImages::image(std::size_t view, int frame) const {
   const SequenceView& source = views_[view];
   return guarded([&] {
     xray::XrayImage read = as_read(view, frame);
-    xray::take_polarity(read, inverted_[view]);
+    xray::take_polarity(read, is_inverted(view));
     check_size(source.images.name, frame + source.frame_offset, {read.pixels.width(), read.pixels.height()},
                sizes_[view]);
     return read;

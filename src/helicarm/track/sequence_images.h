@@ -35,7 +35,7 @@ class SequenceImages {
   Expected<std::vector<xray::XrayImage>> at(int frame) const;
 
   /// Whether the view's grey values are inverted because metal looks bright.
-  bool is_inverted(std::size_t view) const { return inverted_[view]; }
+  bool is_inverted(std::size_t view) const { return inverted_[view].has_value(); }
   /// The grey values as stored, without a warning: the view's markers show that its metal is dark.
   void undo_inversion(std::size_t view);
 
@@ -51,7 +51,7 @@ class SequenceImages {
   std::vector<SequenceView> views_;
   std::vector<std::shared_ptr<const xray::ImageFile>> files_;  ///< of several frames; null: numbered files
   std::vector<std::optional<Eigen::Vector2i>> sizes_;
-  std::vector<char> inverted_;
+  std::vector<std::optional<Warning>> inverted_;  ///< of each view that is, the warning among `warnings_`
   std::vector<Warning> warnings_;
 };
 

@@ -8,7 +8,6 @@
 #include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/digest.h"
 #include "helicarm/xray/polarity.h"
-#include "helicarm/xray/run_polarity.h"
 #include "helicarm/xray/uid.h"
 
 namespace helicarm::xray {
@@ -32,7 +31,9 @@ void invert(XrayImage& xray_image) {
 void make_metal_dark(XrayImage& xray_image, const std::string& origin) {
   if (!metal_looks_bright(xray_image.pixels).value_or(false)) return;
   invert(xray_image);
-  xray_image.warnings.push_back({Reason::tag_disagrees, fmt::format("{}: {}", origin, inverted_note)});
+  xray_image.inverted = {Reason::tag_disagrees,
+                         fmt::format("{}: metal is bright; the grey values were inverted", origin)};
+  xray_image.warnings.push_back(*xray_image.inverted);
 }
 
 float highest_grey(const image::Image<float>& pixels) {

@@ -22,7 +22,7 @@ XrayImage dotted(float ground, float dot) {
 
 TEST(RunPolarity, AFrameThatWasInvertedAloneIsAsStoredAgain) {
   XrayImage frame = dotted(1000, 3000);
-  ASSERT_TRUE(was_inverted(frame));
+  ASSERT_TRUE(frame.inverted.has_value());
   take_polarity(frame, false);
   EXPECT_EQ(frame.pixels(0, 0), 1000);
   EXPECT_EQ(frame.pixels(10, 10), 3000);
@@ -31,7 +31,7 @@ TEST(RunPolarity, AFrameThatWasInvertedAloneIsAsStoredAgain) {
 
 TEST(RunPolarity, AFrameThatWasNotInvertedFollowsItsRun) {
   XrayImage frame = dotted(3000, 1000);
-  ASSERT_FALSE(was_inverted(frame));
+  ASSERT_FALSE(frame.inverted.has_value());
   take_polarity(frame, true);
   EXPECT_EQ(frame.pixels(0, 0), 4095 - 3000);
 }

@@ -52,6 +52,9 @@ struct XrayImage {
   float highest = 4095;
   Acquisition acquisition;
   std::vector<Warning> warnings;
+  /// One of the warnings: metal looks bright, so that the reader inverted the grey values. A file that states
+  /// its polarity is never inverted for its looks.
+  std::optional<Warning> inverted = {};
 };
 
 }  // namespace helicarm::xray
