@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "solve_command.h"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
-#include <span>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "command_line.h"
 #include "findings.h"
-#include "helicarm/calibration/calibrate.h"
+#include "helicarm/calibration/solve_view.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/json.h"
-#include "helicarm/exchange/import_matrix.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/pipeline/result.h"
@@ -23,13 +19,7 @@
 namespace helicarm::cli {
 namespace {
 
-struct Solution {
-  geometry::View view;
-  std::optional<geometry::DltFactors> dlt;
-  std::optional<Eigen::MatrixXd> covariance;
-  double condition = 0;
-  double sigmas_exceeded = 1;  ///< residuals over the stated sigmas, where inconsistent
-};
+using calibration::SolvedView;
 
 std::vector<fiducials::Fiducial> points_from(const CsvTable& table, const std::string& origin) {
   std::vector<fiducials::Fiducial> points;
@@ -51,43 +41,20 @@ std::vector<fiducials::Fiducial> points_from(const CsvTable& table, const std::s
   return points;
 }
 
-Expected<Solution> most_likely(const std::vector<fiducials::Fiducial>& points, bool sigmas_given) {
-  calibration::CalibrationOptions options;
-  options.rejection_probability = 0;
-  options.largest_rms_px = std::numeric_limits<double>::infinity();
-  const auto result = calibration::calibrate({{"", points}}, options);
-  if (!result) return tl::unexpected<Failure>(result.error());
-  const calibration::CalibratedView& view = result->views.front();
-  const double scale = sigmas_given ? 1 : result->chi2 / result->dof / result->variance_scale;
-  return Solution{view.view, view.dlt, result->joint_covariance * scale, view.condition,
-                  sigmas_given ? std::sqrt(result->variance_scale) : 1};
-}
-
-Expected<Solution> solve(const std::string& method, const std::vector<fiducials::Fiducial>& points,
-                         const std::vector<geometry::PointPair>& pairs, bool sigmas_given) {
-  if (method == "ml") return most_likely(points, sigmas_given);
-  if (method != "dlt" && method != "homogeneous")
-    return fail(Reason::usage, fmt::format("--method: \"{}\" is none of: dlt, homogeneous, ml", method));
-  const auto result = method == "dlt" ? geometry::dlt_least_squares(pairs) : geometry::dlt_homogeneous(pairs);
-  return result.map([](const geometry::DltResult& dlt) {
-    return Solution{dlt.view, dlt.factors, std::nullopt, dlt.condition, 1};
-  });
-}
-
-Json json_of(const Solution& solution, double rms_px, std::span<const Warning> warnings) {
+Json json_of(const SolvedView& solution) {
   Json json;
   json["dlt"] = solution.dlt ? geometry::json_list(*solution.dlt) : Json();
   json["projection"] = geometry::json_rows(solution.view.projection());
   json["intrinsics"] = geometry::intrinsics_json(solution.view.intrinsics, std::nullopt);
   json["camera_from_world"] = geometry::json_rows(solution.view.camera_from_world.matrix());
   json["covariance"] = solution.covariance ? geometry::json_rows(*solution.covariance) : Json();
-  json["reprojection_rms_px"] = rms_px;
+  json["reprojection_rms_px"] = solution.reprojection_rms_px;
   json["condition"] = solution.condition;
-  json["warnings"] = pipeline::json_list_of(warnings);
+  json["warnings"] = pipeline::json_list_of(solution.warnings);
   return json;
 }
 
-void print_table(const Solution& solution, double rms_px, const std::vector<fiducials::Fiducial>& points,
+void print_table(const SolvedView& solution, const std::vector<fiducials::Fiducial>& points,
                  std::ostream& out) {
   const geometry::Intrinsics& k = solution.view.intrinsics;
   const geometry::RigidTransform& pose = solution.view.camera_from_world;
@@ -106,50 +73,10 @@ void print_table(const Solution& solution, double rms_px, const std::vector<fidu
                      pose.translation.z())
       << fmt::format("source         {:.4f} {:.4f} {:.4f} mm\n", source.x(), source.y(), source.z())
       << fmt::format("condition      {:.3g}\nreprojection   {:.4g} px rms over {} points\n",
-                     solution.condition, rms_px, points.size());
+                     solution.condition, solution.reprojection_rms_px, points.size());
   for (const fiducials::Fiducial& point : points)
     out << fmt::format("  {:<12} {:.4g} px\n", point.label,
                        (solution.view.project(point.centre_in_calibrator) - point.uv).norm());
-}
-
-/// Label of the point with the largest residual.
-std::string farthest(const Solution& solution, const std::vector<fiducials::Fiducial>& points) {
-  const auto residual = [&](const fiducials::Fiducial& point) {
-    return (solution.view.project(point.centre_in_calibrator) - point.uv).norm();
-  };
-  return std::ranges::max_element(points, {}, residual)->label;
-}
-
-std::vector<Warning> warnings_of(const Solution& solution, double rms_px,
-                                 const std::vector<fiducials::Fiducial>& points) {
-  std::vector<Warning> warnings;
-  const double limit = calibration::CalibrationOptions{}.largest_rms_px;
-  if (rms_px > limit)
-    warnings.push_back(
-        {Reason::residual_too_large,
-         fmt::format("{:.3g} px rms, over {:g} px: check the point with the largest residual ({}); "
-                     "solve rejects no outlier",
-                     rms_px, limit, farthest(solution, points)),
-         {},
-         {{"rms_px", rms_px}, {"limit", limit}}});
-  else if (solution.sigmas_exceeded > 1)
-    warnings.push_back(
-        {Reason::residual_too_large,
-         fmt::format(
-             "residuals are {:.3g} times the stated sigma_px, and the covariance is inflated: check the "
-             "point with the largest residual ({}); solve rejects no outlier",
-             solution.sigmas_exceeded, farthest(solution, points)),
-         {},
-         {{"sigmas_exceeded", solution.sigmas_exceeded}}});
-  if (const auto flipped = exchange::mirrored_or_upwards(solution.view.intrinsics))
-    warnings.push_back(*flipped);
-  return warnings;
-}
-
-double distance_to_source(const Solution& solution, const std::vector<geometry::PointPair>& pairs) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const geometry::PointPair& pair : pairs) sum += pair.point_in_world;
-  return (solution.view.source_in_world() - sum / double(pairs.size())).norm();
 }
 
 }  // namespace
@@ -161,21 +88,15 @@ CommandResult solve_command(const SolveArguments& arguments, Console& console) {
   const std::string origin = arguments.points.filename().string();
   const auto points = guarded([&] { return points_from(*table, origin); });
   if (!points) return tl::unexpected<Failure>(points.error());
-  std::vector<geometry::PointPair> pairs;
-  for (const fiducials::Fiducial& point : *points) pairs.push_back({point.centre_in_calibrator, point.uv});
-  const auto solution = solve(arguments.method, *points, pairs, table->has("sigma_px"));
-  if (!solution) return tl::unexpected<Failure>(solution.error());
-  const auto in_mm =
-      exchange::check_source_distance(distance_to_source(*solution, pairs), "the points' middle", origin,
-                                      "give x_mm, y_mm and z_mm in mm; they look like cm or m");
-  if (!in_mm) return in_mm;
-  const double rms_px = geometry::reprojection_rms(solution->view, pairs);
-  const auto warnings = warnings_of(*solution, rms_px, *points);
-  print_warnings(warnings, console);
+  const auto solved = calibration::solve_method(arguments.method, "--method").and_then([&](auto method) {
+    return calibration::solve_view(*points, method, table->has("sigma_px"), {origin, "x_mm, y_mm and z_mm"});
+  });
+  if (!solved) return tl::unexpected<Failure>(solved.error());
+  print_warnings(solved->warnings, console);
   if (console.json)
-    console.out << to_text(json_of(*solution, rms_px, warnings)) << '\n';
+    console.out << to_text(json_of(*solved)) << '\n';
   else
-    print_table(*solution, rms_px, *points, console.out);
+    print_table(*solved, *points, console.out);
   return {};
 }
 

@@ -6,7 +6,6 @@
 #include "helicarm/exchange/itk_transform.h"
 #include "helicarm/exchange/matrix_transform.h"
 #include "helicarm/geometry/decomposition.h"
-#include "helicarm/geometry/dlt.h"
 #include "helicarm/volume/declared.h"
 #include "helicarm/volume/drr_view.h"
 #include "module.h"
@@ -126,23 +125,6 @@ py::dict transform_of_file(const std::filesystem::path& path, const std::optiona
        {}});
 }
 
-py::tuple dlt(const Doubles& xyz_mm, const Doubles& uv, bool homogeneous) {
-  const auto points = rows_of<3>(xyz_mm, "xyz_mm");
-  const auto pixels = rows_of<2>(uv, "uv");
-  if (points.size() != pixels.size())
-    raise(
-        {Reason::bad_value, fmt::format("uv: {} rows, xyz_mm has {}", pixels.size(), points.size()), {}, {}});
-  std::vector<geometry::PointPair> pairs;
-  for (std::size_t i = 0; i < points.size(); ++i) pairs.push_back({points[i], pixels[i]});
-  const auto found =
-      value_or_raise(homogeneous ? geometry::dlt_homogeneous(pairs) : geometry::dlt_least_squares(pairs));
-  Camera camera;
-  camera.view = found.view;
-  const py::object factors =
-      found.factors ? py::object(rows_array<11>({*found.factors}, true)) : py::object(py::none());
-  return py::make_tuple(camera, factors, found.condition, geometry::reprojection_rms(found.view, pairs));
-}
-
 py::object shape_of_image(const Camera& camera) {
   if (!camera.image_size) return py::none();
   return py::make_tuple(camera.image_size->y(), camera.image_size->x());
@@ -241,7 +223,6 @@ Raises InputError: missing_file, truncated, bad_json, bad_value, not_finite, bad
 unit: the file's unit of length. Returns {"moving_from_fixed", "fixed_from_moving"} of an ITK file (LPS, mm), {"matrix",
 "inverse"} of a matrix: (4, 4). Of a sequence of transforms of 3D Slicer (.seq.mha; RAS, to parent): {"index": (N,), "transforms":
 {name: (N, 4, 4)}}, LPS, nan where there is none. Raises InputError as import_camera.)");
-  module.def("_dlt", &dlt);
 }
 
 }  // namespace helicarm::python
