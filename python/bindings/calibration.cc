@@ -135,8 +135,10 @@ HeldCalibration calibrated(const std::vector<ViewPoints>& views, const calibrati
 
 py::dict solved(const ViewPoints& view, const std::string& method, bool sigmas_given) {
   const auto how = value_or_raise(calibration::solve_method(method, "method"));
-  const auto made =
-      value_or_raise(calibration::solve_view(view.fiducials, how, sigmas_given, {"xyz_mm", "the points"}));
+  value_or_raise(calibration::aligned_by_label({view}));
+  const auto made = value_or_raise(without_gil([&] {
+    return calibration::solve_view(view.fiducials, how, sigmas_given, {"xyz_mm", "the points"});
+  }));
   exchange::ImportedMatrix camera;
   camera.view = made.view;
   if (const auto flipped = exchange::mirrored_or_upwards(made.view.intrinsics))

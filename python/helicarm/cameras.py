@@ -9,7 +9,8 @@ def solve(xyz_mm, uv, *, sigma_px=None, labels=None, method="ml"):
     xyz_mm: (N, 3) world; uv: (N, 2); sigma_px: per axis, a number or (N,); None: alike, and estimated from the residuals.
     method: "ml" (maximum likelihood), "dlt" (least-squares solution of Eq. 7) or "homogeneous" (normalised). No outlier is
     rejected. Returns {"camera": Camera, "dlt": (11,) or None, "covariance": (11, 11) or None, "reprojection_rms_px",
-    "condition", "warnings"}. Raises InputError; RefusedError: too_few_fiducials, coplanar_fiducials, ...
+    "condition", "warnings"}. Raises InputError: usage (places not in mm), name_clash, bad_value, not_finite; RefusedError:
+    too_few_fiducials, coplanar_fiducials, ...
     """
     points = _c.ViewPoints("", xyz_mm, uv, sigma_px=1 if sigma_px is None else sigma_px, labels=labels)
     return _c._solve(points, method, sigma_px is not None)

@@ -109,6 +109,25 @@ def test_solve_warns_alike_of_a_point_that_does_not_fit(pair, tmp_path, off_px, 
     assert word in found[0]["message"] and found[0]["code"] == "residual_too_large"
 
 
+@pytest.mark.parametrize("method", ["ml", "dlt", "homogeneous"])
+def test_solve_refuses_places_in_cm_alike(pair, tmp_path, method):
+    uv, places = pair.pixels("AP", pair.xyz), pair.xyz / 10
+    rows = [(f"P{i}", *map(repr, map(float, (*xyz, *at)))) for i, (xyz, at) in enumerate(zip(places, uv))]
+    file = csv(tmp_path / "p.csv", rows, "label,x_mm,y_mm,z_mm,u_px,v_px")
+    done = subprocess.run([PROGRAM, "solve", "--points", file, "--method", method], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and "usage: p.csv: in mm the source lies" in done.stderr
+    with pytest.raises(helicarm.InputError, match="in mm the source lies") as refused:
+        helicarm.solve(places, uv, method=method)
+    assert refused.value.code == "usage"
+
+
+def test_solve_refuses_a_label_given_twice(pair):
+    labels = ["P1", "P1", *(f"P{i}" for i in range(3, len(pair.xyz) + 1))]
+    with pytest.raises(helicarm.InputError) as refused:
+        helicarm.solve(pair.xyz, pair.pixels("AP", pair.xyz), labels=labels)
+    assert refused.value.code == "name_clash"
+
+
 def test_drr_gives_the_same_pixels(tmp_path):
     voxels = np.random.default_rng(2).integers(-1000, 2000, (9, 8, 7)).astype("<i2")
     (tmp_path / "a.mha").write_bytes(b"NDims = 3\nDimSize = 9 8 7\nElementSpacing = 2 2 3\nElementType = MET_SHORT\n"

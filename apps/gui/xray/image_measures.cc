@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "gui/xray/text.h"
+#include "helicarm/core/statistics.h"
 
 namespace helicarm::gui {
 namespace {
@@ -13,7 +14,6 @@ namespace {
 using measures::Kind;
 
 /// Half of a 95 % interval of a normal distribution, in standard deviations.
-constexpr double sigmas_at_95 = 1.96;
 
 QString unit_of(const measures::Quantity& quantity) {
   return quantity.unit == "deg" ? QStringLiteral("°") : " " + text(quantity.unit);
@@ -27,7 +27,7 @@ QString value_of(const measures::Quantity& quantity) {
 
 QString within_of(const measures::Quantity& quantity) {
   if (!quantity.sigma) return {};
-  return "±" + fixed(sigmas_at_95 * *quantity.sigma, digits_of(quantity)) + unit_of(quantity);
+  return "±" + fixed(normal_at_975 * *quantity.sigma, digits_of(quantity)) + unit_of(quantity);
 }
 
 QString words_of(std::string_view name) {
@@ -123,7 +123,7 @@ void add_results(EvaluatedMeasure& done, const MeasuredLine& head, const measure
       MeasuredLine line = head;
       line.what = text(position.point) + ", " + words_of(components[i]);
       line.value = fixed(position.percent[at], 1) + " %";
-      line.within = "±" + fixed(sigmas_at_95 * std::sqrt(position.covariance(at, at)), 1) + " %";
+      line.within = "±" + fixed(normal_at_975 * std::sqrt(position.covariance(at, at)), 1) + " %";
       all << line.value;
       done.lines.push_back(line);
     }

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "helicarm/core/failure.h"
 #include "helicarm/fiducials/fiducial.h"
 #include "helicarm/geometry/dlt.h"
 
@@ -27,13 +28,13 @@ struct SolvedView {
   std::optional<Eigen::MatrixXd> covariance;
   double condition = 0;  ///< as `geometry::dlt_condition`
   double reprojection_rms_px = 0;
-  std::vector<Warning> warnings;  ///< residual_too_large; mirrored or upside down
+  std::vector<Warning> warnings;  ///< residual_too_large, ambiguous_handedness
 };
 
 /// Where points and their places come from, for messages.
 struct PointsOrigin {
   std::string file;    ///< or argument
-  std::string places;  ///< the columns of the places
+  std::string places;  ///< the columns of the places, or words for them
 };
 
 /// Eq. 4-7 with every point, none of which is rejected: by maximum likelihood, by least squares of Eq. 7 or

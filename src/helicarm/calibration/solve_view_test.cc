@@ -2,7 +2,9 @@
 #include "helicarm/calibration/solve_view.h"
 
 #include <cmath>
+#include <string>
 
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 
 #include "helicarm/core/random.h"

@@ -28,9 +28,8 @@ std::map<std::string, double> figures_of(const BoneCheck& check) {
 /// Bridge and bone ahead of the end in words.
 std::string places_of(const BoneCheck& check) {
   if (!check.entry)
-    return check.length_in_bone_mm > 0
-               ? "its line enters the bone where the CT ends, which shows no surface there"
-               : "its line does not pass through the bone";
+    return check.enters_at_cut ? "its line enters the bone where the CT ends, which shows no surface there"
+                               : "its line does not pass through the bone";
   std::string text;
   if (check.bridge_mm)
     text = fmt::format(

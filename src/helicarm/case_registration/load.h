@@ -24,7 +24,7 @@ struct LoadedViews {
   Eigen::MatrixXd camera_covariance;  ///< 11 n x 11 n; empty: cameras taken as exact
   std::string patient_key;            ///< as xray::Acquisition, of the first view that has one
   std::vector<Warning> warnings;
-  std::vector<Warning> inverted = {};  ///< of the warnings `xray::XrayImage::inverted`
+  std::vector<Warning> inverted = {};  ///< those that are an image's `xray::XrayImage::inverted`
 };
 
 /// The views of a case: calibrated by the program, then fiducials, plate dots and check targets are masked,

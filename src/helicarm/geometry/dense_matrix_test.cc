@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/geometry/dense_matrix.h"
 
+#include <cmath>
+
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 namespace helicarm::geometry {
@@ -85,6 +88,17 @@ TEST(Whitening, WhitensTheCovariance) {
 
 TEST(Whitening, IndefiniteCovarianceHasNone) {
   EXPECT_FALSE(whitening((Eigen::MatrixXd(2, 2) << 1, 2, 2, 1).finished()));
+}
+
+TEST(LogDeterminant, IsThatOfAPositiveMatrixAndNothingOfAnother) {
+  const Eigen::MatrixXd positive = gram(tall_matrix());
+  EXPECT_NEAR(*log_determinant(positive), std::log(positive.determinant()), 1e-12);
+  EXPECT_FALSE(log_determinant(-positive));
+}
+
+TEST(Inverse, TimesTheMatrixIsOne) {
+  const Eigen::MatrixXd matrix = gram(tall_matrix());
+  EXPECT_TRUE((inverse(matrix) * matrix).isIdentity(1e-12));
 }
 
 }  // namespace

@@ -17,9 +17,14 @@ struct SmallSymmetricEigen {
   Eigen::Matrix<double, n, n> vectors;
 };
 
-/// Of a symmetric matrix, of which the lower triangle is read.
+/// Of a symmetric matrix, of which the lower triangle is read. Expressions take that of dense_matrix.h.
 template <int n>
 requires(n == 2 || n == 3) SmallSymmetricEigen<n> symmetric_eigen(const Eigen::Matrix<double, n, n>& matrix);
+
+template <>
+SmallSymmetricEigen<2> symmetric_eigen<2>(const Eigen::Matrix2d& matrix);
+template <>
+SmallSymmetricEigen<3> symmetric_eigen<3>(const Eigen::Matrix3d& matrix);
 
 /// Likewise, ascending.
 Vector6d symmetric_eigenvalues(const Matrix6d& matrix);

@@ -28,9 +28,10 @@ struct BoneCheck {
   std::optional<double> at_mm = {};                    ///< depth of the bridge
   Eigen::Vector3d thinnest = Eigen::Vector3d::Zero();  ///< on the axis at that depth
   Eigen::Vector3d outward = Eigen::Vector3d::Zero();   ///< normal of the surface nearest to it
-  double length_in_bone_mm = 0;  ///< without an entry: the line enters where the volume ends
-  std::optional<Eigen::Vector3d> entry =
-      {};  ///< on the bone's surface; nothing: the line does not meet the bone
+  double length_in_bone_mm = 0;
+  /// On the bone's surface; nothing: the line does not meet the bone, or enters it where the volume ends.
+  std::optional<Eigen::Vector3d> entry = {};
+  bool enters_at_cut = false;                ///< where the volume ends, which shows no surface there
   std::optional<Eigen::Vector3d> exit = {};  ///< likewise; nothing: a blind tunnel
   std::optional<double> entry_angle_deg = {},
                         exit_angle_deg = {};      ///< between axis and surface; 90: perpendicular

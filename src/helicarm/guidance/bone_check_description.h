@@ -23,7 +23,8 @@ void describe_bone_check(Output& output, const BoneCheck& check) {
   output.value("length_in_bone_mm", check.length_in_bone_mm, "of the axis");
   output.value(
       "entry_mm", check.entry,
-      "where the axis enters the bone, in the model's coordinates; `null`: the line does not meet it");
+      "where the axis enters the bone, in the model's coordinates; `null`: the line does not meet it, "
+      "or enters it where the volume ends");
   output.value("exit_mm", check.exit, "where it leaves the bone; `null` for a blind tunnel too");
   output.value("entry_angle_deg", check.entry_angle_deg,
                "between axis and surface there; 90 is perpendicular");

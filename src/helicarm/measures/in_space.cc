@@ -6,7 +6,6 @@
 #include <numbers>
 #include <optional>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 

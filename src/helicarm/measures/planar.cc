@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "helicarm/geometry/dense_matrix.h"
 
@@ -29,7 +29,7 @@ std::optional<Circle> algebraic_circle(std::span<const Vector2d> points) {
     right[Eigen::Index(i)] = p.squaredNorm();
   }
   const auto solved = geometry::linear_least_squares(design, right);
-  if (!(solved.last_pivot > 1e-9)) return std::nullopt;
+  if (solved.rank < 3 || !(solved.last_pivot > 1e-9)) return std::nullopt;
   const Eigen::Vector3d found = solved.solution;
   const double square = found[2] + found.head<2>().squaredNorm();
   if (!(square > 0)) return std::nullopt;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "helicarm/core/reason_code.h"

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "helicarm/geometry/rotation.h"

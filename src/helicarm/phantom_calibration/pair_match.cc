@@ -8,7 +8,6 @@
 #include <tuple>
 
 #include "helicarm/geometry/dense_matrix.h"
-#include "helicarm/geometry/small_matrix.h"
 
 namespace helicarm::phantom_calibration {
 namespace {

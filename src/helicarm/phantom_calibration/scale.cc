@@ -86,7 +86,8 @@ Expected<ScaledPoints> scaled_by(const std::vector<Vector3d>& centres, const Eig
   Eigen::MatrixXd innovation = rows * gain_rows;
   for (Eigen::Index k = 0; k < count; ++k)
     innovation(k, k) += distances[std::size_t(k)].sigma_mm * distances[std::size_t(k)].sigma_mm;
-  const Eigen::MatrixXd gain = gain_rows * geometry::inverse(innovation);
+  // Not by an inverse: of an unknown scale its numbers are large, and cancel.
+  const Eigen::MatrixXd gain = geometry::solve_spd(innovation, gain_rows.transpose()).solution.transpose();
   const Eigen::VectorXd change = gain * residual;
   for (std::size_t i = 0; i < centres.size(); ++i)
     scaled.centres[i] += change.segment<3>(3 * Eigen::Index(i));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/phantom_calibration/scale.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "helicarm/phantom_calibration/synthetic_phantom_test.h"
@@ -56,6 +58,21 @@ TEST(Scale, TwoDistancesThatAgreeHalveTheVariance) {
                 {{0, 2, given.distance(0, 2), 0.2}, {0, 1, given.distance(0, 1), 0.2}}, given.labels);
   ASSERT_TRUE(one && two);
   EXPECT_LT(two->scale_sigma, 0.85 * one->scale_sigma);
+}
+
+TEST(Scale, SeveralFineDistancesLeaveTheirMeansError) {
+  const Unscaled given;
+  constexpr double sigma_mm = 0.005;
+  std::vector<CentreDistance> distances;
+  double information = 0;
+  for (std::size_t k = 1; k < 7; ++k) {
+    distances.push_back({0, k, given.distance(0, k), sigma_mm});
+    information += std::pow(given.distance(0, k) / sigma_mm, 2);
+  }
+  const auto scaled =
+      scaled_by(given.centres, MatrixXd(1e-12 * MatrixXd::Identity(36, 36)), distances, given.labels);
+  ASSERT_TRUE(scaled) << scaled.error().message;
+  EXPECT_NEAR(scaled->scale_sigma * std::sqrt(information), 1, 0.01);
 }
 
 TEST(Scale, DistancesThatContradictEachOtherAreRefusedByName) {

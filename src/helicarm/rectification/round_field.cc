@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"

@@ -66,7 +66,7 @@ class Check {
     check.diameter_mm = diameter_;
     if (!find_openings()) return std::nullopt;
     if (!entry_) {
-      if (bone_.holds(at(length_ / 2))) check.length_in_bone_mm = length_;
+      check.enters_at_cut = bone_.holds(start_);
       return check;
     }
     const double to = exit_ ? exit_->at_mm : length_;

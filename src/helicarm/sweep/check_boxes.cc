@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Geometry>
-
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/triangulation.h"
 

@@ -15,7 +15,6 @@ namespace {
 // Of a step along the path: frames of a gantry that rests share a node, as shorter steps are all but rigid,
 // and their information would hide the frames'.
 constexpr double least_step_deg = 0.05;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 // Of the path's first value (mm, mm, rad) and rate per degree: far beyond any C-arm's flex.
 constexpr std::array first_sigma{100.0, 100.0, 0.5};
 constexpr std::array rate_sigma{5.0, 5.0, 0.05};
@@ -33,7 +32,8 @@ CameraMatrix inverse_of(const CameraMatrix& matrix) {
 double log_determinant(const CameraMatrix& matrix) {
   const CameraVector root = matrix.diagonal().cwiseSqrt().cwiseInverse();
   const CameraMatrix unit = root.asDiagonal() * matrix * root.asDiagonal();
-  return geometry::log_determinant(unit).value_or(nan) - 2 * root.array().log().sum();
+  return geometry::log_determinant(unit).value_or(std::numeric_limits<double>::quiet_NaN()) -
+         2 * root.array().log().sum();
 }
 
 /// A frame's jitter about the path: its information, without any on the turn.
@@ -246,17 +246,17 @@ SmoothPath smooth_path(const std::vector<PathObservation>& frames, const PathPri
     point.camera = about * frame.information * frame.value + to_path * point.path;
     point.camera_covariance = about + to_path * point.path_covariance * to_path.transpose();
     // The others' path: this frame's information taken from the node.
-    const ChainMatrix information = geometry::inverse(Eigen::MatrixXd(covariance));
+    const ChainMatrix information = geometry::inverse(covariance);
     ChainMatrix without = information;
     without.topLeftCorner<camera_size, camera_size>() -= problem.on_path[i];
-    const ChainMatrix of_others = geometry::inverse(Eigen::MatrixXd(without));
+    const ChainMatrix of_others = geometry::inverse(without);
     const ChainVector at =
         of_others * (information * path[i].col(0) - on_chain(problem.on_path[i] * frame.value).col(0));
     const CameraVector off = frame.value - at.head<camera_size>();
     // Residual's information, the turn left free: (path's^-1 + on_path^-1)^-1 without an inverse of on_path.
     const CameraMatrix of_path = of_others.topLeftCorner<camera_size, camera_size>();
     const CameraMatrix mixed = CameraMatrix::Identity() + of_path * problem.on_path[i];
-    point.off_path_chi2 = off.dot(problem.on_path[i] * (geometry::inverse(Eigen::MatrixXd(mixed)) * off));
+    point.off_path_chi2 = off.dot(problem.on_path[i] * (geometry::inverse(mixed) * off));
   }
   return smooth;
 }

@@ -3,7 +3,6 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "helicarm/core/csv.h"

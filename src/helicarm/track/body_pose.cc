@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Geometry>
-
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/small_matrix.h"

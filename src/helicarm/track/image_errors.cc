@@ -88,7 +88,7 @@ GapSquares gap_squares(const SequenceData& work) {
 /// By how much a 95 % band is wider because the errors' variance is itself estimated: by as many independent
 /// gaps as the part that a marker's gaps have in common (texture moves with it) leaves.
 double few_gaps_factor(const SequenceData& work) {
-  constexpr double z = 1.96, fewest = 4;
+  constexpr double z = normal_at_975, fewest = 4;
   const GapSquares squares = gap_squares(work);
   if (!squares.is_enough()) return 1;
   const double per_marker = squares.count / squares.markers;

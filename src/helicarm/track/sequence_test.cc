@@ -3,9 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <functional>
-#include <limits>
-#include <optional>
 #include <random>
 
 #include <gtest/gtest.h>

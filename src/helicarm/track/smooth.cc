@@ -131,7 +131,7 @@ Filtered filter(std::span<const double> times, std::span<const std::optional<Mea
       const Eigen::Matrix<double, state_size, 6> gain = covariance.leftCols<6>() * weight;
       result.squares += off.dot(weight * off);
       result.log_widths +=
-          0.5 * geometry::log_determinant(spread).value_or(std::numeric_limits<double>::quiet_NaN());
+          0.5 * geometry::log_determinant(spread).value_or(std::numeric_limits<double>::infinity());
       ++result.updates;
       state = moved(state, gain * off);
       covariance -= gain * covariance.topRows<6>();

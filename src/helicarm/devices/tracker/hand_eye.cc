@@ -131,7 +131,7 @@ Expected<HandEye> refined(std::span<const HandEyePair> pairs, double sigma_mm, d
   };
   auto fit = geometry::fit_least_squares(start, linearise, stepped);
   if (!fit->converged) return fail(Reason::uncertain, "the hand-eye calibration does not converge");
-  fit->state.covariance = geometry::inverse(Eigen::MatrixXd(fit->equations.information));
+  fit->state.covariance = geometry::inverse(fit->equations.information);
   return fit->state;
 }
 

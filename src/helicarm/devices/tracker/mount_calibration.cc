@@ -122,7 +122,8 @@ Fit fit_from(const geometry::RigidTransform& start, const Places& places, const 
   // An exact tip has the weight of a nanometre.
   const Matrix3d tip_covariance =
       options.tip_covariance.value_or(Matrix3d(unknown_tip_mm * unknown_tip_mm * Matrix3d::Identity()));
-  const Matrix3d tip_weight = (tip_covariance + 1e-12 * Matrix3d::Identity()).inverse();
+  const Matrix3d tip_weight =
+      geometry::solve_spd(tip_covariance + 1e-12 * Matrix3d::Identity(), Matrix3d::Identity()).solution;
   const auto linearise = [&](const Mount& mount) {
     geometry::NormalEquations<parameters> equations{Eigen::Matrix<double, parameters, parameters>::Zero(),
                                                     Step::Zero()};
@@ -334,9 +335,9 @@ Expected<MountCalibration> calibrate_mount(const Places& places, std::span<const
     PoseCovariance reading = PoseCovariance::Zero();
     reading.diagonal().head<3>().setConstant(options.sigma_mm * options.sigma_mm);
     reading.diagonal().tail<3>().setConstant(turn * turn);
-    mount.covariance = std::max(1.0, mount.chi2 / mount.dof) *
-                           geometry::inverse(Eigen::MatrixXd(fitted.information)).topLeftCorner<6, 6>() +
-                       reading;
+    mount.covariance =
+        std::max(1.0, mount.chi2 / mount.dof) * geometry::inverse(fitted.information).topLeftCorner<6, 6>() +
+        reading;
     for (const auto& [label, place] : places) {
       Eigen::Matrix<double, 3, 6> effect;
       effect << Matrix3d::Identity(),
