@@ -6,9 +6,7 @@
 #include "held_calibration.h"
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/calibration/labelled_views.h"
-#include "helicarm/calibration/solve_view.h"
 #include "helicarm/core/files.h"
-#include "helicarm/exchange/import_matrix.h"
 #include "helicarm/phantom/calibrator_limits.h"
 #include "module.h"
 
@@ -133,27 +131,6 @@ HeldCalibration calibrated(const std::vector<ViewPoints>& views, const calibrati
   return held;
 }
 
-py::dict solved(const ViewPoints& view, const std::string& method, bool sigmas_given) {
-  const auto how = value_or_raise(calibration::solve_method(method, "method"));
-  value_or_raise(calibration::aligned_by_label({view}));
-  const auto made = value_or_raise(without_gil([&] {
-    return calibration::solve_view(view.fiducials, how, sigmas_given, {"xyz_mm", "the points"});
-  }));
-  exchange::ImportedMatrix camera;
-  camera.view = made.view;
-  if (const auto flipped = exchange::mirrored_or_upwards(made.view.intrinsics))
-    camera.warnings.push_back(*flipped);
-  py::dict answer;
-  answer["camera"] = camera;
-  answer["dlt"] = made.dlt ? py::object(rows_array<11>({*made.dlt}, true)) : py::object(py::none());
-  answer["covariance"] =
-      made.covariance ? py::object(matrix_array(*made.covariance)) : py::object(py::none());
-  answer["reprojection_rms_px"] = made.reprojection_rms_px;
-  answer["condition"] = made.condition;
-  answer["warnings"] = warning_list(made.warnings);
-  return answer;
-}
-
 HeldCalibration loaded(const std::filesystem::path& path) {
   return {value_or_raise(calibration::saved_calibration_from_json(value_or_raise(read_json(path)),
                                                                   path.filename().string())),
@@ -273,7 +250,6 @@ World: calibrator frame, mm. Pixels: rectified unless raw=True. A view is given 
   add_point_methods(held);
   add_parameters(held);
   const calibration::CalibrationOptions usual;
-  module.def("_solve", &solved);
   module.def("calibrate", &calibrated, py::arg("views"), py::kw_only(), py::arg("c_arm") = usual.common.c_arm,
              py::arg("ball_covariance_mm2") = py::none(), py::arg("ball_labels") = py::none(),
              py::arg("scale_sigma") = usual.common.scale_sigma,

@@ -5,6 +5,9 @@
 #include "arrays.h"
 #include "checks.h"
 #include "held_calibration.h"
+#include "helicarm/calibration/labelled_views.h"
+#include "helicarm/calibration/solve_view.h"
+#include "helicarm/exchange/import_matrix.h"
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/fiducials/status_words.h"
 #include "helicarm/phantom/calibrator_limits.h"
@@ -60,10 +63,13 @@ std::string words_of(const geometry::IntrinsicsPrior& prior) {
                      principal, prior.unit_px, words_of(prior.aspect), words_of(prior.skew));
 }
 
-void check_extent(const std::vector<Eigen::Vector3d>& points, const std::string& view) {
+void check_extent(const std::vector<fiducials::Fiducial>& points, const std::string& view) {
   if (points.size() < 2) return;
-  Eigen::Vector3d low = points[0], high = points[0];
-  for (const Eigen::Vector3d& point : points) low = low.cwiseMin(point), high = high.cwiseMax(point);
+  Eigen::Vector3d low = points[0].centre_in_calibrator, high = low;
+  for (const fiducials::Fiducial& point : points) {
+    low = low.cwiseMin(point.centre_in_calibrator);
+    high = high.cwiseMax(point.centre_in_calibrator);
+  }
   const double extent = (high - low).maxCoeff();
   if (extent < phantom::least_extent_mm)
     raise(
@@ -115,11 +121,11 @@ void check_map_share(const ViewPoints& view) {
   }
 }
 
-ViewPoints view_points(const std::string& name, const Doubles& xyz_mm, const Doubles& uv,
-                       const Doubles& sigma_px, const std::optional<std::vector<std::string>>& labels,
-                       const geometry::IntrinsicsPrior& prior,
-                       const std::optional<Doubles>& map_covariance_px2,
-                       const std::optional<rectification::DistortionMap>& map, std::optional<bool> mirrored) {
+using GivenLabels = std::optional<std::vector<std::string>>;
+
+std::vector<fiducials::Fiducial> points_of(const std::string& name, const Doubles& xyz_mm, const Doubles& uv,
+                                           const Doubles& sigma_px, const GivenLabels& labels,
+                                           const std::optional<rectification::DistortionMap>& map) {
   const auto points = rows_of<3>(xyz_mm, "xyz_mm", name);
   const auto pixels = rows_of<2>(uv, "uv", name);
   const std::size_t n = points.size();
@@ -129,27 +135,59 @@ ViewPoints view_points(const std::string& name, const Doubles& xyz_mm, const Dou
                        labels ? labels->size() : n),
            name,
            {}});
-  if (map && map_covariance_px2)
-    raise({Reason::usage, "map_covariance_px2: is computed from the map; give one of them", name, {}});
   const std::vector<double> sigmas = sigmas_of(sigma_px, n, name);
-  check_extent(points, name);
-  ViewPoints view{{name, {}, prior, {}, {}}, mirrored, map};
-  std::vector<Eigen::Vector2d> places;
+  std::vector<fiducials::Fiducial> made;
   for (std::size_t i = 0; i < n; ++i) {
     const auto [raw, rectified, sigma] = image_point(pixels[i], sigmas[i], map, name);
-    fiducials::Fiducial fiducial{labels ? (*labels)[i] : fmt::format("P{}", i + 1), points[i],
-                                 FiducialStatus::used, raw, rectified};
-    fiducial.sigma_px = sigma;
-    view.fiducials.push_back(fiducial);
-    places.push_back(rectified);
+    fiducials::Fiducial& point = made.emplace_back(fiducials::Fiducial{
+        labels ? (*labels)[i] : fmt::format("P{}", i + 1), points[i], FiducialStatus::used, raw, rectified});
+    point.sigma_px = sigma;
   }
+  return made;
+}
+
+ViewPoints view_points(const std::string& name, const Doubles& xyz_mm, const Doubles& uv,
+                       const Doubles& sigma_px, const GivenLabels& labels,
+                       const geometry::IntrinsicsPrior& prior,
+                       const std::optional<Doubles>& map_covariance_px2,
+                       const std::optional<rectification::DistortionMap>& map, std::optional<bool> mirrored) {
+  if (map && map_covariance_px2)
+    raise({Reason::usage, "map_covariance_px2: is computed from the map; give one of them", name, {}});
+  ViewPoints view{{name, points_of(name, xyz_mm, uv, sigma_px, labels, map), prior, {}, {}}, mirrored, map};
+  check_extent(view.fiducials, name);
+  std::vector<Eigen::Vector2d> places;
+  for (const fiducials::Fiducial& point : view.fiducials) places.push_back(point.uv);
   if (map) view.map_covariance_px2 = map->covariance_px2(places);
   if (!map_covariance_px2) return view;
-  const auto size = py::ssize_t(n);
+  const auto size = py::ssize_t(view.fiducials.size());
   view.map_covariance_px2 = checked_covariance(
       matrix_of(*map_covariance_px2, size, size, "map_covariance_px2", name), "map_covariance_px2", name);
   check_map_share(view);
   return view;
+}
+
+py::dict solved(const Doubles& xyz_mm, const Doubles& uv, const std::optional<Doubles>& sigma_px,
+                const GivenLabels& labels, const std::string& method) {
+  const auto how = value_or_raise(calibration::solve_method(method, "method"));
+  const auto points =
+      points_of("", xyz_mm, uv, sigma_px ? *sigma_px : Doubles(py::object(py::float_(1.0))), labels, {});
+  value_or_raise(calibration::aligned_by_label({{"", points}}));
+  const auto made = value_or_raise(without_gil([&] {
+    return calibration::solve_view(points, how, sigma_px.has_value(), {"xyz_mm", "the points"});
+  }));
+  exchange::ImportedMatrix camera;
+  camera.view = made.view;
+  if (const auto flipped = exchange::mirrored_or_upwards(made.view.intrinsics))
+    camera.warnings.push_back(*flipped);
+  py::dict answer;
+  answer["camera"] = camera;
+  answer["dlt"] = made.dlt ? py::object(rows_array<11>({*made.dlt}, true)) : py::object(py::none());
+  answer["covariance"] =
+      made.covariance ? py::object(matrix_array(*made.covariance)) : py::object(py::none());
+  answer["reprojection_rms_px"] = made.reprojection_rms_px;
+  answer["condition"] = made.condition;
+  answer["warnings"] = warning_list(made.warnings);
+  return answer;
 }
 
 using GivenMap = std::variant<std::monostate, rectification::Rectification, rectification::DistortionMap>;
@@ -254,6 +292,7 @@ py::list fiducial_list(const std::vector<fiducials::Fiducial>& fiducials) {
 }
 
 void add_view_points(py::module_& module) {
+  module.def("_solve", &solved);
   add_priors(module);
   const auto count_used = [](const ViewPoints& view) {
     return std::size_t(

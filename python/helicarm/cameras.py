@@ -12,5 +12,4 @@ def solve(xyz_mm, uv, *, sigma_px=None, labels=None, method="ml"):
     "condition", "warnings"}. Raises InputError: usage (places not in mm), name_clash, bad_value, not_finite; RefusedError:
     too_few_fiducials, coplanar_fiducials, ...
     """
-    points = _c.ViewPoints("", xyz_mm, uv, sigma_px=1 if sigma_px is None else sigma_px, labels=labels)
-    return _c._solve(points, method, sigma_px is not None)
+    return _c._solve(xyz_mm, uv, sigma_px, labels, method)
