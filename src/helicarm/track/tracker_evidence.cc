@@ -16,8 +16,8 @@ namespace {
 
 /// Logarithm of the likelihood ratio that makes a marker certain.
 double enough_evidence() {
-  constexpr double detected = 0.95, certain = 0.99;  // before and after the image is seen
-  return std::log(certain / (1 - certain)) - std::log(detected / (1 - detected));
+  constexpr double before = 0.95, after = 0.99;  // the image is seen
+  return std::log(after / (1 - after)) - std::log(before / (1 - before));
 }
 
 }  // namespace
