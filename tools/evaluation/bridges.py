@@ -57,13 +57,22 @@ def values_at(array, points):
     return np.where(inside, total, 1e3)
 
 
+def is_shown(points):
+    """Whether (n, 3) places lie in the CT."""
+    at = (points - bone_ct.LOW) / VOXEL_MM
+    return bool(np.all((at >= 0) & (at < np.array(bone_ct.SIZE) - 1)))
+
+
 def bridge_of(distance, surface, axis, along, diameter):
     """(bridge, its depth, where the line enters and leaves) of a tunnel through the place `axis`, from which depths count; None where that
-    is outside the bone, too near to an opening, or the bridge depends on what counts as one."""
+    is outside the bone, too near to an opening, the line enters or leaves where the CT ends, or the bridge depends on what counts as an
+    opening."""
     steps = np.arange(-90, 90, 0.25)
     outside = steps[values_at(distance, axis + steps[:, None] * along) >= 0]
     before, behind = outside[outside <= 0], outside[outside >= 0]
     if not len(before) or not len(behind) or before[-1] > -OPENING_MM or behind[0] < OPENING_MM:
+        return None
+    if not is_shown(axis + np.array([[before[-1]], [behind[0]]]) * along):
         return None
     depth = (surface - axis) @ along
     beside = np.linalg.norm(surface - axis - depth[:, None] * along, axis=1) - diameter / 2
