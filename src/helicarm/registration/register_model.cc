@@ -314,7 +314,8 @@ Registration registered_anywhere(const Model& model, const std::vector<Registrat
   for (const Alternative& other : found.alternatives) from.push_back(other.world_from_model);
   Registration again = registered(model, views, starts, options, from, true);
   again.seconds += found.seconds;
-  if (!again.failure) return again;
+  // Of all that is near to what was found, a single start that is not refused is chance.
+  if (!again.failure && again.agree >= 2) return again;
   found.seconds = again.seconds;
   return found;
 }
