@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "helicarm/case_registration/dicom_registrations.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/report/earlier_results.h"
 #include "helicarm/xray/dicom_tags.h"
 
@@ -21,7 +22,6 @@ using xray::ReportMark;
 using xray::ReportValue;
 
 /// Half of the 95 % interval of a normal error, in standard deviations.
-constexpr double half_of_95 = 1.959964;
 
 Code in_mm() { return {"mm", "UCUM", "mm"}; }
 Code in_degrees() { return {"deg", "UCUM", "deg"}; }
@@ -34,7 +34,7 @@ Code own_code(std::string value, const std::string& meaning) {
 }
 
 ReportValue value_of(const Code& name, const Code& unit, double value, std::optional<double> sigma = {}) {
-  return {name, unit, value, sigma, sigma ? std::optional(half_of_95 * *sigma) : std::nullopt};
+  return {name, unit, value, sigma, sigma ? std::optional(normal_at_975 * *sigma) : std::nullopt};
 }
 
 ReportValue failed_value(const Code& name, const Code& unit, std::string why) {

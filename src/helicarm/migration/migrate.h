@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/migration/exam.h"
 #include "helicarm/migration/rigid_fit.h"
 
@@ -55,7 +56,7 @@ struct Migration {
   bool is_by_residuals =
       false;           ///< the covariances follow from the residuals: markers' errors are not stated
   double freedom = 0;  ///< degrees of freedom of these residuals
-  double width_of_95 = 1.959964;  ///< standard deviations of a 95 % interval
+  double width_of_95 = normal_at_975;  ///< standard deviations of a 95 % interval
   std::vector<Warning> warnings;
 };
 

@@ -8,13 +8,14 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/report/markup.h"
 
 namespace helicarm::track {
 namespace {
 
-constexpr double degrees = 180 / EIGEN_PI, width_of_95 = 1.959964;
+constexpr double degrees = 180 / EIGEN_PI;
 constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
@@ -41,7 +42,7 @@ report::Chart pose_chart(const std::vector<int>& numbers, const std::vector<Trac
                                  : (frames[f].centre - start)[axis];
       const int at = axis + (turns ? 0 : 3);
       const double width =
-          width_of_95 * (turns ? degrees : 1) * std::sqrt(std::max(0.0, pose->covariance(at, at)));
+          normal_at_975 * (turns ? degrees : 1) * std::sqrt(std::max(0.0, pose->covariance(at, at)));
       curve.points.push_back({double(numbers[f]), value});
       curve.ranges.push_back({value - width, value + width});
     }

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/report/chart.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/table.h"
@@ -67,7 +68,6 @@ std::string body_charts(const Sequence& sequence, const TrackCase& the_case) {
 
 /// Nothing where the bodies have no origins.
 std::optional<report::Chart> shift_chart(const Sequence& sequence, const Joint& joint) {
-  constexpr double bar_sigmas = 1.959964;
   constexpr std::array names{"lateral", "anterior", "distraction"};
   report::Chart chart{"Joint translations (Grood and Suntay)", "frame", "mm"};
   bool is_any = false;
@@ -79,7 +79,7 @@ std::optional<report::Chart> shift_chart(const Sequence& sequence, const Joint& 
       const bool is_here = at && at->shift;
       is_any = is_any || is_here;
       const double value = is_here ? (*at->shift)[i] : no_value;
-      const double width = is_here ? bar_sigmas * std::sqrt(at->shift_covariance(i, i)) : no_value;
+      const double width = is_here ? normal_at_975 * std::sqrt(at->shift_covariance(i, i)) : no_value;
       curve.points.push_back({double(sequence.frames[f]), value});
       curve.ranges.push_back({value - width, value + width});
     }
@@ -89,7 +89,7 @@ std::optional<report::Chart> shift_chart(const Sequence& sequence, const Joint& 
 }
 
 std::vector<report::Chart> charts_of_joint(const Sequence& sequence, const Joint& joint) {
-  constexpr double to_degrees = 180 / EIGEN_PI, bar_sigmas = 1.959964;
+  constexpr double to_degrees = 180 / EIGEN_PI;
   constexpr std::array names{"flexion", "adduction", "external rotation"};
   report::Chart chart{"Joint angles (Grood and Suntay)", "frame", "degrees"};
   for (int i = 0; i < 3; ++i) {
@@ -98,7 +98,7 @@ std::vector<report::Chart> charts_of_joint(const Sequence& sequence, const Joint
     for (std::size_t f = 0; f < sequence.frames.size(); ++f) {
       const auto& at = joint.frames[f];
       const double value = at ? to_degrees * at->angles[i] : no_value;
-      const double width = at ? bar_sigmas * to_degrees * std::sqrt(at->covariance(i, i)) : no_value;
+      const double width = at ? normal_at_975 * to_degrees * std::sqrt(at->covariance(i, i)) : no_value;
       curve.points.push_back({double(sequence.frames[f]), value});
       curve.ranges.push_back({value - width, value + width});
     }
