@@ -26,6 +26,7 @@ LOW_MM, HIGH_MM = -2, 6
 OPENING_MM = 12
 TRIES = 300  # of places for one bridge
 VOXEL_MM = bone_ct.VOXEL_MM
+BEYOND_MM = 1e3  # value outside the grid
 
 
 def surface_of(distance):
@@ -44,7 +45,7 @@ def surface_of(distance):
 
 
 def values_at(array, points):
-    """Trilinear, of a (S, P, L) array at (n, 3) places L, P, S; far outside where the grid ends."""
+    """Trilinear, of a (S, P, L) array at (n, 3) places L, P, S; BEYOND_MM where the grid ends."""
     at = (points - bone_ct.LOW) / VOXEL_MM
     low = np.floor(at).astype(int)
     inside = np.all((low >= 0) & (low < np.array(bone_ct.SIZE) - 1), axis=1)
@@ -54,13 +55,7 @@ def values_at(array, points):
         weight = np.prod(np.where(corner, share, 1 - share), axis=1)
         l, p, s = (low + corner).T
         total = total + weight * array[s, p, l]
-    return np.where(inside, total, 1e3)
-
-
-def is_shown(points):
-    """Whether (n, 3) places lie in the CT."""
-    at = (points - bone_ct.LOW) / VOXEL_MM
-    return bool(np.all((at >= 0) & (at < np.array(bone_ct.SIZE) - 1)))
+    return np.where(inside, total, BEYOND_MM)
 
 
 def bridge_of(distance, surface, axis, along, diameter):
@@ -72,7 +67,7 @@ def bridge_of(distance, surface, axis, along, diameter):
     before, behind = outside[outside <= 0], outside[outside >= 0]
     if not len(before) or not len(behind) or before[-1] > -OPENING_MM or behind[0] < OPENING_MM:
         return None
-    if not is_shown(axis + np.array([[before[-1]], [behind[0]]]) * along):
+    if values_at(distance, axis + np.array([[before[-1]], [behind[0]]]) * along).max() == BEYOND_MM:
         return None
     depth = (surface - axis) @ along
     beside = np.linalg.norm(surface - axis - depth[:, None] * along, axis=1) - diameter / 2
