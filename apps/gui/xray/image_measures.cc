@@ -13,8 +13,6 @@ namespace {
 
 using measures::Kind;
 
-/// Half of a 95 % interval of a normal distribution, in standard deviations.
-
 QString unit_of(const measures::Quantity& quantity) {
   return quantity.unit == "deg" ? QStringLiteral("°") : " " + text(quantity.unit);
 }

@@ -11,6 +11,7 @@
 
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/exchange/import_matrix.h"
+#include "helicarm/geometry/absolute_pose.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -41,12 +42,6 @@ Expected<Solution> linear(const std::vector<geometry::PointPair>& pairs, SolveMe
   return found.map([](const geometry::DltResult& dlt) {
     return Solution{{dlt.view, dlt.factors, std::nullopt, dlt.condition, 0, {}}};
   });
-}
-
-Eigen::Vector3d middle_of(const std::vector<fiducials::Fiducial>& points) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const fiducials::Fiducial& point : points) sum += point.centre_in_calibrator;
-  return sum / double(points.size());
 }
 
 double residual_px(const SolvedView& solved, const fiducials::Fiducial& point) {
@@ -88,11 +83,15 @@ Expected<SolvedView> solve_view(const std::vector<fiducials::Fiducial>& points, 
                                 bool sigmas_given, const PointsOrigin& origin) {
   return guarded([&] {
     std::vector<geometry::PointPair> pairs;
-    for (const fiducials::Fiducial& point : points) pairs.push_back({point.centre_in_calibrator, point.uv});
+    std::vector<Eigen::Vector3d> places;
+    for (const fiducials::Fiducial& point : points) {
+      pairs.push_back({point.centre_in_calibrator, point.uv});
+      places.push_back(point.centre_in_calibrator);
+    }
     Solution solution = value_or_throw(method == SolveMethod::most_likely ? most_likely(points, sigmas_given)
                                                                           : linear(pairs, method));
     SolvedView& solved = solution.solved;
-    const double distance_mm = (solved.view.source_in_world() - middle_of(points)).norm();
+    const double distance_mm = (solved.view.source_in_world() - geometry::mean_of(places)).norm();
     value_or_throw(
         exchange::check_source_distance(distance_mm, "the points' middle", origin.file,
                                         fmt::format("give {} in mm; they look like cm or m", origin.places)));

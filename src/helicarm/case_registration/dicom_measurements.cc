@@ -21,8 +21,6 @@ using xray::ReportGroup;
 using xray::ReportMark;
 using xray::ReportValue;
 
-/// Half of the 95 % interval of a normal error, in standard deviations.
-
 Code in_mm() { return {"mm", "UCUM", "mm"}; }
 Code in_degrees() { return {"deg", "UCUM", "deg"}; }
 Code in_percent() { return {"%", "UCUM", "%"}; }

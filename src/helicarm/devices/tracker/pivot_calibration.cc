@@ -10,7 +10,6 @@
 #include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
-#include "helicarm/geometry/small_matrix.h"
 
 namespace helicarm::tracker {
 namespace {
