@@ -167,14 +167,17 @@ class Check {
         if (is_face(hits[std::size_t(i)], *exit_, -frame_.axis)) last = i - 1;
       for (int i = first; i <= last; ++i)
         if (const auto& hit = hits[std::size_t(i)])
-          take(check, hit->radius_mm - radius(), depth(i), hit->normal.value_or(frame_.spoke(sector)));
+          take(check, hit->radius_mm - radius(), depth(i),
+               at(from + depth(i)) + hit->radius_mm * frame_.spoke(sector),
+               hit->normal.value_or(frame_.spoke(sector)));
     }
   }
 
-  void take(BoneCheck& check, double bridge, double depth, const Vector3d& normal) const {
+  void take(BoneCheck& check, double bridge, double depth, const Vector3d& place,
+            const Vector3d& normal) const {
     if (check.bridge_mm && bridge >= *check.bridge_mm) return;
     check.bridge_mm = bridge;
-    check.sigma_mm = check.drilled_sigma_mm = bone_.sigma_mm(normal);
+    check.sigma_mm = check.drilled_sigma_mm = bone_.sigma_mm(place);
     check.at_mm = depth;
     check.thinnest = at(entry_->at_mm + depth);
     check.outward = normal;
@@ -191,7 +194,7 @@ class Check {
         const double ahead = found.front().leaves ? found.front().at_mm : 0;
         if (check.end_mm && ahead >= *check.end_mm) continue;
         check.end_mm = ahead;
-        check.end_sigma_mm = bone_.sigma_mm(found.front().normal);
+        check.end_sigma_mm = bone_.sigma_mm(from + found.front().at_mm * frame_.axis);
       }
     for (int sector = 0; sector < sectors; sector += 2)
       for (double angle = 5; angle < 90; angle += 5) {
@@ -202,7 +205,7 @@ class Check {
         const double across = hit->radius_mm * std::sin(angle / deg) - radius();
         if (across > 0)
           take(check, std::hypot(across, hit->radius_mm * std::cos(angle / deg)), to - entry_->at_mm,
-               *hit->normal);
+               at(to) + hit->radius_mm * way, *hit->normal);
       }
   }
 

@@ -31,13 +31,12 @@ class BoneSurface {
       const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double length_mm,
       std::size_t most = std::numeric_limits<std::size_t>::max()) const = 0;
   virtual bool holds(const Eigen::Vector3d& point) const = 0;
-  /// Standard deviation of the surface's position along its normal, mm.
-  virtual double sigma_mm(const Eigen::Vector3d& normal) const = 0;
+  /// Standard deviation along its normal of the surface at this place on it, mm.
+  virtual double sigma_mm(const Eigen::Vector3d& point) const = 0;
 };
 
-/// Of a CT with a mask or a window. Where the CT shows the edge, it is placed at half the height between soft
-/// tissue and the bone beside it, within one voxel of the outline; elsewhere between the voxels. A window's
-/// gaps of up to 2 mm are closed. Volume and mask as accepted by `model_from`.
+/// Of a CT with a mask or a window, by `volume::bone_edge`. A window's gaps of up to 2 mm are closed. Volume
+/// and mask as accepted by `model_from`.
 std::shared_ptr<const BoneSurface> bone_surface(const volume::Volume& volume,
                                                 const std::optional<volume::Volume>& mask,
                                                 const std::optional<HuWindow>& window);

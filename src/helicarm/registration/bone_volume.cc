@@ -8,7 +8,7 @@
 #include <Eigen/LU>
 
 #include "helicarm/registration/bone_surface.h"
-#include "helicarm/volume/filled_shares.h"
+#include "helicarm/volume/bone_edge.h"
 
 namespace helicarm::registration {
 namespace {
@@ -18,8 +18,6 @@ using Eigen::Vector3i;
 using volume::ByteGrid;
 
 constexpr double closed_gap_mm = 2;
-// Of a voxel: 0.29 (uniform) for one edge voxel, less over the neighbours that are averaged.
-constexpr double edge_sigma_voxels = 0.2;
 
 /// Voxels that are reached from those in `queue` without crossing bone, along the axes; marks them.
 void flood(const ByteGrid& bone, ByteGrid& reached, std::vector<Vector3i> queue,
@@ -109,21 +107,11 @@ void close_gaps(ByteGrid& bone, const Vector3d& spacing) {
   bone.each([&](const Vector3i& at) { bone.values[i++] |= closed.values[closed.index(at + reach)]; });
 }
 
-/// Takes away the edge voxels of which the CT shows that less than half is bone: a mask that was grown by a
-/// voxel is as one that was not. Where the CT shows no edge nothing is taken away.
-void shrink_to_edge(ByteGrid& bone, const std::vector<float>& hu) {
-  constexpr std::uint8_t half = 128;
-  const ByteGrid shares = volume::filled_shares(bone, hu);
-  for (std::size_t i = 0; i < bone.values.size(); ++i)
-    if (shares.values[i] < half) bone.values[i] = 0;
-}
-
 class BoneVolume final : public BoneSurface {
  public:
-  BoneVolume(ByteGrid shares, const Eigen::Affine3d& model_from_voxel)
-      : shares_(std::move(shares)),
+  BoneVolume(volume::BoneEdge edge, const Eigen::Affine3d& model_from_voxel)
+      : edge_(std::move(edge)),
         voxel_from_model_(model_from_voxel.inverse()),
-        model_from_voxel_(model_from_voxel.linear()),
         step_mm_(0.4 * model_from_voxel.linear().colwise().norm().minCoeff()) {}
 
   std::vector<Crossing> crossings(const Vector3d& origin, const Vector3d& direction, double length_mm,
@@ -143,35 +131,10 @@ class BoneVolume final : public BoneSurface {
     return found;
   }
   bool holds(const Vector3d& point) const override { return excess(point) > 0; }
-  double sigma_mm(const Vector3d& along) const override {
-    // The voxel's width along the normal, as that of an ellipsoid.
-    return edge_sigma_voxels * (model_from_voxel_.transpose() * along).norm();
-  }
+  double sigma_mm(const Vector3d& point) const override { return edge_.sigma_mm(voxel_from_model_ * point); }
 
  private:
-  /// Over the level of the surface, in model coordinates; beyond the grid as on its face.
-  double excess(const Vector3d& point) const {
-    const Vector3d at = voxel_from_model_ * point;
-    Vector3i low;
-    Vector3d part;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double inside = std::clamp(at[axis], 0.0, double(shares_.size[axis] - 1));
-      low[axis] = std::min(int(inside), std::max(0, shares_.size[axis] - 2));
-      part[axis] = inside - low[axis];
-    }
-    double value = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-      Vector3i voxel = low;
-      double weight = 1;
-      for (int axis = 0; axis < 3; ++axis) {
-        const bool upper = (corner >> axis & 1) != 0;
-        weight *= upper ? part[axis] : 1 - part[axis];
-        voxel[axis] = std::min(voxel[axis] + upper, shares_.size[axis] - 1);
-      }
-      value += weight * shares_.values[shares_.index(voxel)];
-    }
-    return value - 127.5;
-  }
+  double excess(const Vector3d& point) const { return edge_.excess(voxel_from_model_ * point); }
 
   Vector3d normal(const Vector3d& point) const {
     Vector3d rise;
@@ -182,9 +145,8 @@ class BoneVolume final : public BoneSurface {
     return rise.norm() > 0 ? Vector3d(-rise.normalized()) : Vector3d::UnitZ();
   }
 
-  ByteGrid shares_;
+  volume::BoneEdge edge_;
   Eigen::Affine3d voxel_from_model_;
-  Eigen::Matrix3d model_from_voxel_;
   double step_mm_;
 };
 
@@ -197,15 +159,15 @@ std::shared_ptr<const BoneSurface> bone_surface(const volume::Volume& volume,
     return mask ? mask->voxels[i] != 0 : double(volume.voxels[i]) >= window->low;
   };
   const Vector3d spacing = volume.patient_from_voxel.linear().colwise().norm();
-  const double sigma_mm = volume::share_smoothing_mm(spacing);
   const ByteGrid whole{volume.size, {}};
   Vector3i low = volume.size, high = Vector3i::Zero();
   whole.each([&](const Vector3i& at) {
     if (is_bone(whole.index(at))) low = low.cwiseMin(at), high = high.cwiseMax(at);
   });
   if (low.x() > high.x()) return nullptr;
+  const Eigen::Matrix3d& mm_from_voxel = volume.patient_from_voxel.linear();
   const Vector3i margin =
-      (3 * sigma_mm / spacing.array() + closed_gap_mm / spacing.array()).ceil().cast<int>() + 2;
+      volume::bone_edge_margin(mm_from_voxel) + (closed_gap_mm / spacing.array()).ceil().cast<int>().matrix();
   low = (low - margin).cwiseMax(0);
   high = (high + margin).cwiseMin(volume.size - Vector3i::Ones());
   ByteGrid bone = volume::byte_grid(high - low + Vector3i::Ones());
@@ -217,11 +179,9 @@ std::shared_ptr<const BoneSurface> bone_surface(const volume::Volume& volume,
   });
   if (!mask) close_gaps(bone, spacing);
   fill_cavities(bone);
-  if (mask) shrink_to_edge(bone, hu);
-  ByteGrid shares = volume::filled_shares(bone, hu);
-  volume::smooth(shares, spacing, sigma_mm);
   return std::make_shared<const BoneVolume>(
-      std::move(shares), volume.patient_from_voxel * Eigen::Translation3d(low.cast<double>()));
+      volume::bone_edge(bone, hu, mm_from_voxel),
+      volume.patient_from_voxel * Eigen::Translation3d(low.cast<double>()));
 }
 
 }  // namespace helicarm::registration

@@ -6,7 +6,7 @@
 
 #include <Eigen/LU>
 
-#include "helicarm/volume/filled_shares.h"
+#include "helicarm/volume/bone_edge.h"
 
 namespace helicarm::segmentation {
 namespace {
@@ -16,18 +16,18 @@ using Eigen::Vector3i;
 
 constexpr double cells_across = 400;
 
-/// Over half a voxel, of a voxel, linear between the voxels; nothing beyond the grid.
-double lack_at(const volume::ByteGrid& shares, const Vector3d& voxel) {
+/// How far outside the bone, in three voxels, linear between the voxels; no bone beyond the grid.
+double outside_at(const volume::ByteGrid& inside, const Vector3d& voxel) {
   const Vector3d low = voxel.array().floor();
   const Vector3d part = voxel - low;
   double value = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const Vector3i to(corner & 1, corner >> 1 & 1, corner >> 2);
     const Vector3i at = low.cast<int>() + to;
-    if (!shares.has(at)) continue;
+    if (!inside.has(at)) continue;
     const Vector3d weight = to.cast<double>().cwiseProduct(part) +
                             (Vector3i::Ones() - to).cast<double>().cwiseProduct(Vector3d::Ones() - part);
-    value += weight.prod() * shares.values[shares.index(at)];
+    value += weight.prod() * inside.values[inside.index(at)];
   }
   return 0.5 - value / 255;
 }
@@ -37,12 +37,11 @@ double lack_at(const volume::ByteGrid& shares, const Vector3d& voxel) {
 phantom::TriangleMesh surface_of(const volume::Volume& ct, const Segmentation& made, const Bone& bone) {
   if (bone.voxels == 0) return {};
   const Vector3d spacing = made.patient_from_voxel.linear().colwise().norm();
-  const double sigma_mm = volume::share_smoothing_mm(spacing);
-  const Vector3i margin = (3 * sigma_mm / spacing.array()).ceil().cast<int>() + 2;
+  const Vector3i margin = volume::bone_edge_margin(made.patient_from_voxel.linear());
   const Vector3i low = (bone.low - margin).cwiseMax(0);
   const Vector3i high = (bone.high + margin).cwiseMin(made.size - Vector3i::Ones());
   volume::ByteGrid own = volume::byte_grid(high - low + Vector3i::Ones());
-  volume::ByteGrid shares = own;
+  volume::BoneEdge edge;
   {
     std::vector<float> hu(own.values.size());
     std::size_t i = 0;
@@ -55,15 +54,14 @@ phantom::TriangleMesh surface_of(const volume::Volume& ct, const Segmentation& m
       own.values[i] = made.labels[from] == bone.label;
       hu[i++] = ct.voxels[from];
     });
-    shares = volume::filled_shares(own, hu);
+    edge = volume::bone_edge(own, hu, made.patient_from_voxel.linear());
   }
-  volume::smooth(shares, spacing, sigma_mm);
   const Eigen::Affine3d voxel_from_patient =
       (made.patient_from_voxel * Eigen::Translation3d(low.cast<double>())).inverse();
   const double step = std::max(std::cbrt(spacing.prod()), bone.box.diagonal().norm() / cells_across);
   const Vector3d around = Vector3d::Constant(2 * step + 2 * spacing.maxCoeff());
   return phantom::surface_of(
-      [&](const Vector3d& point) { return step * lack_at(shares, voxel_from_patient * point); },
+      [&](const Vector3d& point) { return step * outside_at(edge.inside, voxel_from_patient * point); },
       {bone.box.min() - around, bone.box.max() + around}, step);
 }
 

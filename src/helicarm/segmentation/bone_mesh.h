@@ -6,9 +6,9 @@
 
 namespace helicarm::segmentation {
 
-/// The closed surface of a bone, patient frame, mm. Where the CT shows the edge it lies at half the height
-/// between soft tissue and the bone beside it. Its edges are about as long as the voxels, of a large bone
-/// longer (a 400th of its box's diagonal).
+/// The closed surface of a bone, patient frame, mm. Where the CT shows the edge it lies there
+/// (`volume::bone_edge`). Its triangles' edges are about as long as the voxels, of a large bone longer (a
+/// 400th of its box's diagonal).
 phantom::TriangleMesh surface_of(const volume::Volume& ct, const Segmentation& made, const Bone& bone);
 
 double area_cm2(const phantom::TriangleMesh& mesh);

@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include "helicarm/pipeline/progress.h"
-#include "helicarm/volume/filled_shares.h"
+#include "helicarm/volume/byte_grid.h"
 
 namespace helicarm::segmentation {
 
