@@ -25,6 +25,8 @@ constexpr int xx = 0, xy = 3, xz = 4;                            // of a strain
 constexpr int least_patches = 8, least_contour_points = 12;      // of a view
 constexpr double least_patch_score = 0.4;
 constexpr double least_contour_score = 0.6;
+// Of a lone start's, as a multiple of those: 0.41 in a view of a mirrored tibia, 0.46 to 0.5 in heads' views.
+constexpr double clear_score = 1.125;
 constexpr double clearly_mirrored_ratio = 0.9;
 constexpr double least_mirrored_ratio = 1.02;  // of a nearly symmetric bone 1.05 to 1.1
 constexpr double least_runner_up_ratio = 1.1;
@@ -39,6 +41,8 @@ constexpr double most_disagreement_ratio =
 constexpr double refused_ratio = 9;  // three standard deviations
 constexpr double refused_ratio_exact = 50;  // cameras of unknown error
 constexpr double most_search_mm = 100, most_search_deg = 90;
+
+double least_score_of(const Model& model) { return model.surface ? least_contour_score : least_patch_score; }
 
 RigidCovariance inverse_of(const RigidCovariance& matrix) {
   return geometry::solve_spd(matrix, RigidCovariance::Identity()).solution;
@@ -298,7 +302,7 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
                         "exchanged, or slices or an axis reversed",
                         *result.mirrored_ratio)
                   : "";
-  const double least = model.surface ? least_contour_score : least_patch_score;
+  const double least = least_score_of(model);
   for (const RegisteredView& view : result.views)
     if (view.score < least)
       refuse(Reason::wrong_model,
@@ -384,6 +388,13 @@ bool may_have_missed(const Registration& result) {
   return result.failure &&
          (result.failure->reason == Reason::wrong_model || result.failure->reason == Reason::out_of_capture ||
           result.failure->reason == Reason::registration_ambiguous);
+}
+
+bool is_confirmed(const Model& model, const Registration& result) {
+  if (result.failure) return false;
+  const double clear = clear_score * least_score_of(model);
+  return result.agree >= 2 ||
+         std::ranges::all_of(result.views, [&](const RegisteredView& view) { return view.score >= clear; });
 }
 
 }  // namespace helicarm::registration

@@ -46,4 +46,9 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
 /// Whether the search of a refused registration may have missed the solution.
 bool may_have_missed(const Registration& result);
 
+/// Whether a registration that follows one which missed the solution counts: of all poses that are searched
+/// then, one start that is not refused may be chance. Two that end at one pose are none, nor is one that
+/// explains each view clearly better than required.
+bool is_confirmed(const Model& model, const Registration& result);
+
 }  // namespace helicarm::registration

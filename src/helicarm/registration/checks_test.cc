@@ -140,6 +140,22 @@ Registration with_strain(const Deformation& deformation, std::size_t views) {
   return result;
 }
 
+TEST(Confirmed, IsALoneStartOnlyByClearScores) {
+  Registration result;
+  result.agree = 1;
+  result.views.resize(2);
+  result.views[0].score = 0.6;
+  result.views[1].score = 0.41;
+  EXPECT_FALSE(is_confirmed(Model{}, result));
+  result.views[1].score = 0.46;
+  EXPECT_TRUE(is_confirmed(Model{}, result));
+  result.views[1].score = 0.41;
+  result.agree = 2;
+  EXPECT_TRUE(is_confirmed(Model{}, result));
+  result.failure = Failure{Reason::wrong_model, "", {}, {}};
+  EXPECT_FALSE(is_confirmed(Model{}, result));
+}
+
 TEST(Decide, AStrainThatIsNotRefusedIsWarnedOf) {
   const Registration warned = with_strain({-0.011, 0.0044}, 2);
   ASSERT_EQ(warned.warnings.size(), 1U);

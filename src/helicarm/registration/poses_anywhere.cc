@@ -14,6 +14,7 @@
 #include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/ray.h"
+#include "helicarm/geometry/rotation.h"
 
 namespace helicarm::registration {
 namespace {
@@ -24,17 +25,20 @@ using Eigen::Vector3d;
 using geometry::RigidTransform;
 using Gradients = cv::Mat2f;
 
-constexpr int orientations = 4608;  // about 15 degrees apart
-constexpr int patch_side = 8;       // side, pixels of the raster
+constexpr int orientation_count = 4608;  // about 15 degrees apart
+constexpr int patch_side = 8;            // side, pixels of the raster
 
-/// Number `i` of nearly uniform rotations (super-Fibonacci spirals, Alexa 2022).
-Eigen::Matrix3d orientation(int i) {
+/// Number `i` of nearly uniform rotations (super-Fibonacci spirals, Alexa 2022), and half of their distance
+/// from them.
+Eigen::Matrix3d orientation(Orientations orientations, int i) {
   constexpr double phi = 1.4142135623730951, psi = 1.533751168755204288118041;
-  const double s = i + 0.5, t = s / orientations;
+  const double s = i + 0.5, t = s / orientation_count;
   const double a = 2 * EIGEN_PI * s / phi, b = 2 * EIGEN_PI * s / psi;
   const double r = std::sqrt(t), q = std::sqrt(1 - t);
-  return Eigen::Quaterniond(q * std::cos(b), r * std::sin(a), r * std::cos(a), q * std::sin(b))
-      .toRotationMatrix();
+  const Eigen::Quaterniond first(q * std::cos(b), r * std::sin(a), r * std::cos(a), q * std::sin(b));
+  if (orientations == Orientations::first) return first.toRotationMatrix();
+  const Vector3d step = Vector3d(1, 1, 1).normalized() * 7.5 * EIGEN_PI / 180;
+  return first.toRotationMatrix() * geometry::rotation_from_vector(step);
 }
 
 /// Correlates a view's image with the model's DRR at every shift.
@@ -246,8 +250,8 @@ double farthest_mm(double spacing_mm) {
 
 Level level_anywhere(const Model& model) { return {false, std::clamp(model.radius_mm / 8, 1.0, 6.0)}; }
 
-std::vector<RigidTransform> poses_anywhere(const RegistrationProblem& scene, std::size_t count,
-                                           const std::function<void()>& interrupt) {
+std::vector<RigidTransform> poses_anywhere(const RegistrationProblem& scene, Orientations orientations,
+                                           std::size_t count, const std::function<void()>& interrupt) {
   const Model& model = scene.model();
   const Level level = level_anywhere(model);
   const Vector3d middle = middle_of(scene.views());
@@ -257,11 +261,12 @@ std::vector<RigidTransform> poses_anywhere(const RegistrationProblem& scene, std
   const auto places = places_about(views, middle, 2 * level.spacing_mm,
                                    int(farthest_mm(level.spacing_mm) / (2 * level.spacing_mm)));
   constexpr std::size_t each = 2;
-  std::vector<Candidate> found(std::size_t(orientations) * each);
-  parallel_for(orientations, scene.threads(), [&](std::size_t i) {
+  std::vector<Candidate> found(std::size_t(orientation_count) * each);
+  parallel_for(orientation_count, scene.threads(), [&](std::size_t i) {
     if (interrupt) interrupt();
-    std::ranges::copy(best_places<each>(views, places, orientation(int(i)), model.centre, level.spacing_mm),
-                      found.begin() + std::ptrdiff_t(each * i));
+    std::ranges::copy(
+        best_places<each>(views, places, orientation(orientations, int(i)), model.centre, level.spacing_mm),
+        found.begin() + std::ptrdiff_t(each * i));
   });
   std::ranges::stable_sort(found, [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
   std::vector<RigidTransform> poses;

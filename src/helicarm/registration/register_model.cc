@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <variant>
 
 #include <fmt/format.h>
 
@@ -178,11 +179,12 @@ struct Search {
   SearchResult found;
 };
 
-Search searched_anywhere(RegistrationProblem& scene, const SearchOptions& options) {
+Search searched_anywhere(RegistrationProblem& scene, Orientations orientations,
+                         const SearchOptions& options) {
   constexpr std::size_t starts = 64;
   const Vector3d middle = middle_of(scene.views());
   scene.prepare(level_anywhere(scene.model()), middle);
-  std::vector<RigidTransform> poses = poses_anywhere(scene, starts, options.interrupt);
+  std::vector<RigidTransform> poses = poses_anywhere(scene, orientations, starts, options.interrupt);
   if (poses.empty()) poses.push_back({Eigen::Matrix3d::Identity(), middle - scene.model().centre});
   Search made{stages_from_anywhere(scene, middle), {}};
   SearchOptions from_poses = options;
@@ -241,9 +243,12 @@ namespace {
 
 using Poses = std::vector<RigidTransform>;
 
-/// Searched about `from`, else over all poses. `starts` limit where the solution may lie; none: nowhere.
+/// Which poses are searched: those about some, or all positions in these orientations.
+using Searched = std::variant<Poses, Orientations>;
+
+/// `starts` limit where the solution may lie; none: nowhere.
 Registration registered(const Model& model, const std::vector<RegistrationView>& views, const Poses& starts,
-                        const RegistrationOptions& options, const std::optional<Poses>& from, bool anywhere) {
+                        const RegistrationOptions& options, const Searched& searched, bool anywhere) {
   const auto begun = std::chrono::steady_clock::now();
   const auto step = [&](std::string_view name) {
     if (options.search.interrupt) options.search.interrupt();
@@ -251,9 +256,11 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
   };
   step("prepare");
   RegistrationProblem scene(model, views, options.threads);
+  const auto* from = std::get_if<Poses>(&searched);
   step(from ? "search" : "search anywhere");
   const auto [stages, found] =
-      from ? searched_about(scene, *from, options.search) : searched_anywhere(scene, options.search);
+      from ? searched_about(scene, *from, options.search)
+           : searched_anywhere(scene, std::get<Orientations>(searched), options.search);
   const Estimate& best = found.solutions.front();
   Registration result;
   result.name = model.name;
@@ -305,18 +312,19 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
 }
 
 /// A search about a pose reaches farther than the last levels of one over all poses: what these missed lies
-/// about the poses that they found.
+/// about the poses that they found, or near to other orientations.
 Registration registered_anywhere(const Model& model, const std::vector<RegistrationView>& views,
                                  const Poses& starts, const RegistrationOptions& options) {
-  Registration found = registered(model, views, starts, options, std::nullopt, true);
+  Registration found = registered(model, views, starts, options, Orientations::first, true);
   if (views.size() < 2 || options.search.candidates == 0 || !may_have_missed(found)) return found;
-  Poses from{found.world_from_model};
-  for (const Alternative& other : found.alternatives) from.push_back(other.world_from_model);
-  Registration again = registered(model, views, starts, options, from, true);
-  again.seconds += found.seconds;
-  // Of all that is near to what was found, a single start that is not refused is chance.
-  if (!again.failure && again.agree >= 2) return again;
-  found.seconds = again.seconds;
+  Poses about{found.world_from_model};
+  for (const Alternative& other : found.alternatives) about.push_back(other.world_from_model);
+  for (const Searched& searched : {Searched(about), Searched(Orientations::between)}) {
+    Registration again = registered(model, views, starts, options, searched, true);
+    again.seconds += found.seconds;
+    if (is_confirmed(model, again)) return again;
+    found.seconds = again.seconds;
+  }
   return found;
 }
 
