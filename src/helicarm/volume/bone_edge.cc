@@ -28,7 +28,7 @@ constexpr double turn_share = 0.25;  // of the contrast, by which a profile turn
 constexpr double near_peak = 0.9;
 constexpr double unresolved = 3.6;  // 2.355 of a blurred line, whose flank is 0.67 as wide as that of a step
 constexpr double dense_share = 0.95;  // of the cortex's places
-constexpr double least_dense_hu = 1200;
+constexpr double least_dense_hu = 1200, least_tissue_hu = -150;
 constexpr double outline_sigma_mm = 1.3, outline_sigma_voxels = 1.4;
 constexpr double fine_sigma_voxels = 0.7, most_fine_sigma_mm = 1;
 constexpr double edge_sigma_voxels = 0.15;   // of a measured edge
@@ -197,11 +197,14 @@ class Measurement {
     blur_mm_ = median(blurs);
   }
 
-  /// Of the cortex that is seen, as a share of its height.
-  double level_if_dense(const Edge& edge) const {
+  /// The highest level at which the edge may be, as a share of its height: of a cortex as dense as the bone's
+  /// densest, and of one that was cut out of its soft tissue.
+  double highest_level(const Edge& edge) const {
     const double share = remaining_share(edge.shell_mm, blur_mm_);
     const double most = std::max(1.0, (dense_hu_ - edge.soft) / edge.height);
-    return std::min(near_peak, 0.5 * (share * most > 1 ? 1 / share : most));
+    const double dense = 0.5 * (share * most > 1 ? 1 / share : most);
+    const double cut_out = 0.5 * (1 + std::max(0.0, least_tissue_hu - edge.soft) / edge.height);
+    return std::min(near_peak, std::max(dense, cut_out));
   }
 
   void measure(const Vector3i& at, BoneEdge& edge) const {
@@ -212,7 +215,7 @@ class Measurement {
     if (beside) {
       const Profile line = profile(at, *beside);
       if (const auto found = edge_of(line)) {
-        const double outer = found->place(0.5), inner = found->place(level_if_dense(*found));
+        const double outer = found->place(0.5), inner = found->place(highest_level(*found));
         const double measured = (outer + inner) / 2;
         const double kept = std::clamp(measured, -beside->farthest_mm, beside->farthest_mm);
         inside = (beside->inside_mm + kept) / beside->voxel_mm;

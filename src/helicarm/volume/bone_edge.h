@@ -21,10 +21,11 @@ struct BoneEdge {
 };
 
 /// Of the bone's outline (non-zero voxels) in the CT's Hounsfield units. Where the CT shows an edge along the
-/// outline's normal (100 HU), within 1.5 mm or 1.6 voxels of the outline, the surface is there: between half
-/// the height of the cortex as it is seen, which blur has lowered and widened where it is thin, and half the
-/// height of the bone's dense cortex (Treece 2010: the density of cortex is about one in a bone). Half of
-/// what they differ by is the doubt. Elsewhere the surface is the outline.
+/// outline's normal (100 HU), within 1.5 mm or 1.6 voxels of the outline, the surface is there, between two
+/// places: half the height of the cortex as it is seen, which blur has lowered and widened where it is thin;
+/// and half the height of the bone's dense cortex (Treece 2010: the density of cortex is about one in a
+/// bone), or halfway to fat where the CT has air, which may have been cut out. What they differ by is the
+/// doubt. Elsewhere the surface is the outline.
 BoneEdge bone_edge(const ByteGrid& bone, const std::vector<float>& hu, const Eigen::Matrix3d& mm_from_voxel,
                    unsigned threads = 0);
 
