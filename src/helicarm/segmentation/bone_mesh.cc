@@ -16,7 +16,8 @@ using Eigen::Vector3i;
 
 constexpr double cells_across = 400;
 
-/// How far outside the bone, in three voxels, linear between the voxels; no bone beyond the grid.
+/// How far outside the bone, in 3 widths of a voxel along the normal, linear between the voxels; no bone
+/// beyond the grid.
 double outside_at(const volume::ByteGrid& inside, const Vector3d& voxel) {
   const Vector3d low = voxel.array().floor();
   const Vector3d part = voxel - low;

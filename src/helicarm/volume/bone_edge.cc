@@ -2,6 +2,7 @@
 #include "helicarm/volume/bone_edge.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -9,7 +10,6 @@
 
 #include <Eigen/LU>
 
-#include "helicarm/core/parallel.h"
 #include "helicarm/core/statistics.h"
 
 namespace helicarm::volume {
@@ -19,49 +19,82 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 
-constexpr double limit_mm = 1.5, limit_voxels = 1.6;  // between outline and edge
-constexpr double band_voxels = 1.5;                   // beyond that, and of the distances
-constexpr double inward_mm = 2.5, outward_mm = 2;     // beyond the limit: where cortex and soft tissue are
-constexpr double step_voxels = 0.4, least_step_mm = 0.1;
+/// A length for voxels of clinical CTs; of larger and of much smaller ones by their width.
+struct Length {
+  double mm, least_voxels, most_voxels;
+
+  double of(double voxel_mm) const { return std::clamp(mm, least_voxels * voxel_mm, most_voxels * voxel_mm); }
+};
+
+constexpr Length farthest_within{1.5, 1.6, 5};  // of the edge from the outline: grown masks, low thresholds
+constexpr Length farthest_outside{0.5, 0.75, 1.7};  // high thresholds; beyond may be a bone that touches
+constexpr Length cortex_reach{2.5, 2, 8}, tissue_reach{2, 2, 7};  // beyond those
+constexpr Length outline_sigma{1.3, 1.4, 4};                      // of the smoothing that gives normals
+constexpr double band_voxels = 1.5;
+constexpr double step_voxels = 0.4;
+constexpr double lowest_hu = -150, highest_hu = 3000, air_hu = -500, highest_tissue_hu = 100;
 constexpr double least_contrast_hu = 100;
-constexpr double turn_share = 0.25;  // of the contrast, by which a profile turns
+constexpr double turn_share = 0.25;  // of the contrast, over the CT's noise
 constexpr double near_peak = 0.9;
 constexpr double unresolved = 3.6;  // 2.355 of a blurred line, whose flank is 0.67 as wide as that of a step
-constexpr double dense_share = 0.95;  // of the cortex's places
-constexpr double least_dense_hu = 1200, least_tissue_hu = -150;
-constexpr double outline_sigma_mm = 1.3, outline_sigma_voxels = 1.4;
-constexpr double fine_sigma_voxels = 0.7, most_fine_sigma_mm = 1;
-constexpr double edge_sigma_voxels = 0.15;   // of a measured edge
+constexpr double direct_air = 2.2;  // standard deviations of the blur, between cortex and air
+constexpr double dense_share = 0.95;     // of the cortex's places
+constexpr double least_dense_hu = 1200;  // a bone may have no thick cortex
+constexpr double smoothing_voxels = 0.7, most_smoothing_mm = 1;
+constexpr double kept_voxels = 0.4;  // of a measured distance: smoothing does not change its sign
+constexpr double edge_sigma_voxels = 0.15;
 constexpr double outline_edge_voxels = 0.2;  // 0.29 (uniform), less over the neighbours that are averaged
+constexpr double sigma_unit_voxels = 0.02;
+const double sqrt_12 = std::sqrt(12.0);
 
-/// A line through the outline: values along the normal from inside to outside.
+/// Values along the outline's normal, from inside to outside.
 struct Profile {
-  std::vector<double> values;
+  std::vector<double> values;        ///< limited
+  std::vector<double> seen;          ///< not limited below
   double first_mm = 0, step_mm = 0;  ///< place of the first value from the outline, outward
   std::size_t outline = 0;
 
   double place(std::size_t i) const { return first_mm + step_mm * double(i); }
+  /// Between the value at `i` and the one before it.
+  double passed(const std::vector<double>& h, std::size_t i, double level) const {
+    const double drop = h[i - 1] - h[i];
+    return place(i) - (drop > 0 ? step_mm * std::clamp((level - h[i]) / drop, 0.0, 1.0) : 0);
+  }
 };
 
-/// The cortex next to the outline and the soft tissue beside it.
+/// The cortex next to the outline and what lies beside it.
 struct Edge {
   const Profile* profile = nullptr;
   std::size_t peak = 0, outside = 0;  ///< the first value outward of the peak below half its height
+  std::size_t end = 0;                ///< of the soft tissue: where the values rise again, or the profile's
   double soft = 0, height = 0;
   double shell_mm = std::numeric_limits<double>::infinity();  ///< full width at half its height
 
-  /// Where the flank has this share of the height.
-  double place(double share) const {
+  double cortex() const { return soft + height; }
+  /// Where the flank has this value, or comes nearest to it.
+  double place_of(double hu) const {
     const auto& h = profile->values;
-    const double level = soft + share * height;
     std::size_t i = outside;
-    while (i > peak + 1 && h[i - 1] < level) --i;
-    while (i + 1 < h.size() && h[i] > level) ++i;
-    const double drop = h[i - 1] - h[i];
-    return profile->place(i) - (drop > 0 ? profile->step_mm * (level - h[i]) / drop : 0);
+    while (i > peak + 1 && h[i - 1] < hu) --i;
+    while (i + 1 < end && h[i] > hu) ++i;
+    return profile->passed(h, i, hu);
   }
+  double place(double share) const { return place_of(soft + share * height); }
   /// Standard deviation of a blurred step with this flank.
   double blur_mm() const { return (place(0.25) - place(0.75)) / (2 * 0.6745); }
+  /// Half the height over air that begins at the flank, of a CT of this blur.
+  std::optional<double> place_over_air(double blur_mm) const {
+    const auto& h = profile->seen;
+    std::size_t air = outside;
+    while (air < end && h[air] > air_hu) ++air;
+    if (air == end || profile->passed(h, air, air_hu) - place(0.5) > direct_air * blur_mm)
+      return std::nullopt;
+    const double level =
+        (cortex() + *std::min_element(h.begin() + std::ptrdiff_t(air), h.begin() + std::ptrdiff_t(end))) / 2;
+    std::size_t i = peak + 1;
+    while (h[i] > level) ++i;
+    return profile->passed(h, i, level);
+  }
 };
 
 std::optional<Edge> edge_of(const Profile& profile) {
@@ -78,6 +111,7 @@ std::optional<Edge> edge_of(const Profile& profile) {
   const double cortex = h[edge.peak];
   edge.soft = cortex;
   for (; i < h.size() && h[i] < edge.soft + turn; ++i) edge.soft = std::min(edge.soft, h[i]);
+  edge.end = i;
   edge.height = cortex - edge.soft;
   if (edge.height < least_contrast_hu) return std::nullopt;
   for (edge.outside = edge.peak; h[edge.outside] > edge.soft + edge.height / 2;) ++edge.outside;
@@ -99,40 +133,42 @@ double remaining_share(double width_mm, double blur_mm) {
   return beyond > 0 ? std::erf(std::sqrt(beyond / 2) / blur_mm) : 0;
 }
 
-class Measurement {
+class EdgeSearch {
  public:
-  Measurement(const ByteGrid& bone, const std::vector<float>& hu, const Matrix3d& mm_from_voxel)
+  EdgeSearch(const ByteGrid& bone, const std::vector<float>& hu, const Matrix3d& mm_from_voxel)
       : hu_(hu),
         mm_from_voxel_(mm_from_voxel),
         voxel_from_mm_(mm_from_voxel.inverse()),
-        outline_(bone),
-        fine_(bone) {
-    const Vector3d spacing = mm_from_voxel.colwise().norm();
-    outline_sigma_ = (outline_sigma_mm / spacing.array()).max(outline_sigma_voxels);
-    for (ByteGrid* grid : {&outline_, &fine_})
-      for (std::uint8_t& value : grid->values) value = value != 0 ? 255 : 0;
+        spacing_(mm_from_voxel.colwise().norm()),
+        bone_(bone) {
+    for (std::uint8_t& value : bone_.values) value = value != 0 ? 255 : 0;
+    for (int axis = 0; axis < 3; ++axis)
+      outline_sigma_[axis] = outline_sigma.of(spacing_[axis]) / spacing_[axis];
+    outline_ = bone_;
     smooth(outline_, outline_sigma_);
-    fine_sigma_ = (most_fine_sigma_mm / spacing.array()).min(fine_sigma_voxels);
-    smooth(fine_, fine_sigma_);
   }
 
-  BoneEdge made(unsigned threads) {
-    learn();
-    BoneEdge edge{byte_grid(outline_.size), byte_grid(outline_.size)};
-    parallel_for(std::size_t(outline_.size.z()), threads, [&](std::size_t z) {
-      for (int y = 0; y < outline_.size.y(); ++y)
-        for (int x = 0; x < outline_.size.x(); ++x) measure({x, y, int(z)}, edge);
-    });
-    smooth(edge.inside, fine_sigma_);
+  BoneEdge edge() {
+    estimate_scan();
+    BoneEdge edge{byte_grid(bone_.size), byte_grid(bone_.size), sigma_unit_voxels * spacing_.maxCoeff()};
+    std::vector<bool> is_measured(bone_.values.size());
+    bone_.each([&](const Vector3i& at) { is_measured[bone_.index(at)] = measure(at, edge); });
+    const ByteGrid sharp = edge.inside;
+    smooth(edge.inside, (most_smoothing_mm / spacing_.array()).min(smoothing_voxels));
+    // Thin plates and narrow gaps remain.
+    for (std::size_t i = 0; i < is_measured.size(); ++i) {
+      const double before = sharp.values[i] - 127.5, now = edge.inside.values[i] - 127.5;
+      if (is_measured[i] && before * now < 0 && std::abs(before) > kept_voxels / band_voxels * 127.5)
+        edge.inside.values[i] = sharp.values[i];
+    }
     return edge;
   }
 
  private:
   struct Near {
-    Vector3d normal;         // outward
-    double inside_mm = 0;    // of the outline
-    double voxel_mm = 0;     // its width along the normal, as that of an ellipsoid
-    double farthest_mm = 0;  // edge from the outline
+    Vector3d normal;       // outward
+    double inside_mm = 0;  // of the outline, about
+    double voxel_mm = 0;   // its width along the normal, as that of an ellipsoid
   };
 
   /// Nothing: far from the outline.
@@ -155,102 +191,146 @@ class Measurement {
     found.normal = outward.normalized();
     const Vector3d along = mm_from_voxel_.transpose() * found.normal;
     found.voxel_mm = along.norm();
-    found.farthest_mm = std::max(limit_mm, limit_voxels * found.voxel_mm);
-    // The normal distribution's quantile, about.
     const double share = value / 255.0;
-    found.inside_mm = along.cwiseProduct(outline_sigma_).norm() * std::log(share / (1 - share)) / 1.75;
-    if (std::abs(found.inside_mm) > found.farthest_mm + band_voxels * found.voxel_mm) return std::nullopt;
+    const double normal_quantile = std::log(share / (1 - share)) / 1.75;  // about
+    found.inside_mm = along.cwiseProduct(outline_sigma_).norm() * normal_quantile;
+    if (std::abs(found.inside_mm) > farthest_within.of(found.voxel_mm) + band_voxels * found.voxel_mm)
+      return std::nullopt;
     return found;
   }
 
-  Profile profile(const Vector3i& at, const Near& near) const {
-    Profile made;
-    made.step_mm = std::max(least_step_mm, step_voxels * near.voxel_mm);
-    const double reach = near.farthest_mm;
-    const auto inward = std::size_t(std::ceil((reach + inward_mm) / made.step_mm));
-    const auto outward = std::size_t(std::ceil((reach + outward_mm) / made.step_mm));
-    made.outline = inward;
-    made.first_mm = -double(inward) * made.step_mm;
+  /// Replaces `near.inside_mm` by the place of the voxels' own outline.
+  void take_profile(const Vector3i& at, Near& near, Profile& profile) const {
+    profile.step_mm = step_voxels * near.voxel_mm;
+    const auto steps = [&](double mm) { return std::size_t(std::ceil(mm / profile.step_mm)); };
+    const std::size_t inward = steps(farthest_within.of(near.voxel_mm) + cortex_reach.of(near.voxel_mm));
+    const std::size_t outward = steps(farthest_within.of(near.voxel_mm) + tissue_reach.of(near.voxel_mm));
     const Vector3d step = voxel_from_mm_ * near.normal;
-    for (std::size_t i = 0; i <= inward + outward; ++i)
-      made.values.push_back(
-          value_at(hu_, outline_.size, at.cast<double>() + (near.inside_mm + made.place(i)) * step));
-    return made;
+    const auto voxel = [&](std::size_t i) -> Vector3d {
+      return at.cast<double>() + (near.inside_mm + profile.step_mm * (double(i) - double(inward))) * step;
+    };
+    profile.values.clear(), profile.seen.clear();
+    double before = 0, crossing = double(inward);
+    bool has_crossing = false;
+    for (std::size_t i = 0; i <= inward + outward; ++i) {
+      profile.seen.push_back(std::min(highest_hu, value_at(hu_, bone_.size, voxel(i))));
+      profile.values.push_back(std::max(lowest_hu, profile.seen.back()));
+      const double share = value_at(bone_.values, bone_.size, voxel(i)) - 127.5;
+      if (i > 0 && before > 0 && share <= 0) {
+        const double here = double(i) - share / (share - before);
+        if (!has_crossing || std::abs(here - double(inward)) < std::abs(crossing - double(inward)))
+          crossing = here;
+        has_crossing = true;
+      }
+      before = share;
+    }
+    near.inside_mm += (crossing - double(inward)) * profile.step_mm;
+    profile.first_mm = -crossing * profile.step_mm;
+    profile.outline = std::min(profile.values.size() - 1, std::size_t(std::lround(crossing)));
   }
 
-  /// The CT's blur and the bone's dense cortex, from places on the outline.
-  void learn() {
-    std::vector<double> heights, blurs;
-    outline_.each([&](const Vector3i& at) {
-      constexpr int every = 3;
+  double blur_mm(const Vector3d& normal) const {
+    return (mm_from_voxel_.transpose() * normal)
+        .cwiseQuotient(spacing_)
+        .normalized()
+        .cwiseProduct(blur_mm_)
+        .norm();
+  }
+
+  /// Blur, dense cortex and soft tissue, from every third place on the outline.
+  void estimate_scan() {
+    constexpr int every = 3;
+    constexpr std::size_t least_places = 20;
+    constexpr double along_axis = 0.9;
+    std::vector<double> cortices, tissues, blurs;
+    std::array<std::vector<double>, 3> blurs_along;
+    Profile profile;
+    bone_.each([&](const Vector3i& at) {
       if ((at.x() + at.y() + at.z()) % every != 0) return;
-      const auto beside = near(at);
+      auto beside = near(at);
       if (!beside || std::abs(beside->inside_mm) > beside->voxel_mm / 2) return;
-      const Profile line = profile(at, *beside);
-      const auto edge = edge_of(line);
+      take_profile(at, *beside, profile);
+      const auto edge = edge_of(profile);
       if (!edge) return;
-      heights.push_back(edge->soft + edge->height);
+      cortices.push_back(edge->cortex());
+      tissues.push_back(edge->soft);
       blurs.push_back(edge->blur_mm());
+      const Vector3d along =
+          (mm_from_voxel_.transpose() * beside->normal).cwiseQuotient(spacing_).normalized().cwiseAbs();
+      for (int axis = 0; axis < 3; ++axis)
+        if (along[axis] > along_axis) blurs_along[std::size_t(axis)].push_back(blurs.back());
     });
-    if (heights.empty()) return;
-    dense_hu_ = std::max(dense_hu_, quantile(heights, dense_share));
-    blur_mm_ = median(blurs);
+    if (cortices.empty()) return;
+    dense_hu_ = std::max(dense_hu_, quantile(cortices, dense_share));
+    soft_hu_ = std::min(highest_tissue_hu, median(tissues));
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto& along = blurs_along[std::size_t(axis)];
+      blur_mm_[axis] = median(along.size() < least_places ? blurs : along);
+    }
   }
 
-  /// The highest level at which the edge may be, as a share of its height: of a cortex as dense as the bone's
-  /// densest, and of one that was cut out of its soft tissue.
-  double highest_level(const Edge& edge) const {
-    const double share = remaining_share(edge.shell_mm, blur_mm_);
+  /// Half the height of a cortex as dense as the bone's densest, as a share of what is seen.
+  double dense_level(const Edge& edge, double blur) const {
+    const double share = remaining_share(edge.shell_mm, blur);
     const double most = std::max(1.0, (dense_hu_ - edge.soft) / edge.height);
-    const double dense = 0.5 * (share * most > 1 ? 1 / share : most);
-    const double cut_out = 0.5 * (1 + std::max(0.0, least_tissue_hu - edge.soft) / edge.height);
-    return std::min(near_peak, std::max(dense, cut_out));
+    return std::min(near_peak, 0.5 * (share * most > 1 ? 1 / share : most));
   }
 
-  void measure(const Vector3i& at, BoneEdge& edge) const {
-    const std::size_t i = outline_.index(at);
-    const auto beside = near(at);
-    double inside = fine_.values[i] > 127 ? band_voxels : -band_voxels;
-    double sigma = outline_edge_voxels * mm_from_voxel_.colwise().norm().maxCoeff();
-    if (beside) {
-      const Profile line = profile(at, *beside);
-      if (const auto found = edge_of(line)) {
-        const double outer = found->place(0.5), inner = found->place(highest_level(*found));
+  /// False: the CT shows no edge.
+  bool measure(const Vector3i& at, BoneEdge& edge) {
+    const std::size_t i = bone_.index(at);
+    const double side = bone_.values[i] != 0 ? 1 : -1;
+    double inside = side * band_voxels;
+    double sigma = outline_edge_voxels * spacing_.maxCoeff();
+    bool is_measured = false;
+    if (auto beside = near(at)) {
+      take_profile(at, *beside, profile_);
+      sigma = outline_edge_voxels * beside->voxel_mm;
+      if (const auto found = edge_of(profile_)) {
+        is_measured = true;
+        const double blur = blur_mm(beside->normal);
+        const double half = found->place(0.5);
+        const double inner = found->place(dense_level(*found, blur));
+        const double outer =
+            std::max({half, found->place_over_air(std::max(blur, 0.5 * beside->voxel_mm)).value_or(half),
+                      found->soft > soft_hu_ ? found->place_of((found->cortex() + soft_hu_) / 2) : half});
         const double measured = (outer + inner) / 2;
-        const double kept = std::clamp(measured, -beside->farthest_mm, beside->farthest_mm);
+        const double kept = std::clamp(measured, -farthest_within.of(beside->voxel_mm),
+                                       farthest_outside.of(beside->voxel_mm));
         inside = (beside->inside_mm + kept) / beside->voxel_mm;
-        sigma = std::hypot((outer - inner) / std::sqrt(12.0), edge_sigma_voxels * beside->voxel_mm) +
+        sigma = std::hypot((outer - inner) / sqrt_12, edge_sigma_voxels * beside->voxel_mm) +
                 std::abs(measured - kept);
       } else {
-        constexpr double steepness = 0.4;  // of a smoothed step, by its standard deviation
-        inside = (fine_.values[i] / 255.0 - 0.5) * fine_sigma_voxels / steepness;
-        sigma = outline_edge_voxels * beside->voxel_mm;
+        // Smoothing turns an outline of this height into the distance from it.
+        inside = side * 1.25 * smoothing_voxels;
       }
     }
     const double value = 127.5 * (1 + std::clamp(inside / band_voxels, -1.0, 1.0));
     edge.inside.values[i] = static_cast<std::uint8_t>(std::lround(value));
-    edge.doubt.values[i] =
-        static_cast<std::uint8_t>(std::min(255L, std::lround(sigma / BoneEdge::doubt_unit_mm)));
+    edge.sigma.values[i] =
+        static_cast<std::uint8_t>(std::clamp(std::lround(sigma / edge.sigma_unit_mm), 1L, 255L));
+    return is_measured;
   }
 
   const std::vector<float>& hu_;
   Matrix3d mm_from_voxel_, voxel_from_mm_;
-  Vector3d outline_sigma_, fine_sigma_;  // in voxels
-  ByteGrid outline_, fine_;
-  double dense_hu_ = least_dense_hu, blur_mm_ = 0;
+  Vector3d spacing_, outline_sigma_;  // the latter in voxels
+  ByteGrid bone_, outline_;           // 0 or 255; smoothed
+  Vector3d blur_mm_ = Vector3d::Zero();
+  double dense_hu_ = least_dense_hu, soft_hu_ = highest_hu;
+  Profile profile_;
 };
 
 }  // namespace
 
-BoneEdge bone_edge(const ByteGrid& bone, const std::vector<float>& hu, const Matrix3d& mm_from_voxel,
-                   unsigned threads) {
-  return Measurement(bone, hu, mm_from_voxel).made(threads);
+BoneEdge bone_edge(const ByteGrid& bone, const std::vector<float>& hu, const Matrix3d& mm_from_voxel) {
+  return EdgeSearch(bone, hu, mm_from_voxel).edge();
 }
 
 Vector3i bone_edge_margin(const Matrix3d& mm_from_voxel) {
-  const Vector3d spacing = mm_from_voxel.colwise().norm();
-  const Vector3d farthest = spacing * limit_voxels + Vector3d::Constant(limit_mm + outward_mm);
-  return (farthest.array() / spacing.array()).ceil().cast<int>() + 2;
+  const double widest_mm = mm_from_voxel.colwise().norm().maxCoeff();
+  const double reach_mm = farthest_within.of(widest_mm) + tissue_reach.of(widest_mm);
+  return (reach_mm * mm_from_voxel.inverse().rowwise().norm()).array().ceil().cast<int>() + 2;
 }
 
 }  // namespace helicarm::volume

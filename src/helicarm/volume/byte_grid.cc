@@ -6,8 +6,6 @@
 #include <functional>
 #include <span>
 
-#include "helicarm/core/parallel.h"
-
 namespace helicarm::volume {
 namespace {
 
@@ -37,26 +35,23 @@ void round_to(const std::vector<float>& sums, std::uint8_t* row) {
 
 void smooth_along_rows(ByteGrid& grid, const std::vector<float>& weights) {
   const auto columns = std::size_t(grid.size.x()), reach = weights.size() - 1;
-  const std::size_t rows = std::size_t(grid.size.y());
-  parallel_for(std::size_t(grid.size.z()), 0, [&](std::size_t z) {
-    std::vector<std::uint8_t> padded(columns + 2 * reach);
-    std::vector<float> sums(columns);
-    for (std::size_t y = 0; y < rows; ++y) {
-      std::uint8_t* row = grid.values.data() + columns * (y + rows * z);
-      if (is_constant({row, columns})) continue;
-      std::fill_n(padded.begin(), reach, row[0]);
-      std::copy_n(row, columns, padded.begin() + std::ptrdiff_t(reach));
-      std::fill_n(padded.end() - std::ptrdiff_t(reach), reach, row[columns - 1]);
-      std::ranges::fill(sums, 0.0F);
-      const std::uint8_t* middle = padded.data() + reach;
-      add(sums, {middle, columns}, weights[0]);
-      for (std::size_t k = 1; k <= reach; ++k) {
-        add(sums, {middle - k, columns}, weights[k]);
-        add(sums, {middle + k, columns}, weights[k]);
-      }
-      round_to(sums, row);
+  std::vector<std::uint8_t> padded(columns + 2 * reach);
+  std::vector<float> sums(columns);
+  for (std::size_t from = 0; from < grid.values.size(); from += columns) {
+    std::uint8_t* row = grid.values.data() + from;
+    if (is_constant({row, columns})) continue;
+    std::fill_n(padded.begin(), reach, row[0]);
+    std::copy_n(row, columns, padded.begin() + std::ptrdiff_t(reach));
+    std::fill_n(padded.end() - std::ptrdiff_t(reach), reach, row[columns - 1]);
+    std::ranges::fill(sums, 0.0F);
+    const std::uint8_t* middle = padded.data() + reach;
+    add(sums, {middle, columns}, weights[0]);
+    for (std::size_t k = 1; k <= reach; ++k) {
+      add(sums, {middle - k, columns}, weights[k]);
+      add(sums, {middle + k, columns}, weights[k]);
     }
-  });
+    round_to(sums, row);
+  }
 }
 
 void smooth_across_rows(ByteGrid& grid, int axis, const std::vector<float>& weights) {
@@ -66,22 +61,20 @@ void smooth_across_rows(ByteGrid& grid, int axis, const std::vector<float>& weig
   const auto row = [&](std::size_t i) -> Row { return {from.values.data() + columns * i, columns}; };
   std::vector<std::uint8_t> constant(rows * std::size_t(grid.size.z()));
   for (std::size_t i = 0; i < constant.size(); ++i) constant[i] = is_constant(row(i));
-  parallel_for(std::size_t(grid.size.z()), 0, [&](std::size_t z) {
-    std::vector<float> sums(columns);
-    for (std::size_t y = 0; y < rows; ++y) {
-      const std::size_t here = y + rows * z;
-      const auto beside = [&](int k) {
-        const auto at = std::size_t(std::clamp(int(axis == 1 ? y : z) + k, 0, count - 1));
-        return axis == 1 ? at + rows * z : y + rows * at;
-      };
-      int k = -reach;
-      while (k <= reach && constant[beside(k)] != 0 && row(beside(k))[0] == row(here)[0]) ++k;
-      if (k > reach) continue;
-      std::ranges::fill(sums, 0.0F);
-      for (k = -reach; k <= reach; ++k) add(sums, row(beside(k)), weights[std::size_t(std::abs(k))]);
-      round_to(sums, grid.values.data() + columns * here);
-    }
-  });
+  std::vector<float> sums(columns);
+  for (std::size_t here = 0; here < constant.size(); ++here) {
+    const std::size_t y = here % rows, z = here / rows;
+    const auto beside = [&](int k) {
+      const auto at = std::size_t(std::clamp(int(axis == 1 ? y : z) + k, 0, count - 1));
+      return axis == 1 ? at + rows * z : y + rows * at;
+    };
+    int k = -reach;
+    while (k <= reach && constant[beside(k)] != 0 && row(beside(k))[0] == row(here)[0]) ++k;
+    if (k > reach) continue;
+    std::ranges::fill(sums, 0.0F);
+    for (k = -reach; k <= reach; ++k) add(sums, row(beside(k)), weights[std::size_t(std::abs(k))]);
+    round_to(sums, grid.values.data() + columns * here);
+  }
 }
 
 }  // namespace

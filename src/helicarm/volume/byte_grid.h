@@ -59,7 +59,7 @@ double value_at(const Values& values, const Eigen::Vector3i& size, const Eigen::
   return (1 - part[2]) * along_xy(0) + part[2] * along_xy(step[2]);
 }
 
-/// Gaussian smoothing by a standard deviation for each axis, in voxels; beyond the box as on its face.
+/// Gaussian smoothing by a standard deviation over 0 for each axis, in voxels; beyond the box as on its face.
 void smooth(ByteGrid& grid, const Eigen::Vector3d& sigma);
 
 }  // namespace helicarm::volume
