@@ -25,8 +25,7 @@ constexpr int xx = 0, xy = 3, xz = 4;                            // of a strain
 constexpr int least_patches = 8, least_contour_points = 12;      // of a view
 constexpr double least_patch_score = 0.4;
 constexpr double least_contour_score = 0.6;
-// Of a lone start's, as a multiple of those: 0.41 in a view of a mirrored tibia, 0.46 to 0.5 in heads' views.
-constexpr double clear_score = 1.125;
+constexpr double clear_patch_score = 0.45;  // 0.41 in a view of a mirrored tibia, 0.46 to 0.5 in heads' views
 constexpr double clearly_mirrored_ratio = 0.9;
 constexpr double least_mirrored_ratio = 1.02;  // of a nearly symmetric bone 1.05 to 1.1
 constexpr double least_runner_up_ratio = 1.1;
@@ -392,9 +391,8 @@ bool may_have_missed(const Registration& result) {
 
 bool is_confirmed(const Model& model, const Registration& result) {
   if (result.failure) return false;
-  const double clear = clear_score * least_score_of(model);
-  return result.agree >= 2 ||
-         std::ranges::all_of(result.views, [&](const RegisteredView& view) { return view.score >= clear; });
+  const auto is_clear = [](const RegisteredView& view) { return view.score >= clear_patch_score; };
+  return result.agree >= 2 || (!model.surface && std::ranges::all_of(result.views, is_clear));
 }
 
 }  // namespace helicarm::registration

@@ -46,9 +46,9 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
 /// Whether the search of a refused registration may have missed the solution.
 bool may_have_missed(const Registration& result);
 
-/// Whether a registration that follows one which missed the solution counts: of all poses that are searched
-/// then, one start that is not refused may be chance. Two that end at one pose are none, nor is one that
-/// explains each view clearly better than required.
+/// Whether a registration counts that follows one which missed the solution: two of its starts or more end at
+/// the pose, or the volume explains each view clearly better than required. Else it may be chance: so many
+/// poses were searched.
 bool is_confirmed(const Model& model, const Registration& result);
 
 }  // namespace helicarm::registration

@@ -156,6 +156,16 @@ TEST(Confirmed, IsALoneStartOnlyByClearScores) {
   EXPECT_FALSE(is_confirmed(Model{}, result));
 }
 
+TEST(Confirmed, IsNoLoneStartOfAContour) {
+  Model model;
+  model.surface.emplace();
+  Registration result;
+  result.agree = 1;
+  result.views.resize(1);
+  result.views[0].score = 0.9;
+  EXPECT_FALSE(is_confirmed(model, result));
+}
+
 TEST(Decide, AStrainThatIsNotRefusedIsWarnedOf) {
   const Registration warned = with_strain({-0.011, 0.0044}, 2);
   ASSERT_EQ(warned.warnings.size(), 1U);

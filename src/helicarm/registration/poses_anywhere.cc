@@ -28,8 +28,8 @@ using Gradients = cv::Mat2f;
 constexpr int orientation_count = 4608;  // about 15 degrees apart
 constexpr int patch_side = 8;            // side, pixels of the raster
 
-/// Number `i` of nearly uniform rotations (super-Fibonacci spirals, Alexa 2022), and half of their distance
-/// from them.
+/// Number `i` of nearly uniform rotations (super-Fibonacci spirals, Alexa 2022); those between are turned
+/// from them by half of their distance about one axis of the model.
 Eigen::Matrix3d orientation(Orientations orientations, int i) {
   constexpr double phi = 1.4142135623730951, psi = 1.533751168755204288118041;
   const double s = i + 0.5, t = s / orientation_count;

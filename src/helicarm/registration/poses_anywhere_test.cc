@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/registration/poses_anywhere.h"
 
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 
 #include "helicarm/registration/register_model.h"
@@ -60,6 +61,25 @@ TEST(PosesAnywhere, AreSearchedAfterARefusalAboutTheStart) {
   EXPECT_LT(separation(model, result.world_from_model, true_pose()), 0.3);
   ASSERT_FALSE(result.notes.empty());
   EXPECT_EQ(result.notes.back().reason, Reason::out_of_capture);
+}
+
+double degrees_between(const RigidTransform& a, const RigidTransform& b) {
+  return Eigen::AngleAxisd(a.rotation.transpose() * b.rotation).angle() * 180 / EIGEN_PI;
+}
+
+TEST(PosesAnywhere, OfTheOtherOrientationsLieBetweenTheFirst) {
+  const auto volume = lopsided_bone();
+  const Model model = bone_of(volume);
+  const auto views = two_views(volume);
+  RegistrationProblem scene(model, views, 2);
+  scene.prepare(level_anywhere(model), middle_of(views));
+  const auto first = poses_anywhere(scene, Orientations::first, 1);
+  const auto between = poses_anywhere(scene, Orientations::between, 1);
+  ASSERT_EQ(first.size(), 1U);
+  ASSERT_EQ(between.size(), 1U);
+  EXPECT_GT(degrees_between(first[0], between[0]), 3);
+  EXPECT_LT(degrees_between(first[0], true_pose()), 15);
+  EXPECT_LT(degrees_between(between[0], true_pose()), 15);
 }
 
 TEST(PosesAnywhere, OfASymmetricBodyAreRefusedAndListed) {

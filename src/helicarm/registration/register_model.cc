@@ -174,17 +174,27 @@ Warning depth_from_scale(const RegistrationView& view, const RigidStep& by_size,
       {{"mm_per_percent", mm_per_percent}, {"scale_sigma", result.scale_sigma}}};
 }
 
+using Poses = std::vector<RigidTransform>;
+
 struct Search {
   std::vector<SearchStage> stages;
   SearchResult found;
 };
 
-Search searched_anywhere(RegistrationProblem& scene, Orientations orientations,
+/// All positions in these orientations, and some poses besides.
+struct Everywhere {
+  Orientations orientations;
+  Poses besides = {};
+};
+
+Search searched_anywhere(RegistrationProblem& scene, const Everywhere& everywhere,
                          const SearchOptions& options) {
   constexpr std::size_t starts = 64;
   const Vector3d middle = middle_of(scene.views());
   scene.prepare(level_anywhere(scene.model()), middle);
-  std::vector<RigidTransform> poses = poses_anywhere(scene, orientations, starts, options.interrupt);
+  std::vector<RigidTransform> poses =
+      poses_anywhere(scene, everywhere.orientations, starts, options.interrupt);
+  poses.insert(poses.end(), everywhere.besides.begin(), everywhere.besides.end());
   if (poses.empty()) poses.push_back({Eigen::Matrix3d::Identity(), middle - scene.model().centre});
   Search made{stages_from_anywhere(scene, middle), {}};
   SearchOptions from_poses = options;
@@ -241,10 +251,8 @@ double worst_error_mm(const Model& model, const Registration& registration) {
 
 namespace {
 
-using Poses = std::vector<RigidTransform>;
-
-/// Which poses are searched: those about some, or all positions in these orientations.
-using Searched = std::variant<Poses, Orientations>;
+/// Which poses are searched: those about some, or all.
+using Searched = std::variant<Poses, Everywhere>;
 
 /// `starts` limit where the solution may lie; none: nowhere.
 Registration registered(const Model& model, const std::vector<RegistrationView>& views, const Poses& starts,
@@ -258,9 +266,9 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
   RegistrationProblem scene(model, views, options.threads);
   const auto* from = std::get_if<Poses>(&searched);
   step(from ? "search" : "search anywhere");
-  const auto [stages, found] =
-      from ? searched_about(scene, *from, options.search)
-           : searched_anywhere(scene, std::get<Orientations>(searched), options.search);
+  const auto [stages, found] = from
+                                   ? searched_about(scene, *from, options.search)
+                                   : searched_anywhere(scene, std::get<Everywhere>(searched), options.search);
   const Estimate& best = found.solutions.front();
   Registration result;
   result.name = model.name;
@@ -315,11 +323,12 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
 /// about the poses that they found, or near to other orientations.
 Registration registered_anywhere(const Model& model, const std::vector<RegistrationView>& views,
                                  const Poses& starts, const RegistrationOptions& options) {
-  Registration found = registered(model, views, starts, options, Orientations::first, true);
+  Registration found = registered(model, views, starts, options, Everywhere{Orientations::first}, true);
   if (views.size() < 2 || options.search.candidates == 0 || !may_have_missed(found)) return found;
   Poses about{found.world_from_model};
   for (const Alternative& other : found.alternatives) about.push_back(other.world_from_model);
-  for (const Searched& searched : {Searched(about), Searched(Orientations::between)}) {
+  // What was found goes with the other orientations: a pose almost as good stays known.
+  for (const Searched& searched : {Searched(about), Searched(Everywhere{Orientations::between, about})}) {
     Registration again = registered(model, views, starts, options, searched, true);
     again.seconds += found.seconds;
     if (is_confirmed(model, again)) return again;
