@@ -86,25 +86,43 @@ struct LoadedMask {
   bool may_be_part = false;
 };
 
-LoadedMask mask_of(const pipeline::CaseModel& case_model) {
-  const fs::path& path = *case_model.mask;
-  const std::string origin = fmt::format("models: \"{}\": {}", case_model.name, path.filename().string());
-  std::optional<volume::Volume> segment = value_or_throw(volume::read_segment(
-      path, {case_model.mask_label, case_model.mask_segment, case_model.mask_threshold}));
+/// Which bone of a file is the mask, and the key that chooses it.
+struct MaskFile {
+  const fs::path& path;
+  volume::SegmentChoice choice;
+  std::string label_key;
+};
+
+LoadedMask mask_of(const pipeline::CaseModel& case_model, const MaskFile& file) {
+  const std::string origin =
+      fmt::format("models: \"{}\": {}", case_model.name, file.path.filename().string());
+  std::optional<volume::Volume> segment = value_or_throw(volume::read_segment(file.path, file.choice));
   if (segment) return {*std::move(segment), true};
-  for (const auto& [is_given, key] : {std::pair(case_model.mask_segment.has_value(), "mask_segment"),
-                                      std::pair(case_model.mask_threshold.has_value(), "mask_threshold")})
+  for (const auto& [is_given, key] : {std::pair(file.choice.label.has_value(), "mask_segment"),
+                                      std::pair(file.choice.threshold.has_value(), "mask_threshold")})
     if (is_given)
       throw BadInput(Reason::bad_value,
                      fmt::format("{} is no DICOM segmentation: it takes no \"{}\"", origin, key));
-  LoadedMask mask{volume_at(path, case_model, 0)};
-  value_or_throw(volume::choose_label(mask.volume, case_model.mask_label, origin, "\"mask_label\""));
+  LoadedMask mask{volume_at(file.path, case_model, 0)};
+  value_or_throw(volume::choose_label(mask.volume, file.choice.number, origin, file.label_key));
   return mask;
 }
 
 bool has_voxels_of(const volume::Volume& volume, const Eigen::Vector3d& voxel_mm) {
   const Eigen::Vector3d spacing = volume.patient_from_voxel.linear().colwise().norm();
   return spacing.isApprox(voxel_mm, 1e-3);
+}
+
+/// The mask on the CT's grid; another grid is refused with the model.
+volume::Volume mask_on(const volume::Volume& ct, const pipeline::CaseModel& case_model,
+                       const MaskFile& file) {
+  LoadedMask mask = mask_of(case_model, file);
+  // A stack has no frame of its own: a mask drawn on it in another program brings that program's.
+  if (case_model.voxel_mm && has_voxels_of(mask.volume, *case_model.voxel_mm))
+    mask.volume.patient_from_voxel = ct.patient_from_voxel;
+  // A segmentation's empty slices may be missing.
+  volume::onto_grid(mask.volume, ct, mask.may_be_part);
+  return std::move(mask.volume);
 }
 
 void check_size(const std::string& view, const char* expected_by, const Eigen::Vector2i& expected,
@@ -260,18 +278,16 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,
                      fmt::format("models: \"{}\": \"voxel_mm\" is for TIFF stacks only; {} states its own",
                                  case_model.name, case_model.volume->filename().string()));
     const volume::Volume volume = volume_at(*case_model.volume, case_model, case_model.tiff_offset_hu);
-    std::optional<volume::Volume> mask;
-    bool may_be_part = false;
-    if (case_model.mask) {
-      LoadedMask loaded_mask = mask_of(case_model);
-      mask = std::move(loaded_mask.volume);
-      may_be_part = loaded_mask.may_be_part;
-    }
-    // A stack has no frame of its own: a mask drawn on it in another program brings that program's.
-    if (mask && case_model.voxel_mm && has_voxels_of(*mask, *case_model.voxel_mm))
-      mask->patient_from_voxel = volume.patient_from_voxel;
-    // Another grid is refused with the model; a segmentation's empty slices may be missing.
-    if (mask) volume::onto_grid(*mask, volume, may_be_part);
+    std::optional<volume::Volume> mask, tunnel_mask;
+    if (case_model.mask)
+      mask = mask_on(volume, case_model,
+                     {*case_model.mask,
+                      {case_model.mask_label, case_model.mask_segment, case_model.mask_threshold},
+                      "\"mask_label\""});
+    if (case_model.tunnel_mask)
+      tunnel_mask =
+          mask_on(volume, case_model,
+                  {*case_model.tunnel_mask, {case_model.tunnel_mask_label}, "\"tunnel_mask_label\""});
     std::optional<registration::HuWindow> window;
     if (case_model.window_hu) window = {case_model.window_hu->x(), case_model.window_hu->y()};
     registration::Model model =
@@ -282,6 +298,12 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,
              fmt::format("models: \"{}\": {}", case_model.name, case_model.volume->filename().string()))))
       model.warnings.push_back(std::move(warning));
     if (mask) model.warnings.insert(model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
+    if (tunnel_mask) {
+      value_or_throw(
+          registration::model_from(case_model.name + ": tunnel_mask", volume, tunnel_mask, std::nullopt));
+      mask = std::move(tunnel_mask);
+      window.reset();
+    }
     if (has_tunnels && (mask || window)) compare(*registration::bone_surface(volume, mask, window), &volume);
     loaded.model = std::move(model);
     return loaded;

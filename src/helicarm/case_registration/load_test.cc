@@ -61,6 +61,36 @@ TEST_F(LoadLabelMap, ALabelThatIsNotThereIsRefused) {
   EXPECT_THAT(load_model(model_).error().message, HasSubstr("holds no label 4"));
 }
 
+/// A tunnel of 2 mm in the second half, 3.5 mm from the first.
+MarkupPlan plan_in_the_second_half() {
+  MarkupPlan plan;
+  plan.points = {{"start", {15, 11.5, 0}}, {"end", {15, 11.5, 23}}};
+  plan.tunnels = {{"tunnel", 0, 1, 2.0, 0.5}};
+  return plan;
+}
+
+TEST_F(LoadLabelMap, TunnelsAreComparedWithTheBoneThatHoldsThem) {
+  model_.mask.reset();
+  model_.window_hu = {100, 3000};
+  EXPECT_NEAR(*load_model(model_, plan_in_the_second_half())->bone_checks[0]->bridge_mm, 3.5, 0.4);
+  model_.tunnel_mask = folder_.path() / "labels.nrrd";
+  EXPECT_THAT(load_model(model_, plan_in_the_second_half()).error().message,
+              HasSubstr("choose one with \"tunnel_mask_label\""));
+  model_.tunnel_mask_label = 8;
+  const auto loaded = load_model(model_, plan_in_the_second_half());
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_NEAR(*loaded->bone_checks[0]->bridge_mm, 2.5, 0.4);
+  EXPECT_NEAR(loaded->model->centre.x(), 11.5, 0.7) << "registered as a whole";
+}
+
+TEST_F(LoadLabelMap, ATunnelMaskOfAnotherGridIsRefused) {
+  model_.mask_label = 8;
+  model_.tunnel_mask = folder_.path() / "other.nrrd";
+  EXPECT_TRUE(write_file(*model_.tunnel_mask, volume::to_nrrd({9, 9, 9}, Eigen::Affine3d(Eigen::Scaling(2.7)),
+                                                              std::vector<std::uint8_t>(729, 1))));
+  EXPECT_THAT(load_model(model_).error().message, HasSubstr("femur: tunnel_mask"));
+}
+
 /// The halves as segments 3 and 8 of a DICOM segmentation, without the slices that are empty.
 class LoadSegmentation : public LoadLabelMap {
  protected:

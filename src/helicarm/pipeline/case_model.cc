@@ -21,9 +21,9 @@ void description::check_model_line(const JsonReader& reader, const ModelLine& tu
     refuse("bone", fmt::format("is \"{}\", but the model \"{}\" moves with \"{}\"", *bone, tunnel.model,
                                *model->moves_with));
   if (bone) model->moves_with = bone;
-  if (tunnel.diameter_mm && !model->surface && !model->mask && !model->window_hu)
+  if (tunnel.diameter_mm && !model->surface && !model->mask && !model->window_hu && !model->tunnel_mask)
     refuse("diameter_mm", fmt::format("cannot be compared with the bone: give the model \"{}\" a \"mask\", "
-                                      "\"window_hu\" or a \"surface\"",
+                                      "\"window_hu\", \"tunnel_mask\" or a \"surface\"",
                                       tunnel.model));
 }
 

@@ -34,6 +34,9 @@ struct CaseModel {
   std::optional<int> mask_label;                             ///< of the mask; nothing: it has only one
   std::optional<std::string> mask_segment = {};  ///< the same by the label of a DICOM segmentation's segment
   std::optional<double> mask_threshold = {};     ///< of a fractional DICOM segmentation: share from which on
+  std::optional<std::filesystem::path> tunnel_mask =
+      {};                                              ///< of the bone that holds the tunnels, if not of all
+  std::optional<int> tunnel_mask_label = {};           ///< of it; nothing: it has only one
   std::optional<std::filesystem::path> measures = {};  ///< table of landmarks for measures in the bone
   std::optional<std::filesystem::path> zones = {};     ///< published positions; nothing: those built in
 };

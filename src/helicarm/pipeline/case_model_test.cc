@@ -75,6 +75,22 @@ TEST(CaseModel, TheLabelOfAMaskIsReadAndWritten) {
     EXPECT_EQ(with(wrong).error().reason, Reason::bad_value) << wrong;
 }
 
+TEST(CaseModel, TheBoneOfItsTunnelsIsReadAndWritten) {
+  const auto with = [&](const std::string& keys) {
+    return registration_case(R"(, "models": [{"name": "wrist", )" + keys + "}]");
+  };
+  const auto read = with(
+      R"("volume": "ct.nrrd", "window_hu": [200, 3000], "tunnel_mask": "map.nrrd", "tunnel_mask_label": 4)");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->models[0].tunnel_mask, "/case/map.nrrd");
+  const Json written = to_json(read->models[0], "/case");
+  EXPECT_EQ(written["tunnel_mask"], "map.nrrd");
+  EXPECT_EQ(written["tunnel_mask_label"], 4);
+  for (const char* wrong : {R"("surface": "bones.stl", "tunnel_mask": "map.nrrd")",
+                            R"("volume": "ct.nrrd", "tunnel_mask_label": 4)"})
+    EXPECT_EQ(with(wrong).error().reason, Reason::bad_value) << wrong;
+}
+
 /// The tunnel of a case with a model, or why it is refused.
 Expected<ModelLine> tunnel_from(const char* tunnel, bool outlined = true) {
   const Json json = Json::parse(tunnel);

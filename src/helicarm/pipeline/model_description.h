@@ -92,6 +92,12 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
       "window_hu", model.window_hu, hu_range,
       "`[low, high]`: the body's voxels, within the mask if there is one. Without mask and window the "
       "whole volume counts");
+  codec.file(
+      "tunnel_mask", model.tunnel_mask, folder,
+      "path of a volume like `mask`: the bone that holds the plan's tunnels, where the model is several "
+      "bones that lie in the images as in the CT. Absent: the model's own bone");
+  codec.integer("tunnel_mask_label", model.tunnel_mask_label, 1, volume_label_limit,
+                "label or segment of that bone, as `mask_label`");
   codec.vector("voxel_mm", model.voxel_mm, {1e-3, 100},
                "`[x, y, z]` of a TIFF stack: x along columns, y along rows, z along pages; the centre of the "
                "first voxel is the origin");
@@ -133,6 +139,8 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
     if (model.mask_segment && model.mask_label)
       refuse("mask_segment", "cannot be combined with \"mask_label\"");
     if (model.mask_threshold && !model.mask) refuse("mask_threshold", "needs a \"mask\"");
+    if (model.tunnel_mask && !model.volume) refuse("tunnel_mask", "needs a \"volume\"");
+    if (model.tunnel_mask_label && !model.tunnel_mask) refuse("tunnel_mask_label", "needs a \"tunnel_mask\"");
     if (model.zones && !model.measures) refuse("zones", "needs \"measures\"");
     if (model.window_hu && !(model.window_hu->x() < model.window_hu->y()))
       refuse("window_hu", "must be two increasing numbers");
