@@ -155,7 +155,10 @@ def add_model(name, folder, into, diameter):
     for file in ("ct.nrrd", "plan.mrk.json", f"{name}.nrrd"):
         shutil.copy(folder / file, into.parent / file)
     content = json.loads(into.read_text())
-    model = {"name": name, "volume": "ct.nrrd", "mask": f"{name}.nrrd", "plan": "plan.mrk.json"}
+    mask = f"{name}.nrrd"
+    # The bones of a wrist in a splint lie as in the CT: all are registered, the scaphoid holds the screw.
+    body = {"window_hu": [200, 3000], "tunnel_mask": mask} if name == "wrist" else {"mask": mask}
+    model = {"name": name, "volume": "ct.nrrd", **body, "plan": "plan.mrk.json"}
     tunnel = {"name": "screw", "model": name, "line": "screw", "diameter_mm": diameter, "bridge_mm": 1}
     if content["format"].startswith("helicarm-plan"):
         content |= {"bones": [name], "picks": []}
