@@ -28,7 +28,6 @@ class TrackFiles(DrawnFilm):
         self.assertEqual(len(table(out / "relative.csv")), FRAMES)
 
     @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
-
     def test_film_gives_the_bytes_of_its_frames(self):
         def filmed(case, folder):
             for view, codec, first in ((case["views"][0], ("ffv1", "A.avi"), 1), (case["views"][1], ("png", "B.mov"), 101)):

@@ -89,18 +89,23 @@ class TrackResume(DrawnFilm):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn('frame 8: no marker near the pick "J1"', done.stderr)
 
-    def test_interruption_says_what_is_kept(self):
-        out = self.root / "stopped"
+    def interrupted(self, name, handler):
+        """Result folder, exit code and messages of a run that is sent SIGINT once it has begun; `handler`: what it inherits."""
+        out = self.root / name
         process = subprocess.Popen([PROGRAM, "track", self.root / "case", "--frames", f"1-{FRAMES}", "--out", out],
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+                                   preexec_fn=lambda: signal.signal(signal.SIGINT, handler))
         while process.poll() is None and not (out / "sights.csv").exists():
             pass
         process.send_signal(signal.SIGINT)
-        _, stderr = process.communicate()
-        if process.returncode == 0:
+        stderr = process.communicate()[1]
+        return out, process.returncode, stderr
+
+    def test_interruption_says_what_is_kept(self):
+        out, code, stderr = self.interrupted("stopped", signal.SIG_DFL)
+        if code == 0:
             return  # it was done before the signal
-        self.assertEqual(process.returncode, -signal.SIGINT, stderr)
+        self.assertEqual(code, -signal.SIGINT, stderr)
         self.assertIn(f"of {FRAMES} frames are kept in {out}", stderr)
         self.assertIn(f"--frames 1-{FRAMES} --out {out} --resume", stderr)
         done = self.track(self.root / "case", "stopped", f"1-{FRAMES}", "--resume")
@@ -108,15 +113,8 @@ class TrackResume(DrawnFilm):
         self.assertEqual((out / "markers.csv").read_bytes(), (self.root / "out/markers.csv").read_bytes())
 
     def test_signal_that_a_background_job_ignores_does_not_end_it(self):
-        out = self.root / "background"
-        process = subprocess.Popen([PROGRAM, "track", self.root / "case", "--frames", f"1-{FRAMES}", "--out", out],
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
-        while process.poll() is None and not (out / "sights.csv").exists():
-            pass
-        process.send_signal(signal.SIGINT)
-        _, stderr = process.communicate()
-        self.assertEqual(process.returncode, 0, stderr)
+        _, code, stderr = self.interrupted("background", signal.SIG_IGN)
+        self.assertEqual(code, 0, stderr)
         self.assertNotIn("interrupted", stderr)
 
 
