@@ -270,9 +270,9 @@ def _mask_on(volume, mask):
 def as_model(obj):
     """The arguments of a model: {"volume" or "surface", "mask", "window_hu", "scale_sigma", "points"}."""
     if isinstance(obj, Mapping):
-        known = {"volume", "surface", "mask", "window_hu", "scale_sigma", "points"}
-        if set(obj) - known:
-            _refuse(f"models: {sorted(set(obj) - known)} is none of {sorted(known)}", "unknown_key")
+        known = ("volume", "surface", "mask", "window_hu", "scale_sigma", "points")
+        if unknown := sorted(set(obj) - set(known)):
+            _refuse(f"models: {', '.join(map(str, unknown))}: a model in memory has {', '.join(known)}", "unknown_key")
         if ("volume" in obj) == ("surface" in obj) or ("surface" in obj and {"mask", "window_hu"} & set(obj)):
             _refuse('models: give "volume" (with "mask" or "window_hu") or "surface"')
         model = {name: value for name, value in obj.items() if value is not None}

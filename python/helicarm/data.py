@@ -197,7 +197,8 @@ def register(folder=None, *, models=None, views=None, starts=None, camera_covari
 def check_tunnels(model, tunnels, *, diameter_mm, bridge_mm=None):
     """Planned tunnels against their bone, without images: bridge, length in the bone, entry, exit, angles, distances.
 
-    model: as register takes it: a volume with "mask" or "window_hu", or a surface. tunnels: {name: (start, end)}, (2, 3) L, P, S,
+    model: as register takes it: a volume with "mask" or "window_hu", or a surface; "tunnel_mask" in place of the mask: the bone that
+    holds the tunnels, of a model of several. tunnels: {name: (start, end)}, (2, 3) L, P, S,
     mm, drilled from the start. diameter_mm, bridge_mm (bone that the wall should keep; None: as of a case): of all, or {name:
     value}.
     Releases the GIL. Returns {name: bone_check} as in registration.json: "bridge_mm", "bridge_sigma_mm", "length_in_bone_mm",
@@ -212,6 +213,8 @@ def check_tunnels(model, tunnels, *, diameter_mm, bridge_mm=None):
         return value[name]
 
     tunnels = _mapping("tunnels", tunnels, "{name: (start, end)}")
+    if isinstance(model, Mapping) and model.get("tunnel_mask") is not None:
+        model = {key: value for key, value in model.items() if key not in ("tunnel_mask", "window_hu")} | {"mask": model["tunnel_mask"]}
     return _called("check_tunnels", _c._check_tunnels, as_model(model),
                    [(name, ends, of(name, diameter_mm, "diameter_mm"), of(name, bridge_mm, "bridge_mm")) for name, ends in tunnels.items()])
 

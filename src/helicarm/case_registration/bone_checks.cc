@@ -27,9 +27,7 @@ std::map<std::string, double> figures_of(const BoneCheck& check) {
 
 /// Bridge and bone ahead of the end in words.
 std::string places_of(const BoneCheck& check) {
-  if (!check.entry)
-    return check.enters_at_cut ? "its line enters the bone where the CT ends, which shows no surface there"
-                               : "its line does not pass through the bone";
+  if (!check.entry) return fmt::format("its line {}", guidance::words(check.no_entry));
   std::string text;
   if (check.bridge_mm)
     text = fmt::format(

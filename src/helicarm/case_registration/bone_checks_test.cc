@@ -97,7 +97,7 @@ TEST(JudgeTunnels, ALineThatEntersWhereTheCtEndsIsRefusedAsSuch) {
   auto checks = bone_checks(plan, registration::bone_surface(ct, ct, {}).get());
   judge_tunnels(plan, checks, result);
   ASSERT_TRUE(result.failure);
-  EXPECT_THAT(result.failure->message, HasSubstr("enters the bone where the CT ends"));
+  EXPECT_THAT(result.failure->message, HasSubstr("enters or leaves the bone where the CT ends"));
 }
 
 TEST(JudgeTunnels, TwoTunnelsTooNearToEachOtherAreWarnedOf) {

@@ -10,6 +10,18 @@ constexpr double one_sided_95 = 1.645;
 
 }  // namespace
 
+std::string_view words(NoEntry reason) {
+  switch (reason) {
+    case NoEntry::beyond_ct:
+      return "enters or leaves the bone where the CT ends, which shows no surface there";
+    case NoEntry::opens_nowhere:
+      return "opens nowhere: its start is more than 5 mm below the bone's surface, and so is its end";
+    case NoEntry::beside_bone:
+      break;
+  }
+  return "does not pass through the bone";
+}
+
 bool BoneCheck::is_breach() const {
   if (!diameter_mm) return false;
   if (!entry) return true;

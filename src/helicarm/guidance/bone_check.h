@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -14,6 +15,12 @@ struct TunnelDistance {
   std::string tunnel;
   double distance_mm = 0;  ///< between the walls; negative: they meet
 };
+
+/// Why a line has no way into the bone that can be compared.
+enum class NoEntry { beside_bone, beyond_ct, opens_nowhere };
+
+/// The same as the end of a sentence about the line.
+std::string_view words(NoEntry reason);
 
 /// A planned tunnel against its bone. Points in model coordinates; depths along the axis from the entry, mm.
 struct BoneCheck {
@@ -29,9 +36,8 @@ struct BoneCheck {
   Eigen::Vector3d thinnest = Eigen::Vector3d::Zero();  ///< on the axis at that depth
   Eigen::Vector3d outward = Eigen::Vector3d::Zero();   ///< normal of the surface nearest to it
   double length_in_bone_mm = 0;
-  /// On the bone's surface; nothing: the line does not meet the bone, or enters it where the volume ends.
-  std::optional<Eigen::Vector3d> entry = {};
-  bool enters_at_cut = false;                ///< where the volume ends, which shows no surface there
+  std::optional<Eigen::Vector3d> entry = {};  ///< on the bone's surface; nothing: see `no_entry`
+  NoEntry no_entry = NoEntry::beside_bone;
   std::optional<Eigen::Vector3d> exit = {};  ///< likewise; nothing: a blind tunnel
   std::optional<double> entry_angle_deg = {},
                         exit_angle_deg = {};      ///< between axis and surface; 90: perpendicular

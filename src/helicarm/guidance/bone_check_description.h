@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <fmt/format.h>
+
 #include "helicarm/core/output.h"
 #include "helicarm/guidance/bone_check.h"
 
@@ -23,8 +25,8 @@ void describe_bone_check(Output& output, const BoneCheck& check) {
   output.value("length_in_bone_mm", check.length_in_bone_mm, "of the axis");
   output.value(
       "entry_mm", check.entry,
-      "where the axis enters the bone, in the model's coordinates; `null`: the line does not meet it, "
-      "or enters it where the volume ends");
+      "where the axis enters the bone, in the model's coordinates; `null`: the line does not meet it, opens "
+      "nowhere, or enters or leaves it where the volume ends, as `note` says");
   output.value("exit_mm", check.exit, "where it leaves the bone; `null` for a blind tunnel too");
   output.value("entry_angle_deg", check.entry_angle_deg,
                "between axis and surface there; 90 is perpendicular");
@@ -44,6 +46,7 @@ void describe_bone_check(Output& output, const BoneCheck& check) {
       [&] {
         constexpr auto axis_alone =
             "the tunnel has no diameter_mm: its wall was not compared with the bone's surface";
+        if (!check.entry) return std::optional(fmt::format("the line {}", words(check.no_entry)));
         return check.diameter_mm ? std::nullopt : std::optional<std::string>(axis_alone);
       },
       "for people");

@@ -14,6 +14,7 @@ namespace helicarm::registration {
 namespace {
 
 using Eigen::Vector3d;
+using guidance::NoEntry;
 
 constexpr double step_mm = 0.5;
 constexpr int sectors = 72;
@@ -21,6 +22,7 @@ constexpr double reach_mm = 60;    // of the wall's surroundings
 constexpr double beyond_mm = 300;  // the line is followed behind its ends
 constexpr double open_start_mm = 5, open_end_mm = 1;
 constexpr double interruption_mm = 1.5;  // of an opening's face, by steps of a mask
+const double one_face_cosine = std::cos(30 * std::numbers::pi / 180);  // within the section
 const double same_face_cosine = std::cos(60 * std::numbers::pi / 180);
 const double least_slope_sine = std::sin(2 * std::numbers::pi / 180);
 constexpr double deg = 180 / std::numbers::pi;
@@ -65,11 +67,11 @@ class Check {
     BoneCheck check;
     check.diameter_mm = diameter_;
     if (!find_openings()) return std::nullopt;
-    if (!entry_) {
-      check.enters_at_cut = bone_.holds(start_);
+    const double to = exit_ ? exit_->at_mm : length_;
+    if (!entry_ || !bone_.shows(at(to))) {
+      if (entry_ || passes_a_cut()) check.no_entry = NoEntry::beyond_ct;
       return check;
     }
-    const double to = exit_ ? exit_->at_mm : length_;
     check.entry = at(entry_->at_mm);
     check.end = at(to);
     check.length_in_bone_mm = length_in_bone(to);
@@ -87,7 +89,15 @@ class Check {
     return std::asin(std::min(1.0, std::abs(opening.normal.dot(frame_.axis)))) * deg;
   }
 
-  /// False: only the end opens.
+  /// Bone of the line that the CT does not show, or into which it shows no way.
+  bool passes_a_cut() const {
+    if (bone_.holds(start_)) return true;
+    for (double along = 0; along < length_; along += step_mm)
+      if (bone_.holds(at(along)) && !bone_.shows(at(along))) return true;
+    return false;
+  }
+
+  /// False: the start does not open.
   bool find_openings() {
     crossings_ = bone_.crossings(at(-beyond_mm), frame_.axis, length_ + 2 * beyond_mm);
     for (Crossing& crossing : crossings_) crossing.at_mm -= beyond_mm;
@@ -105,26 +115,32 @@ class Check {
       if (crossing.leaves && ends_it) out = crossing;
     }
     if (end_inside && out && out->at_mm > length_ + open_end_mm) out.reset();
-    if (start_inside && -into->at_mm > open_start_mm && out) return false;
+    if (start_inside && -into->at_mm > open_start_mm) return false;
     if (!into) return true;
-    entry_ = Opening{into->at_mm, mean_normal(*into)};
-    if (out) exit_ = Opening{out->at_mm, mean_normal(*out)};
+    entry_ = Opening{into->at_mm, face_normal(*into)};
+    if (out) exit_ = Opening{out->at_mm, face_normal(*out)};
     return true;
   }
 
-  /// Over the tunnel's section.
-  Vector3d mean_normal(const Crossing& middle) const {
-    Vector3d sum = middle.normal;
+  /// Of the face that the axis meets most steeply within the tunnel's section: an edge beside it is none of
+  /// it.
+  Vector3d face_normal(const Crossing& middle) const {
+    std::vector<Vector3d> normals{middle.normal};
     const double reach = 2 * radius() + 2;
     for (int i = 0; i < 8; ++i) {
       const Vector3d from = at(middle.at_mm - reach) + radius() * frame_.spoke(i, 8);
       for (const Crossing& crossing : bone_.crossings(from, frame_.axis, 2 * reach))
         if (crossing.leaves == middle.leaves) {
-          sum += crossing.normal;
+          normals.push_back(crossing.normal);
           break;
         }
     }
-    return sum.norm() > 0 ? Vector3d(sum.normalized()) : middle.normal;
+    const Vector3d steepest = *std::ranges::max_element(
+        normals, {}, [&](const Vector3d& normal) { return std::abs(normal.dot(frame_.axis)); });
+    Vector3d sum = Vector3d::Zero();
+    for (const Vector3d& normal : normals)
+      if (normal.dot(steepest) > one_face_cosine) sum += normal;
+    return sum.normalized();
   }
 
   double length_in_bone(double to) const {
@@ -224,7 +240,8 @@ BoneCheck check_tunnel(const BoneSurface& bone, const BoneTunnel& tunnel) {
   if (auto check = Check(bone, tunnel).made()) return *std::move(check);
   // From its end, now a start at the surface.
   auto turned = Check(bone, {tunnel.end, tunnel.start, tunnel.diameter_mm}).made();
-  return turned ? *std::move(turned) : BoneCheck{.diameter_mm = tunnel.diameter_mm};
+  if (turned) return *std::move(turned);
+  return {.diameter_mm = tunnel.diameter_mm, .no_entry = NoEntry::opens_nowhere};
 }
 
 double tunnel_distance_mm(const BoneCheck& a, const BoneCheck& b) {

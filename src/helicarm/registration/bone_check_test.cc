@@ -43,7 +43,8 @@ Shape ball(double radius) {
 
 struct Voxels {
   Vector3d spacing;
-  bool partial = false;  ///< whether the CT shows what share of a voxel is bone
+  bool partial = false;                ///< whether the CT shows what share of a voxel is bone
+  double end_mm = 2 * half_length_mm;  ///< where the CT ends along z
 };
 
 /// A CT of the shape at a pose, with its mask.
@@ -52,6 +53,7 @@ std::shared_ptr<const BoneSurface> in_volume(const Shape& shape, const Eigen::Af
   volume::Volume ct;
   const double half_mm = half_length_mm + 10;
   ct.size = (2 * half_mm / voxels.spacing.array()).cast<int>();
+  ct.size.z() = int((half_mm + std::min(half_mm, voxels.end_mm)) / voxels.spacing.z());
   ct.patient_from_voxel = Eigen::Translation3d(Vector3d::Constant(-half_mm) + model_from_bone.translation()) *
                           Eigen::Scaling(voxels.spacing);
   volume::Volume mask = ct;
@@ -158,6 +160,49 @@ TEST(CheckTunnel, AWallThatClosesInBehindTheEndCounts) {
   const BoneCheck check = checked(wedge, {{0, 0, -20}, {0, 0, 5}, 8.0});
   EXPECT_NEAR(*check.bridge_mm, 3 * std::cos(turn), 0.1);
   EXPECT_NEAR(*check.at_mm, 20, 0.6);
+}
+
+TEST(CheckTunnel, AGrooveAlongTheWallIsNoFaceOfTheOpening) {
+  // Enters half a millimetre beside the box's edge and leaves its side by 10 degrees.
+  const Vector3d way(-std::sin(0.17), 0, std::cos(0.17)), entry(9.5, 0, -half_length_mm);
+  const BoneTunnel tunnel{entry - 5 * way, entry + 30 * way, 4.6};
+  for (const auto& bone :
+       {in_mesh(box(10), Eigen::Affine3d::Identity()),
+        in_volume(box(10), Eigen::Affine3d::Identity(), {Vector3d::Constant(0.5), true})}) {
+    const BoneCheck check = check_tunnel(*bone, tunnel);
+    EXPECT_TRUE(check.is_breach());
+    EXPECT_LT(*check.bridge_mm, -1);
+    EXPECT_GT(*check.entry_angle_deg, 70);
+  }
+}
+
+TEST(CheckTunnel, ALineThroughTheCtsEndIsNotCompared) {
+  const auto bone = in_volume(cylinder(9), Eigen::Affine3d::Identity(), {Vector3d::Constant(0.5), true, 12});
+  for (const double tilt : {0.0, 0.03, 0.07, 0.14, 0.2}) {
+    const Vector3d way(std::sin(tilt), 0, -std::cos(tilt)), cut(0, 0, 12);
+    const BoneTunnel tunnel{cut - 5 * way, cut + 20 * way, 4.0};
+    for (const BoneTunnel& each : {tunnel, BoneTunnel{tunnel.end, tunnel.start, 4.0}}) {
+      const BoneCheck check = check_tunnel(*bone, each);
+      EXPECT_FALSE(check.entry) << tilt;
+      EXPECT_EQ(check.no_entry, guidance::NoEntry::beyond_ct) << tilt;
+      EXPECT_TRUE(check.is_breach());
+    }
+  }
+}
+
+TEST(CheckTunnel, ABlindEndBeyondTheCtIsNotCompared) {
+  const auto bone = in_volume(cylinder(9), Eigen::Affine3d::Identity(), {Vector3d::Constant(0.5), true, 12});
+  const BoneCheck check = check_tunnel(*bone, {{0, 0, -30}, {0, 0, 16}, 4.0});
+  EXPECT_EQ(check.no_entry, guidance::NoEntry::beyond_ct);
+  EXPECT_FALSE(check.entry);
+}
+
+TEST(CheckTunnel, ALineBetweenTwoPlacesDeepInTheBoneOpensNowhere) {
+  const BoneCheck check = checked(box(10), {{0, 0, -11}, {0, 0, 8}, 4.0});
+  EXPECT_FALSE(check.entry);
+  EXPECT_EQ(check.no_entry, guidance::NoEntry::opens_nowhere);
+  const Json json = output_of([&](OutputJson& output) { guidance::describe_bone_check(output, check); });
+  EXPECT_NE(json["note"].get<std::string>().find("opens nowhere"), std::string::npos);
 }
 
 TEST(CheckTunnel, ALineBesideTheBoneIsABreach) {

@@ -72,6 +72,7 @@ class BoneMesh final : public BoneSurface {
     const auto found = crossings(point, direction, box_.sizes().norm(), 1);
     return !found.empty() && found.front().leaves;
   }
+  bool shows(const Vector3d&) const override { return true; }
   double sigma_mm(const Vector3d&) const override { return sigma_mm_; }
 
  private:

@@ -124,13 +124,18 @@ class BoneVolume final : public BoneSurface {
       const double now = excess(origin + k * step * direction);
       if ((now > 0) != (before > 0)) {
         const double at = (k - 1 + before / (before - now)) * step;
-        found.push_back({at, normal(origin + at * direction), before > 0});
+        const Vector3d place = origin + at * direction;
+        if (shows(place)) found.push_back({at, normal(place), before > 0});
       }
       before = now;
     }
     return found;
   }
   bool holds(const Vector3d& point) const override { return excess(point) > 0; }
+  bool shows(const Vector3d& point) const override {
+    const Eigen::Array3d voxel = (voxel_from_model_ * point).array();
+    return (voxel >= -0.5).all() && (voxel <= edge_.inside.size.cast<double>().array() - 0.5).all();
+  }
   double sigma_mm(const Vector3d& point) const override { return edge_.sigma_mm(voxel_from_model_ * point); }
 
  private:
