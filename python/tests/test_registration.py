@@ -234,6 +234,9 @@ def test_tunnels_are_compared_with_a_bone_in_memory():
     assert found["blind"]["bridge_mm"] == pytest.approx(3, abs=0.3) and not found["blind"]["thin"]
     assert found["blind"]["exit_mm"] is None and found["blind"]["end_mm"] == pytest.approx(14.5, abs=0.5)
     assert [other["name"] for other in found["blind"]["to_tunnels"]] == ["thin"]
+    one_bone = helicarm.check_tunnels({"volume": volume, "window_hu": (500, 2000), "tunnel_mask": mask}, lines, diameter_mm=6,
+                                      bridge_mm={"thin": 3, "blind": 2})
+    assert one_bone == found
     by_window = helicarm.check_tunnels({"volume": volume, "window_hu": (500, 2000)}, lines, diameter_mm=6)
     assert by_window["thin"]["bridge_mm"] == pytest.approx(found["thin"]["bridge_mm"], abs=0.2)
     assert by_window["thin"]["required_bridge_mm"] == 2
