@@ -273,9 +273,10 @@ def as_model(obj):
         known = ("volume", "surface", "mask", "window_hu", "scale_sigma", "points")
         if unknown := sorted(set(obj) - set(known)):
             _refuse(f"models: {', '.join(map(str, unknown))}: a model in memory has {', '.join(known)}", "unknown_key")
+        obj = {name: value for name, value in obj.items() if value is not None}
         if ("volume" in obj) == ("surface" in obj) or ("surface" in obj and {"mask", "window_hu"} & set(obj)):
             _refuse('models: give "volume" (with "mask" or "window_hu") or "surface"')
-        model = {name: value for name, value in obj.items() if value is not None}
+        model = dict(obj)
         for name, convert in (("volume", as_volume), ("surface", as_surface)):
             if name in model:
                 model[name] = convert(model[name])

@@ -213,8 +213,10 @@ def check_tunnels(model, tunnels, *, diameter_mm, bridge_mm=None):
         return value[name]
 
     tunnels = _mapping("tunnels", tunnels, "{name: (start, end)}")
-    if isinstance(model, Mapping) and model.get("tunnel_mask") is not None:
-        model = {key: value for key, value in model.items() if key not in ("tunnel_mask", "window_hu")} | {"mask": model["tunnel_mask"]}
+    if isinstance(model, Mapping) and "tunnel_mask" in model:
+        model = dict(model)
+        if (bone := model.pop("tunnel_mask")) is not None:
+            model = {**model, "mask": bone, "window_hu": None}
     return _called("check_tunnels", _c._check_tunnels, as_model(model),
                    [(name, ends, of(name, diameter_mm, "diameter_mm"), of(name, bridge_mm, "bridge_mm")) for name, ends in tunnels.items()])
 

@@ -89,8 +89,9 @@ void judge_tunnels(const MarkupPlan& plan, std::vector<std::optional<BoneCheck>>
       add_finding(
           result,
           finding(Reason::tunnel_breach, result.name, tunnel, check,
-                  ": that it leaves the bone is not excluded (95 %); move the line or choose a smaller "
-                  "diameter"),
+                  check.entry ? ": that it leaves the bone is not excluded (95 %); move the line or choose a "
+                                "smaller diameter"
+                              : "; move the line"),
           true);
     else if (check.is_thin())
       add_finding(result,

@@ -299,6 +299,7 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,
       model.warnings.push_back(std::move(warning));
     if (mask) model.warnings.insert(model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
     if (tunnel_mask) {
+      model.warnings.insert(model.warnings.end(), tunnel_mask->warnings.begin(), tunnel_mask->warnings.end());
       value_or_throw(
           registration::model_from(case_model.name + ": tunnel_mask", volume, tunnel_mask, std::nullopt));
       mask = std::move(tunnel_mask);

@@ -13,7 +13,7 @@ constexpr double one_sided_95 = 1.645;
 std::string_view words(NoEntry reason) {
   switch (reason) {
     case NoEntry::beyond_ct:
-      return "enters or leaves the bone where the CT ends, which shows no surface there";
+      return "enters or leaves the bone where the CT ends, which shows no surface there, or ends beyond it";
     case NoEntry::opens_nowhere:
       return "opens nowhere: its start is more than 5 mm below the bone's surface, and so is its end";
     case NoEntry::beside_bone:

@@ -2,7 +2,6 @@
 #include "helicarm/registration/bone_check.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -50,7 +49,7 @@ struct Beside {
 /// Where the tunnel crosses the surface.
 struct Opening {
   double at_mm;     ///< along the line from its start
-  Vector3d normal;  ///< outward, mean over the tunnel's section
+  Vector3d normal;  ///< outward, of the face
 };
 
 class Check {
@@ -62,14 +61,15 @@ class Check {
         frame_(frame_of((tunnel.end - tunnel.start) / length_)),
         diameter_(tunnel.diameter_mm) {}
 
-  /// Nothing: only the line's end opens.
+  /// Nothing: the start is too deep in the bone to open.
   std::optional<BoneCheck> made() {
     BoneCheck check;
     check.diameter_mm = diameter_;
     if (!find_openings()) return std::nullopt;
     const double to = exit_ ? exit_->at_mm : length_;
-    if (!entry_ || !bone_.shows(at(to))) {
-      if (entry_ || passes_a_cut()) check.no_entry = NoEntry::beyond_ct;
+    const bool is_cut = passes_a_cut() || (entry_ && !bone_.shows(at(to)));
+    if (!entry_ || is_cut) {
+      if (is_cut) check.no_entry = NoEntry::beyond_ct;
       return check;
     }
     check.entry = at(entry_->at_mm);
@@ -89,15 +89,15 @@ class Check {
     return std::asin(std::min(1.0, std::abs(opening.normal.dot(frame_.axis)))) * deg;
   }
 
-  /// Bone of the line that the CT does not show, or into which it shows no way.
+  /// Bone of the line that the CT does not show, or bone at its start without a surface behind it.
   bool passes_a_cut() const {
-    if (bone_.holds(start_)) return true;
+    if (bone_.holds(start_) && !(entry_ && entry_->at_mm < 0)) return true;
     for (double along = 0; along < length_; along += step_mm)
       if (bone_.holds(at(along)) && !bone_.shows(at(along))) return true;
     return false;
   }
 
-  /// False: the start does not open.
+  /// False: the start is too deep in the bone to open.
   bool find_openings() {
     crossings_ = bone_.crossings(at(-beyond_mm), frame_.axis, length_ + 2 * beyond_mm);
     for (Crossing& crossing : crossings_) crossing.at_mm -= beyond_mm;
@@ -122,7 +122,7 @@ class Check {
     return true;
   }
 
-  /// Of the face that the axis meets most steeply within the tunnel's section: an edge beside it is none of
+  /// Of the face that most of the tunnel's section lies on: an edge beside the opening is not averaged with
   /// it.
   Vector3d face_normal(const Crossing& middle) const {
     std::vector<Vector3d> normals{middle.normal};
@@ -135,12 +135,16 @@ class Check {
           break;
         }
     }
-    const Vector3d steepest = *std::ranges::max_element(
-        normals, {}, [&](const Vector3d& normal) { return std::abs(normal.dot(frame_.axis)); });
-    Vector3d sum = Vector3d::Zero();
+    const auto sum_near = [&](const Vector3d& normal) {
+      Vector3d sum = Vector3d::Zero();
+      for (const Vector3d& each : normals)
+        if (each.dot(normal) > one_face_cosine) sum += each;
+      return sum;
+    };
+    Vector3d most = Vector3d::Zero();
     for (const Vector3d& normal : normals)
-      if (normal.dot(steepest) > one_face_cosine) sum += normal;
-    return sum.normalized();
+      if (const Vector3d sum = sum_near(normal); sum.norm() > most.norm()) most = sum;
+    return most.normalized();
   }
 
   double length_in_bone(double to) const {

@@ -24,7 +24,8 @@ using guidance::TunnelDistance;
 /// its surface, its start where it is at most 5 mm below; a start inside the bone is led back to the surface
 /// along the axis. Where only the end opens, the tunnel is drilled from there. An opening's face, where the
 /// wall necessarily leaves the bone: surface that continues from the opening, within 60 degrees of the
-/// surface there, as far as its distance from the axis grows with the depth (by 2 degrees or more).
+/// face that most of the opening lies on, as far as its distance from the axis grows with the depth (by
+/// 2 degrees or more).
 BoneCheck check_tunnel(const BoneSurface& bone, const BoneTunnel& tunnel);
 
 /// Between the walls of two tunnels in the same bone (axes, without a diameter), mm; negative: they meet.

@@ -190,6 +190,29 @@ TEST(CheckTunnel, ALineThroughTheCtsEndIsNotCompared) {
   }
 }
 
+TEST(CheckTunnel, AnObliqueEntryBesideASteeperFaceIsNoBreach) {
+  // Through the side 4 mm behind the edge, at 35 degrees; the end's face is steeper to the axis.
+  const Vector3d way(-std::sin(0.61), 0, std::cos(0.61)), entry(10, 0, -half_length_mm + 3.4);
+  const BoneCheck check = checked(box(10), {entry - 8 * way, entry + 14 * way, 4.0});
+  EXPECT_NEAR(*check.entry_angle_deg, 35, 4);
+  EXPECT_FALSE(check.is_breach()) << *check.bridge_mm << " at " << *check.at_mm;
+}
+
+TEST(CheckTunnel, ALineThatReentersBehindTheCtsEndIsNotCompared) {
+  const Shape notched{[](const Vector3d& p) {
+                        const double whole = (p.cwiseAbs() - Vector3d(10, 10, 30)).maxCoeff();
+                        return std::max(whole, std::min(3 - std::abs(p.z()), 30.0));
+                      },
+                      10};
+  const auto bone = in_volume(notched, Eigen::Affine3d::Identity(), {Vector3d::Constant(0.5), true, 12});
+  for (const BoneTunnel& each :
+       {BoneTunnel{{0, 0, 16}, {0, 0, -20}, 4.0}, BoneTunnel{{0, 0, -20}, {0, 0, 16}, 4.0}}) {
+    const BoneCheck check = check_tunnel(*bone, each);
+    EXPECT_FALSE(check.entry);
+    EXPECT_EQ(check.no_entry, guidance::NoEntry::beyond_ct);
+  }
+}
+
 TEST(CheckTunnel, ABlindEndBeyondTheCtIsNotCompared) {
   const auto bone = in_volume(cylinder(9), Eigen::Affine3d::Identity(), {Vector3d::Constant(0.5), true, 12});
   const BoneCheck check = check_tunnel(*bone, {{0, 0, -30}, {0, 0, 16}, 4.0});

@@ -19,7 +19,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 
-/// A length for voxels of clinical CTs; of larger and of much smaller ones by their width.
+/// Millimetres, limited to a range of voxel widths.
 struct Length {
   double mm, least_voxels, most_voxels;
 
@@ -34,7 +34,7 @@ constexpr double band_voxels = 1.5;
 constexpr double step_voxels = 0.4;
 constexpr double lowest_hu = -150, highest_hu = 3000, air_hu = -500, highest_tissue_hu = 100;
 constexpr double least_contrast_hu = 100;
-constexpr double turn_share = 0.25;  // of the contrast, over the CT's noise
+constexpr double turn_share = 0.25;  // of the contrast, above the CT's noise
 constexpr double near_peak = 0.9;
 constexpr double unresolved = 3.6;  // 2.355 of a blurred line, whose flank is 0.67 as wide as that of a step
 constexpr double direct_air = 2.2;  // standard deviations of the blur, between cortex and air

@@ -25,12 +25,12 @@ struct BoneEdge {
 /// Of the bone's outline (non-zero voxels) in the CT's Hounsfield units, finite and in the same order.
 ///
 /// Where the CT shows an edge along the outline's normal (100 HU), at most 1.5 mm or 1.6 voxels within the
-/// outline and half a millimetre or 0.75 voxels outside it (the larger; at most 5 voxels), the surface is
-/// there, in the middle between the ends of what it may be: half the height of the cortex as it is seen,
-/// which blur has lowered and widened where it is thin; half the height of the bone's dense cortex (Treece
-/// 2010: the density of cortex is about one in a bone); half the height over the soft tissue that the bone
-/// has elsewhere, where a narrow space shows less of it; and over air, where the CT has air beside the bone,
-/// which may have been cut out of its soft tissue. Its standard deviation is that of a uniform density
+/// outline and half a millimetre or 0.75 voxels outside it (the larger; at most 5 and 1.7 voxels), the
+/// surface is there, in the middle between the ends of what it may be: half the height of the cortex as it is
+/// seen, which blur has lowered and widened where it is thin; half the height of the bone's dense cortex
+/// (Treece 2010: the density of cortex is about one in a bone); half the height over the soft tissue that the
+/// bone has elsewhere, where a narrow space shows less of it; and over air, where the CT has air beside the
+/// bone, which may have been cut out of its soft tissue. Its standard deviation is that of a uniform density
 /// between them, and 0.15 voxels. What the limits cut off is added. Elsewhere the surface is the outline, to
 /// 0.2 voxels. Values below -150 HU and over 3000 HU (metal) count as these.
 BoneEdge bone_edge(const ByteGrid& bone, const std::vector<float>& hu, const Eigen::Matrix3d& mm_from_voxel);
