@@ -16,7 +16,7 @@ struct TunnelDistance {
   double distance_mm = 0;  ///< between the walls; negative: they meet
 };
 
-/// Why a line has no way into the bone that can be compared.
+/// Why a line has no entry into the bone that can be compared.
 enum class NoEntry { beside_bone, beyond_ct, opens_nowhere };
 
 /// The same as the end of a sentence about the line.

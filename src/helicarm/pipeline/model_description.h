@@ -92,10 +92,10 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
       "window_hu", model.window_hu, hu_range,
       "`[low, high]`: the body's voxels, within the mask if there is one. Without mask and window the "
       "whole volume counts");
-  codec.file(
-      "tunnel_mask", model.tunnel_mask, folder,
-      "path of a volume like `mask`: the bone that holds the plan's tunnels, where the model is several "
-      "bones that lie in the images as in the CT. Absent: the model's own bone");
+  codec.file("tunnel_mask", model.tunnel_mask, folder,
+             "path of a volume like `mask`, no fractional DICOM segmentation: the bone that holds the plan's "
+             "tunnels, where the model is several bones that lie in the images as in the CT. Absent: the "
+             "model's own bone");
   codec.integer("tunnel_mask_label", model.tunnel_mask_label, 1, volume_label_limit,
                 "label or segment of that bone, as `mask_label`");
   codec.vector("voxel_mm", model.voxel_mm, {1e-3, 100},

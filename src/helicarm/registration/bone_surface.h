@@ -31,7 +31,7 @@ class BoneSurface {
       const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double length_mm,
       std::size_t most = std::numeric_limits<std::size_t>::max()) const = 0;
   virtual bool holds(const Eigen::Vector3d& point) const = 0;
-  /// False: the place is beyond the CT, where it continues what its face shows.
+  /// False: the place is beyond the part of the CT about the bone; bone there is continued from its face.
   virtual bool shows(const Eigen::Vector3d& point) const = 0;
   /// Standard deviation along its normal of the surface at this place on it, mm.
   virtual double sigma_mm(const Eigen::Vector3d& point) const = 0;

@@ -41,8 +41,6 @@ constexpr double refused_ratio = 9;  // three standard deviations
 constexpr double refused_ratio_exact = 50;  // cameras of unknown error
 constexpr double most_search_mm = 100, most_search_deg = 90;
 
-double least_score_of(const Model& model) { return model.surface ? least_contour_score : least_patch_score; }
-
 RigidCovariance inverse_of(const RigidCovariance& matrix) {
   return geometry::solve_spd(matrix, RigidCovariance::Identity()).solution;
 }
@@ -301,7 +299,7 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
                         "exchanged, or slices or an axis reversed",
                         *result.mirrored_ratio)
                   : "";
-  const double least = least_score_of(model);
+  const double least = model.surface ? least_contour_score : least_patch_score;
   for (const RegisteredView& view : result.views)
     if (view.score < least)
       refuse(Reason::wrong_model,

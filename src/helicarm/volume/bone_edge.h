@@ -32,7 +32,7 @@ struct BoneEdge {
 /// bone has elsewhere, where a narrow space shows less of it; and over air, where the CT has air beside the
 /// bone, which may have been cut out of its soft tissue. Its standard deviation is that of a uniform density
 /// between them, and 0.15 voxels. What the limits cut off is added. Elsewhere the surface is the outline, to
-/// 0.2 voxels. Values below -150 HU and over 3000 HU (metal) count as these.
+/// 0.2 voxels. Values below -150 HU (but for the height over air) and over 3000 HU (metal) count as these.
 BoneEdge bone_edge(const ByteGrid& bone, const std::vector<float>& hu, const Eigen::Matrix3d& mm_from_voxel);
 
 /// What the edges need of a CT around the bone along each axis, in voxels.
