@@ -17,15 +17,16 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 /// The limit of FreshnessLimits for states.
 constexpr double recent_s = 0.1;
-/// The median of the last `most` samples in `window_s` is compared with the plan.
+/// The median of the last `most` samples in the `window_s` before the newest is compared with the plan.
 struct MedianWindow {
   double window_s;
   std::size_t most;
 };
 constexpr std::size_t most_of_bone = 5;
 /// The tool's rotational noise acts on the tip by the tool's length: with 0.2 degrees per sample the median
-/// of five samples deviates by up to 1.25 mm in ten minutes, of twelve by 0.74 mm, at a limit of 1 mm.
-constexpr MedianWindow of_tool{0.25, 12};
+/// of five samples deviates by up to 1.25 mm in ten minutes, of twelve by 0.74 mm, at a limit of 1 mm. The
+/// window holds twelve also where every second sample is lost.
+constexpr MedianWindow of_tool{0.5, 12};
 /// Lever that converts a rotation to a distance when the nearest pose of a path is sought.
 constexpr double lever_mm = 200;
 constexpr double deg_per_rad = 180 / std::numbers::pi;
@@ -55,10 +56,10 @@ Vector6d median_of(const std::vector<Vector6d>& steps) {
 std::vector<tracker::PoseSample> recent(const tracker::PoseBoard& board, const std::string& name,
                                         double now_s, double oldest_s, const MedianWindow& wanted) {
   if (const auto elsewhere = board.elsewhere(name, now_s, oldest_s)) return {*elsewhere};
-  value_or_throw(board.latest(name, now_s, oldest_s));
+  const double newest_s = value_or_throw(board.latest(name, now_s, oldest_s)).time_s;
   // A sample may arrive after `now`.
   std::vector<tracker::PoseSample> samples =
-      board.between(name, now_s - wanted.window_s, std::numeric_limits<double>::infinity());
+      board.between(name, newest_s - wanted.window_s, std::numeric_limits<double>::infinity());
   if (samples.size() > wanted.most)
     samples.erase(samples.begin(), samples.end() - static_cast<std::ptrdiff_t>(wanted.most));
   return samples;

@@ -105,6 +105,7 @@ struct Scene {
         base_moves * tool_moves * hand_eye.tracker_from_base * robot.state().base_from_tcp *
         robot::drill().flange_from_tcp.inverse() * hand_eye.flange_from_marker;
     const geometry::RigidTransform femur = femur_moves * tracker_from_femur;
+    if (++samples % one_kept_in) return;
     board.take({"tracker", tracker::stamp_from_seconds(1.7e9 + time_s),
                 tracker::IgtlTracking{{{"femur", 1, seen(taken_for_femur.value_or(femur)).matrix()},
                                        {"tool", 1, seen(marker).matrix()}}}},
@@ -151,6 +152,7 @@ struct Scene {
 
   double tracker_period_s;
   double delay_s = 0.002;
+  int samples = 0, one_kept_in = 1;  ///< the others are lost
   double sigma_mm = 0.12, sigma_deg = 0.05;
   RandomStream random;
   double time_s = 0, next_sample_s = 0;
@@ -210,18 +212,30 @@ TEST(PlanWatch, TenMinutesOfNoiseStayBelowTheLimit) {
   RecordProperty("most_mdeg", int(most_deg * 1000));
 }
 
-TEST(PlanWatch, TenMinutesOfRotationalNoiseOfTheToolStayBelowTheLimit) {
-  Scene scene;
-  scene.sigma_deg = 0.2;
+/// Most that ten minutes of this scene's noise at rest appear as a motion of base or tool, mm.
+double most_at_rest_mm(Scene& scene) {
   const PlanWatch watch = scene.watch();
   double most_mm = 0;
   while (scene.time_s < 600) {
     scene.next_sample();
-    most_mm =
-        std::max(most_mm, watch.base_motion(scene.board, scene.track, scene.time_s).value().distance_mm);
+    const auto moved = watch.base_motion(scene.board, scene.track, scene.time_s);
+    most_mm = std::max(most_mm, moved.value().distance_mm);
   }
-  EXPECT_LT(most_mm, 1);
-  RecordProperty("most_um", int(most_mm * 1000));
+  testing::Test::RecordProperty("most_um", int(most_mm * 1000));
+  return most_mm;
+}
+
+TEST(PlanWatch, TenMinutesOfRotationalNoiseOfTheToolStayBelowTheLimit) {
+  Scene scene;
+  scene.sigma_deg = 0.2;
+  EXPECT_LT(most_at_rest_mm(scene), 1);
+}
+
+TEST(PlanWatch, LostSamplesDoNotRaiseTheNoise) {
+  Scene scene;
+  scene.sigma_deg = 0.2;
+  scene.one_kept_in = 2;
+  EXPECT_LT(most_at_rest_mm(scene), 1);
 }
 
 TEST(PlanWatch, CreepingBoneStopsTheRobot) {
