@@ -86,26 +86,22 @@ struct LoadedMask {
   bool may_be_part = false;
 };
 
-/// Which bone of a file is the mask, and the key that chooses it.
-struct MaskFile {
-  const fs::path& path;
-  volume::SegmentChoice choice;
-  std::string label_key;
-};
-
-LoadedMask mask_of(const pipeline::CaseModel& case_model, const MaskFile& file) {
-  const std::string origin =
-      fmt::format("models: \"{}\": {}", case_model.name, file.path.filename().string());
-  std::optional<volume::Volume> segment = value_or_throw(volume::read_segment(file.path, file.choice));
+/// `key`: of the mask in its case.
+LoadedMask mask_of(const pipeline::CaseModel& case_model, const pipeline::CaseMask& mask,
+                   const std::string& key) {
+  const fs::path& file = *mask.file;
+  const std::string origin = fmt::format("models: \"{}\": {}", case_model.name, file.filename().string());
+  std::optional<volume::Volume> segment =
+      value_or_throw(volume::read_segment(file, {mask.label, mask.segment, mask.threshold, key}));
   if (segment) return {*std::move(segment), true};
-  for (const auto& [is_given, key] : {std::pair(file.choice.label.has_value(), "mask_segment"),
-                                      std::pair(file.choice.threshold.has_value(), "mask_threshold")})
+  for (const auto& [is_given, part] :
+       {std::pair(mask.segment.has_value(), "segment"), std::pair(mask.threshold.has_value(), "threshold")})
     if (is_given)
       throw BadInput(Reason::bad_value,
-                     fmt::format("{} is no DICOM segmentation: it takes no \"{}\"", origin, key));
-  LoadedMask mask{volume_at(file.path, case_model, 0)};
-  value_or_throw(volume::choose_label(mask.volume, file.choice.number, origin, file.label_key));
-  return mask;
+                     fmt::format("{} is no DICOM segmentation: it takes no \"{}_{}\"", origin, key, part));
+  LoadedMask loaded{volume_at(file, case_model, 0)};
+  value_or_throw(volume::choose_label(loaded.volume, mask.label, origin, fmt::format("\"{}_label\"", key)));
+  return loaded;
 }
 
 bool has_voxels_of(const volume::Volume& volume, const Eigen::Vector3d& voxel_mm) {
@@ -113,16 +109,18 @@ bool has_voxels_of(const volume::Volume& volume, const Eigen::Vector3d& voxel_mm
   return spacing.isApprox(voxel_mm, 1e-3);
 }
 
-/// The mask on the CT's grid; another grid is refused with the model.
-volume::Volume mask_on(const volume::Volume& ct, const pipeline::CaseModel& case_model,
-                       const MaskFile& file) {
-  LoadedMask mask = mask_of(case_model, file);
+/// The mask, if there is one, on the CT's grid; another grid is refused (bad_value).
+std::optional<volume::Volume> mask_on(const volume::Volume& ct, const pipeline::CaseModel& case_model,
+                                      const pipeline::CaseMask& mask, const std::string& key) {
+  if (!mask.file) return std::nullopt;
+  LoadedMask loaded = mask_of(case_model, mask, key);
   // A stack has no frame of its own: a mask drawn on it in another program brings that program's.
-  if (case_model.voxel_mm && has_voxels_of(mask.volume, *case_model.voxel_mm))
-    mask.volume.patient_from_voxel = ct.patient_from_voxel;
+  if (case_model.voxel_mm && has_voxels_of(loaded.volume, *case_model.voxel_mm))
+    loaded.volume.patient_from_voxel = ct.patient_from_voxel;
   // A segmentation's empty slices may be missing.
-  volume::onto_grid(mask.volume, ct, mask.may_be_part);
-  return std::move(mask.volume);
+  volume::onto_grid(loaded.volume, ct, loaded.may_be_part);
+  value_or_throw(registration::check_mask(fmt::format("{}: {}", case_model.name, key), ct, loaded.volume));
+  return std::move(loaded.volume);
 }
 
 void check_size(const std::string& view, const char* expected_by, const Eigen::Vector2i& expected,
@@ -278,16 +276,9 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,
                      fmt::format("models: \"{}\": \"voxel_mm\" is for TIFF stacks only; {} states its own",
                                  case_model.name, case_model.volume->filename().string()));
     const volume::Volume volume = volume_at(*case_model.volume, case_model, case_model.tiff_offset_hu);
-    std::optional<volume::Volume> mask, tunnel_mask;
-    if (case_model.mask)
-      mask = mask_on(volume, case_model,
-                     {*case_model.mask,
-                      {case_model.mask_label, case_model.mask_segment, case_model.mask_threshold},
-                      "\"mask_label\""});
-    if (case_model.tunnel_mask)
-      tunnel_mask =
-          mask_on(volume, case_model,
-                  {*case_model.tunnel_mask, {case_model.tunnel_mask_label}, "\"tunnel_mask_label\""});
+    std::optional<volume::Volume> mask = mask_on(volume, case_model, case_model.mask, "mask");
+    std::optional<volume::Volume> tunnel_mask =
+        mask_on(volume, case_model, case_model.tunnel_mask, "tunnel_mask");
     std::optional<registration::HuWindow> window;
     if (case_model.window_hu) window = {case_model.window_hu->x(), case_model.window_hu->y()};
     registration::Model model =
@@ -300,8 +291,6 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,
     if (mask) model.warnings.insert(model.warnings.end(), mask->warnings.begin(), mask->warnings.end());
     if (tunnel_mask) {
       model.warnings.insert(model.warnings.end(), tunnel_mask->warnings.begin(), tunnel_mask->warnings.end());
-      value_or_throw(
-          registration::model_from(case_model.name + ": tunnel_mask", volume, tunnel_mask, std::nullopt));
       mask = std::move(tunnel_mask);
       window.reset();
     }

@@ -28,10 +28,10 @@ class LoadLabelMap : public testing::Test {
     }
     model_.name = "femur";
     model_.volume = folder_.path() / "ct.nrrd";
-    model_.mask = folder_.path() / "labels.nrrd";
+    model_.mask.file = folder_.path() / "labels.nrrd";
     const Eigen::Affine3d place = Eigen::Affine3d::Identity();
     EXPECT_TRUE(write_file(*model_.volume, volume::to_nrrd({24, 24, 24}, place, bone)));
-    EXPECT_TRUE(write_file(*model_.mask, volume::to_nrrd({24, 24, 24}, place, labels)));
+    EXPECT_TRUE(write_file(*model_.mask.file, volume::to_nrrd({24, 24, 24}, place, labels)));
   }
 
   TemporaryFolder folder_;
@@ -39,11 +39,11 @@ class LoadLabelMap : public testing::Test {
 };
 
 TEST_F(LoadLabelMap, TheChosenLabelIsTheBody) {
-  model_.mask_label = 3;
+  model_.mask.label = 3;
   const auto loaded = load_model(model_);
   ASSERT_TRUE(loaded) << loaded.error().message;
   EXPECT_NEAR(loaded->model->centre.x(), 7.5, 0.7);
-  model_.mask_label = 8;
+  model_.mask.label = 8;
   EXPECT_NEAR(load_model(model_)->model->centre.x(), 15.5, 0.7);
 }
 
@@ -57,7 +57,7 @@ TEST_F(LoadLabelMap, SeveralLabelsWithoutAChoiceAreRefused) {
 }
 
 TEST_F(LoadLabelMap, ALabelThatIsNotThereIsRefused) {
-  model_.mask_label = 4;
+  model_.mask.label = 4;
   EXPECT_THAT(load_model(model_).error().message, HasSubstr("holds no label 4"));
 }
 
@@ -70,13 +70,13 @@ MarkupPlan plan_in_the_second_half() {
 }
 
 TEST_F(LoadLabelMap, TunnelsAreComparedWithTheBoneThatHoldsThem) {
-  model_.mask.reset();
+  model_.mask = {};
   model_.window_hu = {100, 3000};
   EXPECT_NEAR(*load_model(model_, plan_in_the_second_half())->bone_checks[0]->bridge_mm, 3.5, 0.4);
-  model_.tunnel_mask = folder_.path() / "labels.nrrd";
+  model_.tunnel_mask.file = folder_.path() / "labels.nrrd";
   EXPECT_THAT(load_model(model_, plan_in_the_second_half()).error().message,
               HasSubstr("choose one with \"tunnel_mask_label\""));
-  model_.tunnel_mask_label = 8;
+  model_.tunnel_mask.label = 8;
   const auto loaded = load_model(model_, plan_in_the_second_half());
   ASSERT_TRUE(loaded) << loaded.error().message;
   EXPECT_NEAR(*loaded->bone_checks[0]->bridge_mm, 2.5, 0.4);
@@ -84,11 +84,18 @@ TEST_F(LoadLabelMap, TunnelsAreComparedWithTheBoneThatHoldsThem) {
 }
 
 TEST_F(LoadLabelMap, ATunnelMaskOfAnotherGridIsRefused) {
-  model_.mask_label = 8;
-  model_.tunnel_mask = folder_.path() / "other.nrrd";
-  EXPECT_TRUE(write_file(*model_.tunnel_mask, volume::to_nrrd({9, 9, 9}, Eigen::Affine3d(Eigen::Scaling(2.7)),
-                                                              std::vector<std::uint8_t>(729, 1))));
+  model_.mask.label = 8;
+  model_.tunnel_mask.file = folder_.path() / "other.nrrd";
+  EXPECT_TRUE(write_file(
+      *model_.tunnel_mask.file,
+      volume::to_nrrd({9, 9, 9}, Eigen::Affine3d(Eigen::Scaling(2.7)), std::vector<std::uint8_t>(729, 1))));
   EXPECT_THAT(load_model(model_).error().message, HasSubstr("femur: tunnel_mask"));
+}
+
+TEST_F(LoadLabelMap, AnEmptyMaskIsRefused) {
+  EXPECT_TRUE(write_file(*model_.mask.file, volume::to_nrrd({24, 24, 24}, Eigen::Affine3d::Identity(),
+                                                            std::vector<std::uint8_t>(24 * 24 * 24, 0))));
+  EXPECT_THAT(load_model(model_).error().message, HasSubstr("femur: mask: the mask is empty"));
 }
 
 /// The halves as segments 3 and 8 of a DICOM segmentation, without the slices that are empty.
@@ -96,7 +103,7 @@ class LoadSegmentation : public LoadLabelMap {
  protected:
   using Builder = xray::DicomBuilder;
 
-  LoadSegmentation() { model_.mask = folder_.path() / "seg.dcm"; }
+  LoadSegmentation() { model_.mask.file = folder_.path() / "seg.dcm"; }
 
   static std::string text(std::uint32_t tag, std::string value) {
     if (value.size() % 2 != 0) value += ' ';
@@ -133,30 +140,45 @@ class LoadSegmentation : public LoadLabelMap {
                 Builder::item(group(0x00209116, text(0x00200037, "1\\0\\0\\0\\1\\0")) +
                               group(0x00289110, text(0x00280030, "1\\1"))));
     builder.raw(0x52009230, "SQ", frames).raw(0x7FE00010, "OB", bits);
-    EXPECT_TRUE(write_file(*model_.mask, builder.bytes()));
+    EXPECT_TRUE(write_file(*model_.mask.file, builder.bytes()));
   }
 };
 
 TEST_F(LoadSegmentation, TheChosenSegmentIsTheBody) {
   write(4);
-  model_.mask_label = 3;
+  model_.mask.label = 3;
   const auto loaded = load_model(model_);
   ASSERT_TRUE(loaded) << loaded.error().message;
   EXPECT_NEAR(loaded->model->centre.x(), 7.5, 0.7);
-  model_.mask_label = 8;
+  model_.mask.label = 8;
   EXPECT_NEAR(load_model(model_)->model->centre.x(), 15.5, 0.7);
 }
 
 TEST_F(LoadSegmentation, ASegmentIsChosenByItsLabel) {
   write(4);
-  model_.mask_segment = "Tibia";
+  model_.mask.segment = "Tibia";
   EXPECT_NEAR(load_model(model_)->model->centre.x(), 15.5, 0.7);
-  model_.mask_threshold = 0.5;
+  model_.mask.threshold = 0.5;
   EXPECT_THAT(load_model(model_).error().message, HasSubstr("takes no \"mask_threshold\""));
 }
 
+TEST_F(LoadSegmentation, ATunnelMaskIsChosenByItsOwnKeys) {
+  write(4);
+  model_.tunnel_mask = model_.mask;
+  model_.mask = {};
+  model_.window_hu = {100, 3000};
+  EXPECT_THAT(load_model(model_).error().message,
+              HasSubstr("\"tunnel_mask_label\" or \"tunnel_mask_segment\"; its segments: 3"));
+  model_.tunnel_mask.segment = "Tibia";
+  const auto loaded = load_model(model_, plan_in_the_second_half());
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_NEAR(*loaded->bone_checks[0]->bridge_mm, 2.5, 0.4);
+  model_.tunnel_mask.threshold = 0.5;
+  EXPECT_THAT(load_model(model_).error().message, HasSubstr("takes no \"tunnel_mask_threshold\""));
+}
+
 TEST_F(LoadLabelMap, ALabelMapTakesNoSegment) {
-  model_.mask_segment = "Tibia";
+  model_.mask.segment = "Tibia";
   EXPECT_THAT(load_model(model_).error().message,
               HasSubstr("is no DICOM segmentation: it takes no \"mask_segment\""));
 }
@@ -171,7 +193,7 @@ TEST_F(LoadSegmentation, SeveralSegmentsWithoutAChoiceAreNamed) {
 
 TEST_F(LoadSegmentation, OneThatLeavesTheCtIsRefused) {
   write(10);  // to z = 25
-  model_.mask_label = 3;
+  model_.mask.label = 3;
   const auto refused = load_model(model_);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::bad_value);

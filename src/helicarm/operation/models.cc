@@ -116,8 +116,8 @@ Expected<Digests> keep_models(OperationPlan& plan, const fs::path& session) {
     for (std::size_t i = 0; i < plan.models.size(); ++i) {
       pipeline::CaseModel& model = plan.models[i];
       const std::string into = std::to_string(i + 1);
-      for (auto* file : {&model.volume, &model.surface, &model.mask, &model.tunnel_mask, &model.landmarks,
-                         &model.plan, &model.measures, &model.zones})
+      for (auto* file : {&model.volume, &model.surface, &model.mask.file, &model.tunnel_mask.file,
+                         &model.landmarks, &model.plan, &model.measures, &model.zones})
         if (*file) *file = folder.kept(**file, into);
       value_or_throw(case_registration::load_model(model));
     }

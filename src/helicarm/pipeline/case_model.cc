@@ -21,7 +21,8 @@ void description::check_model_line(const JsonReader& reader, const ModelLine& tu
     refuse("bone", fmt::format("is \"{}\", but the model \"{}\" moves with \"{}\"", *bone, tunnel.model,
                                *model->moves_with));
   if (bone) model->moves_with = bone;
-  if (tunnel.diameter_mm && !model->surface && !model->mask && !model->window_hu && !model->tunnel_mask)
+  if (tunnel.diameter_mm && !model->surface && !model->mask.file && !model->window_hu &&
+      !model->tunnel_mask.file)
     refuse("diameter_mm", fmt::format("cannot be compared with the bone: give the model \"{}\" a \"mask\", "
                                       "\"window_hu\", \"tunnel_mask\" or a \"surface\"",
                                       tunnel.model));

@@ -16,12 +16,20 @@ namespace helicarm::pipeline {
 
 enum class Side { left, right };
 
+/// The voxels of a volume that are of one body: those that are not 0, or a part of them.
+struct CaseMask {
+  std::optional<std::filesystem::path> file = {};
+  std::optional<int> label = {};            ///< of a label map; nothing: it has only one
+  std::optional<std::string> segment = {};  ///< the same by the label of a DICOM segmentation's segment
+  std::optional<double> threshold = {};     ///< of a fractional DICOM segmentation: share from which on
+};
+
 /// An element of "models": files of a rigid body, and from where its registration starts.
 struct CaseModel {
   std::string name;
   std::optional<std::filesystem::path> volume;   ///< CT; this or `surface`, or landmarks alone
   std::optional<std::filesystem::path> surface;  ///< closed: STL, PLY or VTP
-  std::optional<std::filesystem::path> mask;     ///< of the volume
+  CaseMask mask;                                 ///< of the volume
   std::optional<Eigen::Vector2d> window_hu;
   std::optional<Eigen::Vector3d> voxel_mm;  ///< of a TIFF stack
   double tiff_offset_hu = 0;                ///< added to a TIFF stack's values
@@ -31,12 +39,7 @@ struct CaseModel {
   std::optional<geometry::RigidTransform> world_from_model;  ///< start
   std::optional<std::filesystem::path> landmarks;            ///< start: CSV of points that are also picked
   std::optional<std::filesystem::path> plan;                 ///< Slicer markups
-  std::optional<int> mask_label;                             ///< of the mask; nothing: it has only one
-  std::optional<std::string> mask_segment = {};  ///< the same by the label of a DICOM segmentation's segment
-  std::optional<double> mask_threshold = {};     ///< of a fractional DICOM segmentation: share from which on
-  std::optional<std::filesystem::path> tunnel_mask =
-      {};                                              ///< of the bone that holds the tunnels, if not of all
-  std::optional<int> tunnel_mask_label = {};           ///< of it; nothing: it has only one
+  CaseMask tunnel_mask = {};                           ///< of the bone that holds the tunnels, if not of all
   std::optional<std::filesystem::path> measures = {};  ///< table of landmarks for measures in the bone
   std::optional<std::filesystem::path> zones = {};     ///< published positions; nothing: those built in
 };

@@ -68,7 +68,7 @@ TEST(CaseModel, TheLabelOfAMaskIsReadAndWritten) {
   };
   const auto read = with(R"("mask": "map.nrrd", "mask_label": 75)");
   ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->models[0].mask_label, 75);
+  EXPECT_EQ(read->models[0].mask.label, 75);
   EXPECT_EQ(to_json(read->models[0], "/case")["mask_label"], 75);
   for (const char* wrong : {R"("mask_label": 75)", R"("mask": "map.nrrd", "mask_label": 0)",
                             R"("mask": "map.nrrd", "mask_label": 1.5)"})
@@ -82,12 +82,14 @@ TEST(CaseModel, TheBoneOfItsTunnelsIsReadAndWritten) {
   const auto read = with(
       R"("volume": "ct.nrrd", "window_hu": [200, 3000], "tunnel_mask": "map.nrrd", "tunnel_mask_label": 4)");
   ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->models[0].tunnel_mask, "/case/map.nrrd");
+  EXPECT_EQ(read->models[0].tunnel_mask.file, "/case/map.nrrd");
   const Json written = to_json(read->models[0], "/case");
   EXPECT_EQ(written["tunnel_mask"], "map.nrrd");
   EXPECT_EQ(written["tunnel_mask_label"], 4);
   for (const char* wrong : {R"("surface": "bones.stl", "tunnel_mask": "map.nrrd")",
-                            R"("volume": "ct.nrrd", "tunnel_mask_label": 4)"})
+                            R"("volume": "ct.nrrd", "tunnel_mask_label": 4)",
+                            R"("volume": "ct.nrrd", "tunnel_mask": "map.nrrd", "tunnel_mask_label": 4,
+                               "tunnel_mask_segment": "Scaphoid")"})
     EXPECT_EQ(with(wrong).error().reason, Reason::bad_value) << wrong;
 }
 

@@ -61,6 +61,33 @@ void describe_start(Codec& codec, Model& model, const std::filesystem::path& fol
   });
 }
 
+/// A mask's keys: `key`, `key`_label, ... `file` describes the first, `what` is its body.
+template <class Codec, class Mask>
+void describe_mask(Codec& codec, const std::string& key, Mask& mask, const std::filesystem::path& folder,
+                   const char* file, const std::string& what) {
+  const std::string label = key + "_label", segment = key + "_segment", threshold = key + "_threshold";
+  codec.file(key.c_str(), mask.file, folder, file);
+  codec.integer(label.c_str(), mask.label, 1, volume_label_limit,
+                ("label of " + what +
+                 " where the file is a label map, or the segment's number in a DICOM segmentation; with "
+                 "several of them it must be given")
+                    .c_str());
+  codec.text(segment.c_str(), mask.segment,
+             "the same by the segment's label in a DICOM segmentation, such as `\"Femur\"`");
+  codec.number(threshold.c_str(), mask.threshold, {0.01, 1},
+               ("share from which a voxel of a fractional DICOM segmentation is of " + what +
+                ". It must be given of such a one, and only of it")
+                   .c_str());
+  codec.check([&](JsonReader& reader) {
+    for (const auto& [is_given, part] :
+         {std::pair(mask.label.has_value(), label), std::pair(mask.segment.has_value(), segment),
+          std::pair(mask.threshold.has_value(), threshold)})
+      if (is_given && !mask.file) reader.refuse(Reason::bad_value, part.c_str(), "needs a \"" + key + "\"");
+    if (mask.segment && mask.label)
+      reader.refuse(Reason::bad_value, segment.c_str(), "cannot be combined with \"" + label + "\"");
+  });
+}
+
 template <class Codec, class Model>
 void describe_model(Codec& codec, Model& model, const std::filesystem::path& folder,
                     const std::vector<guidance::Bone>& bones) {
@@ -76,28 +103,19 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
       "that a header, comment or field data state (`SPACE=RAS`, "
       "`units: cm`) is converted to LPS and mm, an unknown one refused; no corner may lie over 1 m from "
       "the surface's middle");
-  codec.file(
-      "mask", model.mask, folder,
+  describe_mask(
+      codec, "mask", model.mask, folder,
       "path of a volume on the CT's grid, or on a part of it (beyond which nothing is of the body); what is "
-      "not 0 is the body. Of a TIFF stack: another stack, or a volume with as many voxels of `voxel_mm`");
-  codec.integer("mask_label", model.mask_label, 1, volume_label_limit,
-                "label of the body where the mask is a label map, or the segment's number in a DICOM "
-                "segmentation; with several of them it must be given");
-  codec.text("mask_segment", model.mask_segment,
-             "the same by the segment's label in a DICOM segmentation, such as `\"Femur\"`");
-  codec.number("mask_threshold", model.mask_threshold, {0.01, 1},
-               "share from which a voxel of a fractional DICOM segmentation is of the body. It must be given "
-               "of such a one, and only of it");
+      "not 0 is the body. Of a TIFF stack: another stack, or a volume with as many voxels of `voxel_mm`",
+      "the body");
   codec.vector(
       "window_hu", model.window_hu, hu_range,
       "`[low, high]`: the body's voxels, within the mask if there is one. Without mask and window the "
       "whole volume counts");
-  codec.file("tunnel_mask", model.tunnel_mask, folder,
-             "path of a volume like `mask`, no fractional DICOM segmentation: the bone that holds the plan's "
-             "tunnels, where the model is several bones that lie in the images as in the CT. Absent: the "
-             "model's own bone");
-  codec.integer("tunnel_mask_label", model.tunnel_mask_label, 1, volume_label_limit,
-                "label or segment of that bone, as `mask_label`");
+  describe_mask(codec, "tunnel_mask", model.tunnel_mask, folder,
+                "path of a volume like `mask`: the bone that holds the plan's tunnels, where the model is "
+                "several bones that lie in the images as in the CT. Absent: the model's own bone",
+                "that bone");
   codec.vector("voxel_mm", model.voxel_mm, {1e-3, 100},
                "`[x, y, z]` of a TIFF stack: x along columns, y along rows, z along pages; the centre of the "
                "first voxel is the origin");
@@ -133,14 +151,8 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
       reader.refuse(Reason::bad_value, key, problem);
     };
     if (model.volume && model.surface) refuse("surface", "cannot be combined with \"volume\"");
-    if (model.mask && !model.volume) refuse("mask", "needs a \"volume\"");
-    if (model.mask_label && !model.mask) refuse("mask_label", "needs a \"mask\"");
-    if (model.mask_segment && !model.mask) refuse("mask_segment", "needs a \"mask\"");
-    if (model.mask_segment && model.mask_label)
-      refuse("mask_segment", "cannot be combined with \"mask_label\"");
-    if (model.mask_threshold && !model.mask) refuse("mask_threshold", "needs a \"mask\"");
-    if (model.tunnel_mask && !model.volume) refuse("tunnel_mask", "needs a \"volume\"");
-    if (model.tunnel_mask_label && !model.tunnel_mask) refuse("tunnel_mask_label", "needs a \"tunnel_mask\"");
+    if (model.mask.file && !model.volume) refuse("mask", "needs a \"volume\"");
+    if (model.tunnel_mask.file && !model.volume) refuse("tunnel_mask", "needs a \"volume\"");
     if (model.zones && !model.measures) refuse("zones", "needs \"measures\"");
     if (model.window_hu && !(model.window_hu->x() < model.window_hu->y()))
       refuse("window_hu", "must be two increasing numbers");

@@ -172,15 +172,28 @@ Density filled(const phantom::TriangleMesh& mesh, double voxel_mm) {
 
 }  // namespace
 
-Expected<Model> model_from(const std::string& name, const volume::Volume& volume,
-                           const std::optional<volume::Volume>& mask, const std::optional<HuWindow>& window) {
-  if (mask &&
-      (mask->size != volume.size || !mask->patient_from_voxel.isApprox(volume.patient_from_voxel, 1e-3)))
+Expected<void> check_mask(const std::string& name, const volume::Volume& volume, const volume::Volume& mask) {
+  if (mask.size != volume.size || !mask.patient_from_voxel.isApprox(volume.patient_from_voxel, 1e-3))
     return fail(Reason::bad_value,
                 fmt::format("{}: the mask has {} x {} x {} voxels, the volume {} x {} x {}, or they lie "
                             "elsewhere; resample the mask to the volume",
-                            name, mask->size.x(), mask->size.y(), mask->size.z(), volume.size.x(),
+                            name, mask.size.x(), mask.size.y(), mask.size.z(), volume.size.x(),
                             volume.size.y(), volume.size.z()));
+  // What resampling adds to a mask of up to 255 stays above this.
+  constexpr float least = -100;
+  const auto [lowest, highest] = std::ranges::minmax(mask.voxels);
+  if (lowest < least)
+    return fail(
+        Reason::bad_value,
+        fmt::format("{}: the mask's values are {:g} to {:g}: it is a CT, not a mask", name, lowest, highest));
+  if (lowest == 0 && highest == 0) return fail(Reason::bad_value, name + ": the mask is empty");
+  return {};
+}
+
+Expected<Model> model_from(const std::string& name, const volume::Volume& volume,
+                           const std::optional<volume::Volume>& mask, const std::optional<HuWindow>& window) {
+  if (mask)
+    if (auto checked = check_mask(name, volume, *mask); !checked) return tl::unexpected(checked.error());
   Density whole{volume.size, volume.voxels, volume.patient_from_voxel};
   for (std::size_t i = 0; i < whole.values.size(); ++i)
     whole.values[i] = density_of(volume.voxels[i], !mask || mask->voxels[i] != 0, window, mask || window);

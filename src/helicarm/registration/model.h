@@ -34,9 +34,13 @@ struct HuWindow {
   double high = 3000;
 };
 
+/// Refuses (bad_value) a mask on another grid than the volume's, one with values below 0 (it is no mask), and
+/// an empty one; `name` begins the message.
+Expected<void> check_mask(const std::string& name, const volume::Volume& volume, const volume::Volume& mask);
+
 /// A body from a CT. With a mask (same grid; non-zero: inside) or a window its density is the excess over
 /// soft tissue, which surrounds it in the image; without either the attenuation of everything. Refuses
-/// (bad_value) a mask on another grid and a model without voxels.
+/// (bad_value) a model without voxels, and as `check_mask`.
 Expected<Model> model_from(const std::string& name, const volume::Volume& volume,
                            const std::optional<volume::Volume>& mask, const std::optional<HuWindow>& window);
 

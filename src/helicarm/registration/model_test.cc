@@ -55,6 +55,13 @@ TEST(ModelFrom, MaskOfAnotherGridIsRefused) {
   EXPECT_EQ(model.error().reason, Reason::bad_value);
 }
 
+TEST(ModelFrom, ACtAsItsOwnMaskIsRefused) {
+  volume::Volume volume = block({1, 1, 1});
+  volume.voxels[0] = -1000;
+  EXPECT_THAT(model_from("block", volume, volume, std::nullopt).error().message,
+              testing::HasSubstr("the mask's values are -1000 to 900: it is a CT, not a mask"));
+}
+
 TEST(ModelFrom, AnEmptyWindowIsRefused) {
   EXPECT_FALSE(model_from("block", block({1, 1, 1}), std::nullopt, HuWindow{2000, 3000}));
 }

@@ -107,7 +107,7 @@ operation::OperationPlan with_ct_plan(operation::OperationPlan plan,
     pipeline::CaseModel model;
     model.name = bone;
     model.volume = folder / "ct.nrrd";
-    model.mask = folder / fmt::format("{}.nrrd", bone);
+    model.mask.file = folder / fmt::format("{}.nrrd", bone);
     model.moves_with = bone;
     model.scale_sigma = 0;
     model.plan = lines;

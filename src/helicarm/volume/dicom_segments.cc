@@ -94,18 +94,19 @@ int chosen_segment(const std::map<int, std::string>& segments, const SegmentChoi
   if (choice.label)
     refuse(fmt::format("{} labelled \"{}\"", found.empty() ? "has no segment" : "has several segments",
                        *choice.label));
-  refuse("has several segments, choose one by \"mask_label\" or \"mask_segment\"");
+  refuse(fmt::format("has several segments, choose one by \"{0}_label\" or \"{0}_segment\"", choice.key));
   return 0;
 }
 
 void check_threshold(const DicomElements& elements, const SegmentChoice& choice) {
   if ((kind_of(elements) == Kind::fractional) == choice.threshold.has_value()) return;
-  elements.refuse(Reason::bad_value, segmentation_type,
-                  choice.threshold
-                      ? fmt::format("is {}: it takes no \"mask_threshold\"", elements.text(segmentation_type))
-                      : fmt::format("is FRACTIONAL ({}): state by \"mask_threshold\" from which share on a "
-                                    "voxel belongs to the body, such as 0.5",
-                                    without_control_characters(std::string(elements.text(fractional_type)))));
+  elements.refuse(
+      Reason::bad_value, segmentation_type,
+      choice.threshold
+          ? fmt::format("is {}: it takes no \"{}_threshold\"", elements.text(segmentation_type), choice.key)
+          : fmt::format("is FRACTIONAL ({}): state by \"{}_threshold\" from which share on a "
+                        "voxel belongs to the body, such as 0.5",
+                        without_control_characters(std::string(elements.text(fractional_type))), choice.key));
 }
 
 }  // namespace

@@ -29,6 +29,7 @@ struct SegmentChoice {
   std::optional<int> number = {};
   std::optional<std::string> label = {};
   std::optional<double> threshold = {};  ///< share from which a voxel of a FRACTIONAL one belongs to it
+  std::string key = "mask";              ///< of the file in its case, whose keys make the choice
 };
 
 /// The mask of one segment (1 inside, 0 elsewhere; slices without a segment may be missing), also where it
