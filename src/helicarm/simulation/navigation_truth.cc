@@ -73,6 +73,7 @@ double distance_to_line(const Vector3d& point, const Vector3d& a, const Vector3d
 TrackerModel virtual_tracker() {
   TrackerModel model;
   model.drift_sigma_mm = {0.07, 0.07, 0.17};
+  model.drift_time_s = 15;
   model.lost_sample = 0.02;
   model.nearest_mm = 300;  // the markers are about 900 mm away and up to 300 mm from each other
   model.half_field_deg = 50;

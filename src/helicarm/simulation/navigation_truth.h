@@ -35,7 +35,8 @@ struct TrueToolLine {
 };
 
 /// The operating room's tracker. Besides the markers' noise each body has a position-dependent error that a
-/// short mean does not reduce.
+/// short mean does not reduce. It changes over longer times than an approach takes and shorter ones than a
+/// rehearsal, as a real one's does in an operation that lasts ten times as long.
 TrackerModel virtual_tracker();
 
 /// A reading is the mean of this many samples of bodies at rest, less lost samples.
