@@ -17,7 +17,7 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 /// The limit of FreshnessLimits for states.
 constexpr double recent_s = 0.1;
-/// The median of the last `most` samples in the `window_s` before the newest is compared with the plan.
+/// The median of the last `most` samples in the last `window_s` is compared with the plan.
 struct MedianWindow {
   double window_s;
   std::size_t most;
@@ -56,10 +56,10 @@ Vector6d median_of(const std::vector<Vector6d>& steps) {
 std::vector<tracker::PoseSample> recent(const tracker::PoseBoard& board, const std::string& name,
                                         double now_s, double oldest_s, const MedianWindow& wanted) {
   if (const auto elsewhere = board.elsewhere(name, now_s, oldest_s)) return {*elsewhere};
-  const double newest_s = value_or_throw(board.latest(name, now_s, oldest_s)).time_s;
+  value_or_throw(board.latest(name, now_s, oldest_s));
   // A sample may arrive after `now`.
   std::vector<tracker::PoseSample> samples =
-      board.between(name, newest_s - wanted.window_s, std::numeric_limits<double>::infinity());
+      board.between(name, now_s - wanted.window_s, std::numeric_limits<double>::infinity());
   if (samples.size() > wanted.most)
     samples.erase(samples.begin(), samples.end() - static_cast<std::ptrdiff_t>(wanted.most));
   return samples;

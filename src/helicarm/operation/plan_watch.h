@@ -58,9 +58,9 @@ Expected<void> check_motion(const std::string& what, const Motion& motion, const
                             const std::string& since = "planning", const std::string& then = "plan again");
 
 /// Compares the newest poses with those of the plan; they are at most as old as the tracker's limit. Each
-/// value is the componentwise median of up to five samples of that time (bone) or twelve of 0.5 s (tool) up
-/// to the newest: single outliers have no effect, and a motion is detected with the third or seventh sample,
-/// also a jump that the gate does not accept yet. A value: each thread may use a copy.
+/// value is the componentwise median of up to five samples of that time (bone) or twelve of the last 0.5 s
+/// (tool): single outliers have no effect, and a motion is detected with the third or seventh sample, also a
+/// jump that the gate does not accept yet. A value: each thread may use a copy.
 class PlanWatch {
  public:
   PlanWatch(const PlanLimits& limits, const TrackerPlan& tracker, PlanBasis basis)

@@ -390,7 +390,9 @@ bool may_have_missed(const Registration& result) {
 bool is_confirmed(const Model& model, const Registration& result) {
   if (result.failure) return false;
   const auto is_clear = [](const RegisteredView& view) { return view.score >= clear_patch_score; };
-  return result.agree >= 2 || (!model.surface && std::ranges::all_of(result.views, is_clear));
+  // Of more starts more end by chance where another does.
+  const int enough = std::max(2, result.starts / 128);
+  return result.agree >= enough || (!model.surface && std::ranges::all_of(result.views, is_clear));
 }
 
 }  // namespace helicarm::registration

@@ -46,9 +46,9 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
 /// Whether the search of a refused registration may have missed the solution.
 bool may_have_missed(const Registration& result);
 
-/// Whether a registration counts that follows one which missed the solution: two of its starts or more end at
-/// the pose, or the volume explains each view clearly better than required. Else it may be chance: so many
-/// poses were searched.
+/// Whether a registration counts that follows one which missed the solution: of its starts two, and one in
+/// 128, or more end at the pose, or the volume explains each view clearly better than required. Else it may
+/// be chance: so many poses were searched.
 bool is_confirmed(const Model& model, const Registration& result);
 
 }  // namespace helicarm::registration

@@ -152,6 +152,10 @@ TEST(Confirmed, IsALoneStartOnlyByClearScores) {
   result.views[1].score = 0.41;
   result.agree = 2;
   EXPECT_TRUE(is_confirmed(Model{}, result));
+  result.starts = 1024;
+  EXPECT_FALSE(is_confirmed(Model{}, result)) << "two of so many end together by chance";
+  result.agree = 8;
+  EXPECT_TRUE(is_confirmed(Model{}, result));
   result.failure = Failure{Reason::wrong_model, "", {}, {}};
   EXPECT_FALSE(is_confirmed(Model{}, result));
 }

@@ -24,6 +24,7 @@ constexpr float air_hu = -800;
 // and 12 cm of water; mass attenuation of Hubbell and Seltzer 2004).
 constexpr float bone_hardening = 0.006F;
 constexpr std::size_t sample_count = 60;
+constexpr float matter = 0.1F;  // least density that is of a body
 
 /// Density of a voxel, 1 per 1000 HU.
 float density_of(float hu, bool inside, const std::optional<HuWindow>& window, bool excess) {
@@ -91,7 +92,6 @@ Density cropped(const Density& density, const Bounds& bounds) {
 /// Voxels on the faces of the whole grid that hold matter, about 2 mm apart.
 std::vector<Vector3d> cuts_of(const Density& density) {
   std::vector<Vector3d> cuts;
-  constexpr float matter = 0.1F;
   const Vector3d spacing = density.model_from_voxel.linear().colwise().norm();
   const Vector3i stride = (2 / spacing.array()).floor().cast<int>().max(1);
   for (int axis = 0; axis < 3; ++axis) {
@@ -179,15 +179,17 @@ Expected<void> check_mask(const std::string& name, const volume::Volume& volume,
                             "elsewhere; resample the mask to the volume",
                             name, mask.size.x(), mask.size.y(), mask.size.z(), volume.size.x(),
                             volume.size.y(), volume.size.z()));
-  // What resampling adds to a mask of up to 255 stays above this.
-  constexpr float least = -100;
-  const auto [lowest, highest] = std::ranges::minmax(mask.voxels);
-  if (lowest < least)
-    return fail(
-        Reason::bad_value,
-        fmt::format("{}: the mask's values are {:g} to {:g}: it is a CT, not a mask", name, lowest, highest));
-  if (lowest == 0 && highest == 0) return fail(Reason::bad_value, name + ": the mask is empty");
-  return {};
+  // A CT has few voxels that are exactly 0.
+  constexpr double least_outside = 0.05;
+  const auto outside = double(std::ranges::count(mask.voxels, 0.0F)) / double(mask.voxels.size());
+  if (outside < least_outside)
+    return fail(Reason::bad_value,
+                fmt::format("{}: {:.2g} % of the mask's voxels are 0, which is outside: it is no mask", name,
+                            100 * outside));
+  if (outside == 1) return fail(Reason::bad_value, name + ": the mask is empty");
+  for (std::size_t i = 0; i < mask.voxels.size(); ++i)
+    if (mask.voxels[i] != 0 && density_of(volume.voxels[i], true, std::nullopt, true) > matter) return {};
+  return fail(Reason::bad_value, name + ": nothing within the mask is denser than soft tissue");
 }
 
 Expected<Model> model_from(const std::string& name, const volume::Volume& volume,
@@ -218,7 +220,7 @@ Expected<Model> model_from(const std::string& name, const volume::Volume& volume
   for (int z = 0; z < model.density.size.z(); ++z)
     for (int y = 0; y < model.density.size.y(); ++y)
       for (int x = 0; x < model.density.size.x(); ++x)
-        if (model.density.values[model.density.index(x, y, z)] > 0.1F)
+        if (model.density.values[model.density.index(x, y, z)] > matter)
           points.push_back(model.density.model_from_voxel * Vector3d(x, y, z));
   if (points.empty())
     return fail(Reason::bad_value,

@@ -56,10 +56,25 @@ TEST(ModelFrom, MaskOfAnotherGridIsRefused) {
 }
 
 TEST(ModelFrom, ACtAsItsOwnMaskIsRefused) {
-  volume::Volume volume = block({1, 1, 1});
-  volume.voxels[0] = -1000;
+  const volume::Volume volume = block({1, 1, 1});
   EXPECT_THAT(model_from("block", volume, volume, std::nullopt).error().message,
-              testing::HasSubstr("the mask's values are -1000 to 900: it is a CT, not a mask"));
+              testing::HasSubstr("0 % of the mask's voxels are 0, which is outside: it is no mask"));
+}
+
+TEST(ModelFrom, AMaskOfSoftTissueIsRefused) {
+  const volume::Volume volume = block({1, 1, 1});
+  volume::Volume mask = volume;
+  std::ranges::fill(mask.voxels, 0);
+  mask.voxels[0] = 1;
+  EXPECT_THAT(model_from("block", volume, mask, std::nullopt).error().message,
+              testing::HasSubstr("nothing within the mask is denser than soft tissue"));
+}
+
+TEST(ModelFrom, AMaskedCtIsAMask) {
+  const volume::Volume volume = block({1, 1, 1});
+  volume::Volume mask = volume;
+  for (float& value : mask.voxels) value = value > 500 ? value - 1100 : 0;
+  EXPECT_TRUE(model_from("block", volume, mask, std::nullopt));
 }
 
 TEST(ModelFrom, AnEmptyWindowIsRefused) {

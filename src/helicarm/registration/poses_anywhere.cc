@@ -272,8 +272,11 @@ std::vector<RigidTransform> poses_anywhere(const RegistrationProblem& scene, Ori
   std::vector<RigidTransform> poses;
   for (const Candidate& candidate : found) {
     if (poses.size() == count || candidate.score <= 0) break;
+    if (interrupt) interrupt();
+    // The centre is the mean of the samples: it moves by no more than they do.
     if (std::ranges::none_of(poses, [&](const RigidTransform& pose) {
-          return separation(model, pose, candidate.pose) < level.spacing_mm;
+          return (pose * model.centre - candidate.pose * model.centre).norm() < level.spacing_mm &&
+                 separation(model, pose, candidate.pose) < level.spacing_mm;
         }))
       poses.push_back(candidate.pose);
   }

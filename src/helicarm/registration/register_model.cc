@@ -181,25 +181,28 @@ struct Search {
   SearchResult found;
 };
 
-/// All positions in these orientations, the best of which are refined, and some poses besides.
+/// All positions in these orientations, and some poses besides.
 struct Everywhere {
   Orientations orientations;
-  std::size_t starts;
   Poses besides = {};
 };
-
-/// Where small bones are most of a model, such as a wrist's, poses beside the right one rank at about 100.
-constexpr std::size_t first_starts = 64, starts_between = 256;
 
 Search searched_anywhere(RegistrationProblem& scene, const Everywhere& everywhere,
                          const SearchOptions& options) {
   const Vector3d middle = middle_of(scene.views());
+  Search made{stages_from_anywhere(scene, middle), {}};
+  std::size_t starts = 64;
+  // Where small bones are most of a model, such as a wrist's, poses beside the right one rank at 100 to 400,
+  // and at the first of several levels wrong ones explain more, by any ratio.
+  if (everywhere.orientations == Orientations::between && !scene.model().surface && made.stages.size() > 2) {
+    starts = 1024;
+    made.stages[1] = {made.stages[1].level, 128};
+  }
   scene.prepare(level_anywhere(scene.model()), middle);
   std::vector<RigidTransform> poses =
-      poses_anywhere(scene, everywhere.orientations, everywhere.starts, options.interrupt);
+      poses_anywhere(scene, everywhere.orientations, starts, options.interrupt);
   poses.insert(poses.end(), everywhere.besides.begin(), everywhere.besides.end());
   if (poses.empty()) poses.push_back({Eigen::Matrix3d::Identity(), middle - scene.model().centre});
-  Search made{stages_from_anywhere(scene, middle), {}};
   SearchOptions from_poses = options;
   from_poses.candidates = 0;
   made.found = search(scene, made.stages, poses, from_poses, same_mm);
@@ -326,14 +329,12 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
 /// about the poses that they found, or near to other orientations.
 Registration registered_anywhere(const Model& model, const std::vector<RegistrationView>& views,
                                  const Poses& starts, const RegistrationOptions& options) {
-  Registration found =
-      registered(model, views, starts, options, Everywhere{Orientations::first, first_starts}, true);
+  Registration found = registered(model, views, starts, options, Everywhere{Orientations::first}, true);
   if (views.size() < 2 || options.search.candidates == 0 || !may_have_missed(found)) return found;
   Poses about{found.world_from_model};
   for (const Alternative& other : found.alternatives) about.push_back(other.world_from_model);
   // What was found goes with the other orientations: a pose almost as good stays known.
-  for (const Searched& searched :
-       {Searched(about), Searched(Everywhere{Orientations::between, starts_between, about})}) {
+  for (const Searched& searched : {Searched(about), Searched(Everywhere{Orientations::between, about})}) {
     Registration again = registered(model, views, starts, options, searched, true);
     again.seconds += found.seconds;
     if (is_confirmed(model, again)) return again;
