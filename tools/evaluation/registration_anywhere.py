@@ -1,18 +1,21 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Registers a modelled knee's bones, or a patient's head, without a start, their volumes turned at random, and wrong ones.
+"""Registers a modelled knee's bones, other bones, or a patient's head, without a start, their volumes turned at random, and wrong ones.
 
   tools/evaluation/registration_anywhere.py --cases 20 --rows anywhere.jsonl
+  tools/evaluation/registration_anywhere.py --bones --cases 20 --rows bones.jsonl
   tools/evaluation/registration_anywhere.py --head --cases 20 --rows head.jsonl
 
-Knees, head and images are those of tools/evaluation/registration_protocol.py. Each case's volume and mask are
-turned by a rotation that is uniform over all of them, so that any orientation occurs. Right kinds: femur, tibia,
-head. Wrong ones: `mirrored` (femur), `mirrored_tibia`, `mirrored_head`, `patient` (the femur of one of twelve other
+Knees, head and images are those of tools/evaluation/registration_protocol.py, vertebra, hip and wrist those of examples/bones (the
+wrist by a window of all its bones). Each case's volume and mask are
+turned by a rotation that is uniform over all of them, so that any orientation occurs. Right kinds: femur, tibia, vertebra, hip, wrist,
+head. Wrong ones: `mirrored` (femur), `mirrored_tibia`, `mirrored_vertebra`, ..., `patient` (the femur of one of twelve other
 knees), `patient_tibia`, `absent_femur` (images of the same knee without its femur: the other bone is all there is),
-`absent_tibia`. Error: rms over the corners of a box of 40 mm about the bone's end, of the head over points of the
-skull. False accept: not refused, and the error over 2 mm or the kind wrong. Exit code 1 if there is one. --rows keeps
+`absent_tibia`. Error: rms over the corners of a box of 40 mm about the bone's end, of other bones over the planned screw's ends and
+points 20 mm from the seed of its segmentation, of the head over points of the skull. False accept: not refused, and the error over 2 mm or the kind wrong. Exit code 1 if there is one. --rows keeps
 what is done; the same command goes on after an interruption. Needs NumPy."""
 import argparse
+import itertools
 import json
 import math
 import pathlib
@@ -25,17 +28,22 @@ import numpy as np
 import bone_ct
 import registration_protocol as protocol
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "examples/bones"))
+import bones  # noqa: E402
+
 RIGHT = ("femur", "tibia")
 WRONG = ("mirrored", "mirrored_tibia", "patient", "patient_tibia", "absent_femur", "absent_tibia")
 OF_HEAD = ("head", "mirrored_head")
-KINDS = RIGHT + WRONG + OF_HEAD
-MARKS = "<!-- registration anywhere -->", "<!-- end of the registration anywhere -->"
-HEAD_MARKS = "<!-- registration anywhere, head -->", "<!-- end of the registration anywhere, head -->"
+OF_BONES = tuple(kind for bone in bones.BODIES for kind in (bone, f"mirrored_{bone}"))
+KINDS = RIGHT + WRONG + OF_HEAD + OF_BONES
+NAMES = ("femur", "tibia", "head", *bones.BODIES)
 END_MM = {"femur": (0, 5, 20.0), "tibia": (0, 5, -20.0)}
 OTHERS = 12
 
 
 class Knees(protocol.Knees):
+    of_anywhere = RIGHT + WRONG
+
     def other(self, number):
         return 4 + number % OTHERS
 
@@ -44,6 +52,40 @@ class Knees(protocol.Knees):
         knee = bone_ct.Knee(subject)
         for name, mask in (("femur", knee.femur), ("tibia", knee.tibia)):
             bone_ct.write_nrrd(folder / f"without_{name}.nrrd", bone_ct.rounded(np.where(mask, bone_ct.MUSCLE, knee.hu)))
+
+    def targets_of(self, bone):
+        return np.array(END_MM[bone]) + protocol.TARGETS
+
+
+class Heads(protocol.Heads):
+    of_anywhere = OF_HEAD
+
+    def targets_of(self, _):
+        return self.targets
+
+
+class Bone:
+    """One of examples/bones; the wrist as the how-to registers it."""
+    window_hu = (200, 3000)
+
+    def __init__(self, name):
+        self.name, self.of_anywhere = name, (name, f"mirrored_{name}")
+
+    def subject(self, _):
+        return 0
+
+    def write(self, folder, _):
+        folder.mkdir()
+        hu, scan, seed, plan = bones.hounsfield(self.name)
+        bones.write_nrrd(folder / "true.nrrd", hu)
+        mask = bones.BODIES[self.name][0](bones.Space())[0] < 0
+        for side, turned in (("scan", slice(None)), ("mirrored", slice(None, None, -1))):
+            bones.write_nrrd(folder / f"{side}.nrrd", scan[:, :, turned])
+            bones.write_nrrd(folder / f"{'' if side == 'scan' else 'mirrored_'}{self.name}.nrrd", mask[:, :, turned])
+        self.targets = np.vstack([*plan, np.array(seed) + 20 * np.vstack([np.eye(3), -np.eye(3)])])
+
+    def targets_of(self, _):
+        return self.targets
 
 
 def random_rotation(rng):
@@ -70,14 +112,17 @@ def files_of(bodies, kind, number):
     """The model's volume and mask, and the model's other keys of case.json."""
     body = bodies.body
     side = "mirrored" if "mirrored" in kind else "scan"
-    if kind in OF_HEAD:
-        return {"volume": bodies.volumes(body.subject(number)) / f"{side}.nrrd"}, {"window_hu": body.files(bodies.folder, "right")["window_hu"]}
     volumes = bodies.volumes(body.other(number) if "patient" in kind else body.subject(number))
-    return {"volume": volumes / f"{side}.nrrd", "mask": volumes / f"{'mirrored_' if side == 'mirrored' else ''}{bone_of(kind)}.nrrd"}, {}
+    files = {"volume": volumes / f"{side}.nrrd"}
+    if bone_of(kind) == "head":
+        return files, {"window_hu": protocol.head_ct.WINDOW_HU}
+    if bone_of(kind) == "wrist":
+        return files, {"window_hu": body.window_hu}
+    return {**files, "mask": volumes / f"{'mirrored_' if side == 'mirrored' else ''}{bone_of(kind)}.nrrd"}, {}
 
 
 def bone_of(kind):
-    return "head" if kind in OF_HEAD else "tibia" if "tibia" in kind else "femur"
+    return next((name for name in NAMES if kind.endswith(name)), "femur")
 
 
 def row_of(bodies, kind, number):
@@ -99,7 +144,7 @@ def row_of(bodies, kind, number):
     if kind == bone and result.get("world_from_model"):
         truth = np.array(json.loads((case / "truth.json").read_text())["ct"]["calibrator_from_patient"])
         found = np.array(result["world_from_model"])
-        points = bodies.body.targets if bone == "head" else np.array(END_MM[bone]) + protocol.TARGETS
+        points = bodies.body.targets_of(bone)
         errors = protocol.placed(found, points @ rotation.T) - protocol.placed(truth, points)
         row["error_mm"] = math.sqrt(np.mean(np.sum(errors**2, axis=1)))
     shutil.rmtree(folder)
@@ -128,7 +173,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="build/bin/helicarm")
     parser.add_argument("--cases", type=int, default=10, help="of each kind (default: 10)")
-    parser.add_argument("--head", nargs="?", const="", metavar="PATH",
+    other = parser.add_mutually_exclusive_group()
+    other.add_argument("--bones", action="store_true", help="vertebra, hip and wrist of examples/bones instead of the knees")
+    other.add_argument("--head", nargs="?", const="", metavar="PATH",
                         help="the head instead of the knees; PATH of Cranium.inv3, default: where its package installs it")
     parser.add_argument("--kinds", help=f"some of {','.join(KINDS)}; default: all that the body has")
     parser.add_argument("--threads", type=int, default=0)
@@ -136,33 +183,37 @@ def main():
     parser.add_argument("--doc", type=pathlib.Path, help="renews the table between the marks of that document")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for the simulated cases (default: a temporary one)")
     arguments = parser.parse_args()
-    is_head = arguments.head is not None
-    body = protocol.Heads(arguments.head or None) if is_head else Knees()
-    own = OF_HEAD if is_head else RIGHT + WRONG
+    if arguments.head is not None:
+        name, bodies = ", head", [Heads(arguments.head or None)]
+    elif arguments.bones:
+        name, bodies = ", bones", [Bone(bone) for bone in bones.BODIES]
+    else:
+        name, bodies = "", [Knees()]
+    own = [kind for body in bodies for kind in body.of_anywhere]
     kinds = arguments.kinds.split(",") if arguments.kinds else own
     if unknown := [kind for kind in kinds if kind not in own]:
-        parser.error(f"--kinds: {', '.join(unknown)}: the {body.name} has {', '.join(own)}")
+        parser.error(f"--kinds: {', '.join(unknown)}: there are {', '.join(own)}")
     rows = protocol.rows_in(arguments.rows)
     done = {(row["kind"], row["number"]) for row in rows}
     with tempfile.TemporaryDirectory() as temporary:
         folder = arguments.keep or pathlib.Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        bodies = protocol.Protocol(body, arguments, folder)
-        for number in range(arguments.cases):
-            for kind in kinds:
-                if (kind, number) in done:
+        protocols = [protocol.Protocol(body, arguments, folder) for body in bodies]
+        for number, of_body in itertools.product(range(arguments.cases), protocols):
+            for kind in of_body.body.of_anywhere:
+                if kind not in kinds or (kind, number) in done:
                     continue
-                rows.append(row_of(bodies, kind, number))
+                rows.append(row_of(of_body, kind, number))
                 print(json.dumps(rows[-1]), flush=True)
                 if arguments.rows:
                     with arguments.rows.open("a") as out:
                         out.write(json.dumps(rows[-1]) + "\n")
-            if not bodies.keep:
-                for case in folder.glob(f"{body.name}-*-{number}"):
+            if not of_body.keep:
+                for case in folder.glob(f"{of_body.body.name}-*-{number}"):
                     shutil.rmtree(case)
     print(table(rows))
     if arguments.doc:
-        protocol.renew(arguments.doc, table(rows), *(HEAD_MARKS if is_head else MARKS))
+        protocol.renew(arguments.doc, table(rows), f"<!-- registration anywhere{name} -->", f"<!-- end of the registration anywhere{name} -->")
     return any(map(is_false, rows))
 
 
