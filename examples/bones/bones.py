@@ -111,6 +111,7 @@ def wrist(space):
     return bone, [radius, lunate, capitate, ulna], (7, 1, 3), ((16, -6.5, 19), (4.5, 3, -4))
 
 
+WRIST_HU = (200, 3000)  # all its bones
 DIAMETERS_MM = {"vertebra": 4.5, "hip": 7, "wrist": 2.4}
 BODIES = {"vertebra": (vertebra, 2.0), "hip": (hip, 2.5), "wrist": (wrist, 1.0)}
 
@@ -157,7 +158,7 @@ def add_model(name, folder, into, diameter):
     content = json.loads(into.read_text())
     mask = f"{name}.nrrd"
     # The bones of a wrist in a splint lie as in the CT: all are registered, the scaphoid holds the screw.
-    body = {"window_hu": [200, 3000], "tunnel_mask": mask} if name == "wrist" else {"mask": mask}
+    body = {"window_hu": WRIST_HU, "tunnel_mask": mask} if name == "wrist" else {"mask": mask}
     model = {"name": name, "volume": "ct.nrrd", **body, "plan": "plan.mrk.json"}
     tunnel = {"name": "screw", "model": name, "line": "screw", "diameter_mm": diameter, "bridge_mm": 1}
     if content["format"].startswith("helicarm-plan"):

@@ -11,8 +11,8 @@ bones move after the images. Seeds are the same for all rows of the table, so th
 True: distance of the ball at the tunnel's end from the tool's axis, which holds what robot or person leave. Measured against true: how
 far the position that tracker and images state is off, across the tool's axis; predicted: the root mean square that its
 covariance states; inside: the true position lies in the stated 95 % ellipse. Interval: of the share, 95 % (Clopper and Pearson).
-An operation that a busy machine ends (late messages, an image or poses that do not come in time) is repeated up to twice. Refused: what else ended one,
-such as `uncertain`, two standard deviations over the tolerance.
+An operation that a busy machine ends (late messages, an image or poses that do not come in time) is repeated up to twice. Refused: what
+ended one then, or at once, such as `uncertain`, two standard deviations over the tolerance.
 --rows keeps what is done; the same command goes on after an interruption. Exit code 1 if an end is off by more than 2.5 mm. Needs SciPy."""
 import argparse
 import json

@@ -12,8 +12,9 @@ turned by a rotation that is uniform over all of them, so that any orientation o
 head. Wrong ones: `mirrored` (femur), `mirrored_tibia`, `mirrored_vertebra`, ..., `patient` (the femur of one of twelve other
 knees), `patient_tibia`, `absent_femur` (images of the same knee without its femur: the other bone is all there is),
 `absent_tibia`. Error: rms over the corners of a box of 40 mm about the bone's end, of other bones over the planned screw's ends and
-points 20 mm from the seed of its segmentation, of the head over points of the skull. False accept: not refused, and the error over 2 mm or the kind wrong. Exit code 1 if there is one. --rows keeps
-what is done; the same command goes on after an interruption. Needs NumPy."""
+points 20 mm from the seed of its segmentation, of the head over points of the skull. False accept: not refused, and the error over
+2 mm or the kind wrong. Exit code 1 if there is one. --rows keeps what is done; the same command goes on after an interruption. Needs
+NumPy."""
 import argparse
 import itertools
 import json
@@ -42,7 +43,7 @@ OTHERS = 12
 
 
 class Knees(protocol.Knees):
-    of_anywhere = RIGHT + WRONG
+    of_anywhere, window_hu = RIGHT + WRONG, None
 
     def other(self, number):
         return 4 + number % OTHERS
@@ -58,7 +59,7 @@ class Knees(protocol.Knees):
 
 
 class Heads(protocol.Heads):
-    of_anywhere = OF_HEAD
+    of_anywhere, window_hu = OF_HEAD, protocol.head_ct.WINDOW_HU
 
     def targets_of(self, _):
         return self.targets
@@ -66,10 +67,10 @@ class Heads(protocol.Heads):
 
 class Bone:
     """One of examples/bones; the wrist as the how-to registers it."""
-    window_hu = (200, 3000)
 
     def __init__(self, name):
         self.name, self.of_anywhere = name, (name, f"mirrored_{name}")
+        self.window_hu = bones.WRIST_HU if name == "wrist" else None
 
     def subject(self, _):
         return 0
@@ -113,12 +114,10 @@ def files_of(bodies, kind, number):
     body = bodies.body
     side = "mirrored" if "mirrored" in kind else "scan"
     volumes = bodies.volumes(body.other(number) if "patient" in kind else body.subject(number))
-    files = {"volume": volumes / f"{side}.nrrd"}
-    if bone_of(kind) == "head":
-        return files, {"window_hu": protocol.head_ct.WINDOW_HU}
-    if bone_of(kind) == "wrist":
-        return files, {"window_hu": body.window_hu}
-    return {**files, "mask": volumes / f"{'mirrored_' if side == 'mirrored' else ''}{bone_of(kind)}.nrrd"}, {}
+    volume = {"volume": volumes / f"{side}.nrrd"}
+    if body.window_hu:
+        return volume, {"window_hu": body.window_hu}
+    return {**volume, "mask": volumes / f"{'mirrored_' if side == 'mirrored' else ''}{bone_of(kind)}.nrrd"}, {}
 
 
 def bone_of(kind):

@@ -34,9 +34,8 @@ struct HuWindow {
   double high = 3000;
 };
 
-/// Refuses (bad_value) a mask on another grid than the volume's, one that is nowhere 0 (5 % of its voxels, at
-/// least), as a CT is, an empty one, and one within which nothing is denser than soft tissue; `name` begins
-/// the message.
+/// Refuses (bad_value) a mask on another grid than the volume's, one of which less than 5 % is 0, as of a CT,
+/// an empty one, and one within which nothing is denser than soft tissue; `name` begins the message.
 Expected<void> check_mask(const std::string& name, const volume::Volume& volume, const volume::Volume& mask);
 
 /// A body from a CT. With a mask (same grid; non-zero: inside) or a window its density is the excess over
