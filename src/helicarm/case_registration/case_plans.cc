@@ -20,8 +20,7 @@ constexpr double same_place_mm = 1;  // of a landmark and a planned point, as tw
 
 /// Whether the model's landmarks hold the point.
 bool is_landmark(const pipeline::CaseModel& model, const PlanPoint& point) {
-  if (!model.landmarks) return false;
-  const std::vector<PlanPoint> landmarks = read_landmarks(*model.landmarks);
+  const std::vector<PlanPoint> landmarks = start_landmarks(model);
   const auto same = std::ranges::find(landmarks, point.name, &PlanPoint::name);
   return same != landmarks.end() && (same->in_model - point.in_model).norm() < same_place_mm;
 }

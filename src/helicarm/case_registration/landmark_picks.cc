@@ -125,10 +125,9 @@ std::vector<registration::Landmark> picked_landmarks(const pipeline::CaseModel& 
                                                      const pipeline::Case& the_case,
                                                      const LoadedViews& loaded,
                                                      const std::vector<RegistrationView>& views) {
-  const std::filesystem::path& path = *case_model.landmarks;
   std::string missing;
   std::vector<PickedRays> picked;
-  for (const auto& [name, in_model] : read_landmarks(path)) {
+  for (const auto& [name, in_model] : start_landmarks(case_model)) {
     PickedRays rays = rays_of(name, in_model, the_case, loaded, views);
     if (rays.rays.size() >= 2)
       picked.push_back(std::move(rays));
@@ -139,7 +138,7 @@ std::vector<registration::Landmark> picked_landmarks(const pipeline::CaseModel& 
     throw BadInput(Reason::bad_value,
                    fmt::format("models: \"{}\": {}: {} of its landmarks are picked in two views, at least {} "
                                "are required; not picked so: {}",
-                               case_model.name, path.filename().string(), picked.size(),
+                               case_model.name, source_of_landmarks(case_model), picked.size(),
                                registration::least_landmarks, missing.empty() ? "none" : missing));
   check_exchange(picked, views, case_model.name);
   std::vector<registration::Landmark> landmarks;

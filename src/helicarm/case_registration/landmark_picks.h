@@ -8,7 +8,7 @@
 
 namespace helicarm::case_registration {
 
-/// Landmarks of a model's file that are picked in two or more views, where their rays meet. Throws BadInput:
+/// Landmarks of a model's start that are picked in two or more views, where their rays meet. Throws BadInput:
 /// bad_value for fewer than three and for a pick outside its image, residual_too_large where the rays miss
 /// each other and would meet with two names of one view exchanged, and as `read_csv`, `geometry::intersect`.
 /// `views`: as used for this model.

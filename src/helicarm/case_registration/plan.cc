@@ -159,4 +159,14 @@ std::vector<PlanPoint> read_landmarks(const std::filesystem::path& path) {
   return landmarks;
 }
 
+std::vector<PlanPoint> start_landmarks(const pipeline::CaseModel& model) {
+  if (!model.placed_landmarks.empty()) return model.placed_landmarks;
+  return model.landmarks ? read_landmarks(*model.landmarks) : std::vector<PlanPoint>{};
+}
+
+std::string source_of_landmarks(const pipeline::CaseModel& model) {
+  if (!model.placed_landmarks.empty()) return "placed in the model";
+  return model.landmarks ? model.landmarks->filename().string() : "";
+}
+
 }  // namespace helicarm::case_registration

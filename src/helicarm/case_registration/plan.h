@@ -9,13 +9,11 @@
 #include <Eigen/Core>
 
 #include "helicarm/core/failure.h"
+#include "helicarm/pipeline/case_model.h"
 
 namespace helicarm::case_registration {
 
-struct PlanPoint {
-  std::string name;
-  Eigen::Vector3d in_model;  ///< mm
-};
+using PlanPoint = pipeline::PointInModel;
 
 /// A line of the plan: its first point is the tunnel's start.
 struct MarkupLine {
@@ -40,5 +38,11 @@ Expected<MarkupPlan> read_plan(const std::filesystem::path& path);
 /// Landmarks in a model, mm, each name once: a CSV of name,x_mm,y_mm,z_mm, or the points of Slicer's markups
 /// (.mrk.json, .fcsv). Throws BadInput: as `read_plan`, and unknown_key.
 std::vector<PlanPoint> read_landmarks(const std::filesystem::path& path);
+
+/// The landmarks of a model's start: those placed, else those of its file; empty without either. Throws as
+/// `read_landmarks`.
+std::vector<PlanPoint> start_landmarks(const pipeline::CaseModel& model);
+/// Where they come from, for messages; empty without any.
+std::string source_of_landmarks(const pipeline::CaseModel& model);
 
 }  // namespace helicarm::case_registration

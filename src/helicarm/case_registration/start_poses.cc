@@ -29,7 +29,7 @@ StartPoses start_poses(const pipeline::Case& the_case, const LoadedViews& loaded
                        const pipeline::CaseModel& case_model, const std::vector<RegistrationView>& views,
                        double motion_sigma_mm) {
   if (case_model.world_from_model) return {{*case_model.world_from_model}, {}, {}};
-  if (case_model.landmarks) {
+  if (!source_of_landmarks(case_model).empty()) {
     StartPoses start;
     start.used = picked_landmarks(case_model, the_case, loaded, views);
     start.landmarks = value_or_throw(
@@ -69,8 +69,8 @@ std::vector<Warning> places_outside(const pipeline::CaseModel& case_model,
     for (const PlanPoint& point : plan->points) of_plan.push_back({point.name, point.in_model});
   const ModelBox box = model ? box_of(*model) : box_of(landmarks);
   std::vector<Warning> warnings;
-  if (case_model.landmarks)
-    warnings = check_places(case_model.name, case_model.landmarks->filename().string(), box, of_landmarks);
+  if (const std::string given = source_of_landmarks(case_model); !given.empty())
+    warnings = check_places(case_model.name, given, box, of_landmarks);
   if (case_model.plan) {
     const auto further = check_places(case_model.name, case_model.plan->filename().string(), box, of_plan);
     warnings.insert(warnings.end(), further.begin(), further.end());

@@ -131,10 +131,17 @@ Expected<Digests> keep_models(OperationPlan& plan, const fs::path& session) {
 
 Expected<CaseRegistration> register_models(const OperationPlan& plan, const pipeline::Case& the_case,
                                            const pipeline::Result& measured,
-                                           const case_registration::Progress& progress) {
+                                           const case_registration::Progress& progress,
+                                           const std::vector<ModelStart>& starts) {
   return guarded([&] {
     if (!measured.calibration) throw BadInput(Reason::usage, "no measurement yet");
-    const pipeline::Case with_models = with_models_of(plan, the_case);
+    pipeline::Case with_models = with_models_of(plan, the_case);
+    for (const ModelStart& start : starts) {
+      const auto model = std::ranges::find(with_models.models, start.model, &pipeline::CaseModel::name);
+      if (model == with_models.models.end())
+        throw BadInput(Reason::bad_value, fmt::format("{}: is not a model of the plan", start.model));
+      model->world_from_model = start.world_from_model;
+    }
     return value_or_throw(case_registration::register_loaded(
         with_models, case_registration::views_of_calibration(with_models, *measured.calibration),
         measuring_options(plan), progress, case_registration::located_points_of(measured)));

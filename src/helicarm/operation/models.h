@@ -13,11 +13,13 @@ namespace helicarm::operation {
 /// missing_file, and what a registration would not read (as `load_model`, `read_plans`).
 Expected<Digests> keep_models(OperationPlan& plan, const std::filesystem::path& session);
 
-/// Registers the models to a measured case by its calibration. Refusals are in the result.
+/// Registers the models to a measured case by its calibration, some of them from other starts than the plan's.
+/// Refusals are in the result. Refuses (bad_value) a start of no model.
 Expected<case_registration::CaseRegistration> register_models(const OperationPlan& plan,
                                                               const pipeline::Case& the_case,
                                                               const pipeline::Result& measured,
-                                                              const case_registration::Progress& progress);
+                                                              const case_registration::Progress& progress,
+                                                              const std::vector<ModelStart>& starts = {});
 
 /// registration.json without its times, which differ from run to run.
 Json recorded(const case_registration::CaseRegistration& registration);

@@ -172,7 +172,7 @@ Expected<void> Operation::measure() {
     notify_(Step::measure, fmt::format("{} views", views_.size()));
     forget_registration();
     verifications_.clear();
-    result_ = run({}, {});
+    result_ = without_models_ = run({}, {});
   });
 }
 

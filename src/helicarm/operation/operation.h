@@ -111,10 +111,12 @@ class Operation {
   std::vector<guidance::Poses> exposures() const;
 
   /// Registers the plan's models to the measured images; the report and an overlay of each view are then in
-  /// the session's folder. Takes seconds to minutes; `interrupt` ends it. Fails with the refusal of a model.
-  /// Until `confirm_registration` it guides nothing (registration_not_confirmed), nor after further images or
-  /// another measurement (registration_stale).
-  Expected<void> register_models();
+  /// the session's folder. `starts`: of models that a person moved, instead of the plan's. Takes seconds to
+  /// minutes; `interrupt` ends it, and so does what `check` throws, which is called often, from other threads.
+  /// Fails with the refusal of a model. Until `confirm_registration` it guides nothing
+  /// (registration_not_confirmed), nor after further images or another measurement (registration_stale).
+  Expected<void> register_models(
+      const std::vector<ModelStart>& starts = {}, const std::function<void()>& check = [] {});
   /// The last registration of the present images, also a refused one.
   const std::optional<case_registration::CaseRegistration>& registration() const { return registration_; }
   /// After a person has compared the outlines with the bones in the images. Refuses (usage) without a
@@ -256,6 +258,7 @@ class Operation {
   std::optional<case_registration::CaseRegistration> registration_;  ///< of `measured_`
   std::string registered_digest_;
   std::optional<pipeline::Result> result_, newest_result_;
+  std::optional<pipeline::Result> without_models_;  ///< `result_` as measured
   std::optional<tracker::HandEye> hand_eye_;
   GuidanceGate gate_;
   std::map<std::string, int> replans_;                                ///< by order

@@ -90,6 +90,12 @@ struct OperationTunnel {
   std::optional<pipeline::ModelLine> of_model = {};
 };
 
+/// Where the search for a model of the plan begins.
+struct ModelStart {
+  std::string model;
+  geometry::RigidTransform world_from_model;
+};
+
 /// Limits beyond which an order is not carried out or is stopped (plan_stale).
 struct PlanLimits {
   double distance_mm = 1;  ///< motion of bone, robot base or tool since planning

@@ -38,7 +38,8 @@ std::optional<Failure> refusal_of(const case_registration::CaseRegistration& reg
 
 }  // namespace
 
-Expected<void> Operation::register_models() {
+Expected<void> Operation::register_models(const std::vector<ModelStart>& starts,
+                                          const std::function<void()>& check) {
   return guarded([&] {
     if (plan_.models.empty()) throw BadInput(Reason::usage, "the plan has no \"models\"");
     if (!result_ || !measured_case_) throw BadInput(Reason::usage, "no measurement yet");
@@ -48,14 +49,16 @@ Expected<void> Operation::register_models() {
     progress.step = [&](const std::string& model, std::string_view step) {
       notify_(Step::measure, fmt::format("{}: {}", model, step));
     };
-    progress.interrupt = [this] {
+    progress.interrupt = [&] {
       if (end_.stop_requested()) throw BadInput(Reason::interrupted, "the registration was stopped");
+      check();
     };
-    auto found = value_or_throw(operation::register_models(plan_, *measured_case_, *by_images_, progress));
+    auto found =
+        value_or_throw(operation::register_models(plan_, *measured_case_, *by_images_, progress, starts));
     const std::string folder = measured_case_->folder.filename().string() + "/" + registration_folder;
     const Digests files = write_with_digests(found, folder_ / folder);
     registered_digest_ = xray::digest(to_text(operation::recorded(found)));
-    record(record::Registered{folder, registered_digest_, files});
+    record(record::Registered{folder, registered_digest_, files, starts});
     registration_ = std::move(found);
     const auto refusal = refusal_of(*registration_);
     gate_.registered(refusal);
@@ -68,7 +71,7 @@ Expected<void> Operation::confirm_registration() {
     value_or_throw(gate_.confirmable());
     if (gate_.is_confirmed()) return;
     pipeline::Result with_models =
-        value_or_throw(with_registration(*result_, *registration_, plan_, *measured_case_));
+        value_or_throw(with_registration(*without_models_, *registration_, plan_, *measured_case_));
     if (with_models.failure) throw BadInput(*with_models.failure);
     record(record::RegistrationConfirmed{registered_digest_, who_});
     value_or_throw(gate_.confirm());

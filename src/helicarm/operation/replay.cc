@@ -223,7 +223,7 @@ class Replay {
     }
     if (is_confirmed_ && !newest_->failure)
       newest_ = value_or_throw(with_registration(*newest_, *registration_, plan_, *derived_, model_lines_));
-    if (!verifies_) result_ = newest_;
+    if (!verifies_) result_ = without_models_ = newest_;
     const auto then = read_json(inside / "result.json");
     if (!then) return differ(origin, then.error().message);
     Json now = without_timing(pipeline::to_json(*newest_));
@@ -247,7 +247,7 @@ class Replay {
     list_files(record.files, record.folder, origin);
     registration_.reset(), is_confirmed_ = false;
     if (!measured_ || !measurement_) return differ(origin, "a registration without a measurement");
-    auto now = register_models(plan_, *measured_, *measurement_, {});
+    auto now = register_models(plan_, *measured_, *measurement_, {}, record.starts);
     if (!now) return differ(origin, now.error().message);
     registered_digest_ = xray::digest(to_text(recorded(*now)));
     if (record.digest != registered_digest_)
@@ -260,7 +260,8 @@ class Replay {
     if (!registration_ || registration_->refused() || !result_ || record.digest != registered_digest_)
       return differ(origin, "the confirmation is of no registration, or of one that was refused");
     is_confirmed_ = true;
-    result_ = newest_ = value_or_throw(with_registration(*result_, *registration_, plan_, *measured_));
+    result_ = newest_ =
+        value_or_throw(with_registration(*without_models_, *registration_, plan_, *measured_));
   }
 
   void take(const record::Guide& record, const std::string& origin) {
@@ -285,6 +286,7 @@ class Replay {
   std::filesystem::path session_;
   OperationPlan plan_;
   std::optional<pipeline::Result> result_;  ///< of the last measurement
+  std::optional<pipeline::Result> without_models_;  ///< the same before the registration was confirmed
   std::optional<pipeline::Result> newest_;  ///< also of a verification
   bool earlier_ = false;                    ///< the last case is of an earlier version
   bool verifies_ = false;                   ///< the last case is that of a verification

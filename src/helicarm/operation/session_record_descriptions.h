@@ -24,6 +24,7 @@ using geometry::recorded_pose;
 inline constexpr Range any{std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max()};
 inline constexpr TextLimits name_limits{0, 1000}, message_limits{0, 100000};
 inline constexpr int most_replanned = 1'000'000;
+inline constexpr std::size_t most_starts = 100;  // one for each model
 inline constexpr std::array<std::string_view, 6> look_words{"plan",   "hand-eye", "correct",
                                                             "verify", "withdraw", "guide"};
 
@@ -189,6 +190,13 @@ void describe(Codec& codec, Value& registered, Of<record::Registered>) {
   describe_name(codec, "folder", registered.folder, "of its files");
   describe_name(codec, "digest", registered.digest, "of the registration without its timing");
   describe_files(codec, registered.files);
+  if (codec.wants(!registered.starts.empty()))
+    codec.list("starts", registered.starts, false, most_starts,
+               "of models that a person moved: where the search began, instead of the plan's start",
+               [](auto& inner, auto& start) {
+                 describe_name(inner, "model", start.model, "its name");
+                 describe_pose(inner, "world_from_model", start.world_from_model, recorded_pose, "mm");
+               });
 }
 
 template <class Codec, class Value>

@@ -86,6 +86,7 @@ struct Registered {
   std::string folder;
   std::string digest;
   Digests files;
+  std::vector<ModelStart> starts = {};
 };
 
 struct RegistrationConfirmed {

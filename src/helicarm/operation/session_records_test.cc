@@ -68,7 +68,7 @@ std::vector<Record> one_of_each_kind() {
           Touched{"divot", window(), {1, 2, 1 / 3.0}},
           CaseBegun{"case-1", {{"format", "helicarm-case/2"}}, files, "femur"},
           Measured{"case-1", "03", files},
-          Registered{"case-1/registration", "04", files},
+          Registered{"case-1/registration", "04", files, {{"femur", pose(10)}}},
           RegistrationConfirmed{"04", "tester"},
           Poses{Look::hand_eye, window()},
           Tour{pose(9)},

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -24,6 +25,12 @@ struct CaseMask {
   std::optional<double> threshold = {};     ///< of a fractional DICOM segmentation: share from which on
 };
 
+/// A point in the coordinates of a model's files, mm.
+struct PointInModel {
+  std::string name;
+  Eigen::Vector3d in_model;
+};
+
 /// An element of "models": files of a rigid body, and from where its registration starts.
 struct CaseModel {
   std::string name;
@@ -38,7 +45,8 @@ struct CaseModel {
   std::optional<guidance::Bone> moves_with;
   std::optional<geometry::RigidTransform> world_from_model;  ///< start
   std::optional<std::filesystem::path> landmarks;            ///< start: CSV of points that are also picked
-  std::optional<std::filesystem::path> plan;                 ///< Slicer markups
+  std::vector<PointInModel> placed_landmarks = {};  ///< start, instead of `landmarks`: placed by a person
+  std::optional<std::filesystem::path> plan;      ///< Slicer markups
   CaseMask tunnel_mask = {};                           ///< of the bone that holds the tunnels, if not of all
   std::optional<std::filesystem::path> measures = {};  ///< table of landmarks for measures in the bone
   std::optional<std::filesystem::path> zones = {};     ///< published positions; nothing: those built in

@@ -141,6 +141,32 @@ TEST_F(CtOperation, ARefusedRegistrationGuidesNothing) {
   expect_replayed(folder_.path() / "session", 1);
 }
 
+TEST_F(CtOperation, AModelThatAPersonMovedIsRegisteredFromThere) {
+  begin();
+  ASSERT_TRUE(operation_->register_models());
+  const registration::Registration right = operation_->registration()->models.front().registration;
+  ASSERT_TRUE(operation_->confirm_registration());
+  geometry::RigidTransform moved = right.world_from_model;
+  moved.translation.x() += 3;
+  const auto again = operation_->register_models({{"femur", moved}});
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(guided().error().reason, Reason::registration_not_confirmed);
+  EXPECT_LT((operation_->registration()->models.front().registration.centre - right.centre).norm(), 0.1);
+  ASSERT_TRUE(operation_->confirm_registration());
+  EXPECT_EQ(operation_->result().model_tunnels.size(), 2U);
+  EXPECT_EQ(operation_->register_models({{"hip", moved}}).error().reason, Reason::bad_value);
+  ASSERT_TRUE(operation_->finish());
+  expect_replayed(folder_.path() / "session", 2);
+}
+
+TEST_F(CtOperation, ARegistrationThatIsCancelledGuidesNothing) {
+  begin();
+  const auto cancel = [] { throw BadInput(Reason::interrupted, "cancelled"); };
+  EXPECT_EQ(operation_->register_models({}, cancel).error().reason, Reason::interrupted);
+  EXPECT_EQ(operation_->confirm_registration().error().reason, Reason::usage);
+  EXPECT_TRUE(operation_->register_models());
+}
+
 TEST_F(CtOperation, ATunnelWhoseWallLeavesTheBoneIsRefused) {
   begin({.off_mm = 2, .off_deg = 2, .diameter_mm = 25, .wrong_bone = false});
   const auto registered = operation_->register_models();
