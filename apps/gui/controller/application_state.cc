@@ -3,7 +3,17 @@
 
 #include <algorithm>
 
+#include "helicarm/case_registration/register_case.h"
+
 namespace helicarm::gui {
+
+bool is_operation(const ApplicationState& state) {
+  return state.source == Source::virtual_or || state.source == Source::devices;
+}
+
+bool awaits_confirmation(const ApplicationState& state) {
+  return is_operation(state) && state.registration && !state.registration->refused() && !state.is_confirmed;
+}
 
 bool can_register(const ApplicationState& state) {
   return state.has_models && state.measured && !state.result->failure;
@@ -54,13 +64,23 @@ std::optional<WantedPick> missing_pick(const ApplicationState& state, const std:
 
 }  // namespace
 
+std::vector<std::string> ends_to_pick(const operation::OperationTunnel& tunnel) {
+  return tunnel.of_model ? std::vector<std::string>{} : std::vector{tunnel.start, tunnel.end};
+}
+
+bool may_guide(const ApplicationState& state, const operation::OperationTunnel& tunnel) {
+  if (tunnel.of_model) return state.is_confirmed && !state.nudged;
+  return std::ranges::all_of(
+      ends_to_pick(tunnel), [&](const std::string& end) { return is_picked(state.picks, state.views, end); });
+}
+
 WantedPick wanted_end(const operation::OperationTunnel& tunnel, const std::string& end) {
   return {end, "", tunnel.bone.empty() ? std::nullopt : std::optional(tunnel.bone), {}};
 }
 
 std::optional<WantedPick> next_pick(const ApplicationState& state) {
   for (const operation::OperationTunnel& tunnel : state.tunnels)
-    for (const std::string& point : {tunnel.start, tunnel.end})
+    for (const std::string& point : ends_to_pick(tunnel))
       if (const auto missing = missing_pick(state, point, wanted_end(tunnel, point).bone)) return missing;
   return std::nullopt;
 }

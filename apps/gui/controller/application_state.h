@@ -60,6 +60,9 @@ struct ExportRecord {
   std::vector<pipeline::Pick> picks;
 };
 
+/// Of each of the case's models, in its coordinates.
+using ModelLandmarks = std::vector<std::vector<pipeline::PointInModel>>;
+
 /// The state shown by the window, except live data. A value: the window receives complete states only.
 struct ApplicationState {
   Source source = Source::none;
@@ -96,9 +99,18 @@ struct ApplicationState {
   bool has_models = false;  ///< the case names models to be registered
   std::shared_ptr<const case_registration::CaseRegistration> registration = {};
   std::optional<NudgedModel> nudged = {};
-  std::vector<pipeline::Pick> registered_picks = {};                     ///< at the registration
-  std::vector<std::string> models = {};                                  ///< names of the case's
+  std::vector<pipeline::Pick> registered_picks = {};  ///< at the registration
+  bool is_confirmed = false;  ///< the registration, of an operation: a person compared the outlines
+  std::vector<std::string> models = {};                                  ///< names of the case's or plan's
   std::vector<std::optional<std::filesystem::path>> model_volumes = {};  ///< their CTs
+  std::vector<pipeline::CaseModel> case_models = {};                     ///< of files only
+  ModelLandmarks model_landmarks = {};       ///< placed; at first those of the case
+  ModelLandmarks case_landmarks = {};        ///< of the case as it was read
+  ModelLandmarks saved_landmarks = {};       ///< of case.json
+  ModelLandmarks registered_landmarks = {};  ///< at the registration
+
+  std::optional<operation::HandDrill> drill = {};  ///< held by a person; the plan has no robot then
+  std::string guided = {};                         ///< tunnel to which the drill is guided, or was last
 
   QString tour;      ///< description of the registration moves
   QString way = {};  ///< of the moves of `order`
@@ -117,6 +129,12 @@ struct ApplicationState {
   std::string doing;          ///< description of the work in progress
   std::map<Phase, Failure> refusals;
 };
+
+/// Whether devices, real or virtual ones, carry out an operation.
+bool is_operation(const ApplicationState& state);
+
+/// Whether the models of an operation are registered, none refused, and nobody has compared their outlines.
+bool awaits_confirmation(const ApplicationState& state);
 
 /// Whether there are models and a measurement that was not refused, to which they can be registered.
 bool can_register(const ApplicationState& state);
@@ -142,6 +160,11 @@ struct WantedPick {
   std::optional<guidance::Bone> bone;
   std::optional<Failure> failed = {};  ///< why an earlier click in this view is no pick
 };
+/// Whether nothing stands between the measurement and a path to the tunnel: its ends are picked, or its model
+/// is registered, confirmed and where it was registered.
+bool may_guide(const ApplicationState& state, const operation::OperationTunnel& tunnel);
+/// Both ends; none of a tunnel of a model's plan.
+std::vector<std::string> ends_to_pick(const operation::OperationTunnel& tunnel);
 /// An end of a tunnel, in any view.
 WantedPick wanted_end(const operation::OperationTunnel& tunnel, const std::string& end);
 std::optional<WantedPick> next_pick(const ApplicationState& state);

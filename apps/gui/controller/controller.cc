@@ -149,6 +149,9 @@ void Controller::take_waiting_image() {
 Controller::Change Controller::came(Images images) {
   return [this, images = std::move(images)](ApplicationState& state) {
     forget_measurement(state);
+    state.registration.reset();  // as the operation does
+    state.is_confirmed = false;
+    state.nudged.reset();
     live_tool_.reset();  // its lines belong to the previous images
     state.result = result_with(images);
     state.failed_picks = failed_picks(state, {});
@@ -175,6 +178,7 @@ Controller::Change Controller::measured(Equipment& equipment, const std::vector<
     state.has_other_options = !case_registration::give_the_same(options_, options);
     if (other_models || result->failure) {
       state.registration.reset();
+      state.is_confirmed = false;
       state.nudged.reset();
       forget_registrations();
     }

@@ -18,6 +18,7 @@
 namespace helicarm::gui {
 
 struct Equipment;
+struct OpenedLandmarks;
 
 /// The live data of the window at one time.
 struct LiveState {
@@ -28,6 +29,7 @@ struct LiveState {
   std::optional<Expected<operation::ToolOverlay>> tool;  ///< empty before registration
   QString tunnel;                                        ///< tunnel of `aim`
   std::optional<Expected<operation::TunnelAim>> aim;     ///< empty without a tunnel
+  std::optional<operation::Guidance> drill;              ///< in a person's hand, while it is guided
   std::optional<Failure> stale;  ///< why the displayed path can no longer be confirmed
 };
 
@@ -43,9 +45,11 @@ class Controller : public QObject {
   const ApplicationState& state() const { return state_; }
 
   /// Virtual devices in this program, over the real protocols through sockets; the plan takes the non-default
-  /// `plan_fields` of `wished`.
+  /// `plan_fields` of `wished`. `by_ct`: the tunnels are lines in a CT of the knee, which is written beside
+  /// `folder` (`rehearsal::with_ct_plan`), in place of picks.
   void open_virtual_or(const virtual_devices::VirtualDevicesOptions& options,
-                       const operation::OperationPlan& wished, const std::filesystem::path& folder);
+                       const operation::OperationPlan& wished, const std::filesystem::path& folder,
+                       bool by_ct = false);
   /// The devices of a plan.
   void open_devices(const std::filesystem::path& plan, const receiver::ReceiverOptions& receiver,
                     const std::filesystem::path& folder);
@@ -74,9 +78,17 @@ class Controller : public QObject {
   void set_snap(const std::string& point, pipeline::Snap snap, const std::string& view = {});
   /// Another point to pick, in a case of files. Refused if the name is empty or taken.
   void add_landmark(const std::string& name, std::optional<pipeline::BoneLabel> bone = {});
+  /// Places landmarks in a model of a case, in its coordinates; those that it has are moved. Each is also a
+  /// point to pick. Refused as `why_no_landmark`.
+  void place_landmarks(std::size_t model, const std::vector<pipeline::PointInModel>& points);
+  /// With its picks.
+  void rename_landmark(std::size_t model, const std::string& from, const std::string& to);
+  /// Its picks stay.
+  void remove_landmark(std::size_t model, const std::string& name);
+  bool takes_landmarks(std::size_t model) const;
   /// Asks no more for tunnels of which no end is picked; of files only.
   void leave_out_tunnels();
-  /// Into case.json.
+  /// Into case.json, with the landmarks placed in models.
   void save_picks();
   /// Removes a point's picks in all views, and the point if it is a landmark.
   void erase_picks(const std::string& point);
@@ -93,14 +105,22 @@ class Controller : public QObject {
   /// Reads the case again if a file of it has changed.
   void measure_again();
 
-  /// Registers the models of a measured case, the nudged one from its present pose.
+  /// Registers the models of a measured case or operation, the nudged one from its present pose.
   void register_models();
+  /// After a person has compared the outlines with the bones: the tunnels of an operation's models guide the
+  /// tool from then on.
+  void confirm_registration();
   /// Moves a registered model from its registered pose, about its centre; its outlines follow as soon as they
   /// are computed. `continues`: as a part of the move before, for undo.
   void nudge(std::size_t model, const registration::RigidStep& step, bool continues = false);
 
   void unlock(const std::string& who);
   void register_robot();
+  /// Guides a hand-held drill to a tunnel until `end_guidance`, or until `verify_drilled` has compared it
+  /// with the tunnel. In a rehearsal a virtual person follows the guidance.
+  void guide_drill(const std::string& tunnel);
+  void verify_drilled();
+  void end_guidance();
   void plan_order(const std::string& tunnel);
   /// Withdraws the displayed path, with a record, and shows the refusal; a new plan is required.
   void drop_plan(const Failure& why);
@@ -142,6 +162,7 @@ class Controller : public QObject {
     std::shared_ptr<const case_registration::CaseRegistration> registration;
     Picks registered_picks;
     std::optional<NudgedModel> nudged;
+    ModelLandmarks model_landmarks, registered_landmarks;
   };
 
   void begin(Phase phase, std::string doing, std::function<Change()> work);
@@ -162,12 +183,22 @@ class Controller : public QObject {
   void picks_changed(bool measurable);
   bool has_all_images() const;
   Change measured(Equipment& equipment, const std::vector<pipeline::Pick>& picks);
-  static Change with_plan(const operation::OperationPlan& plan, const std::vector<pipeline::Pick>& offered);
+  /// `models`: those of the session, into which it was copied.
+  static Change with_plan(const operation::OperationPlan& plan,
+                          const std::vector<pipeline::CaseModel>& models,
+                          const std::vector<pipeline::Pick>& offered);
   Change with_case(pipeline::Case the_case, Equipment& equipment, std::optional<Picks> unsaved = {});
   void keep_unsaved_picks();
+  void take_landmarks(const OpenedLandmarks& opened);
+  void landmarks_changed();
+  void keep_landmarks();
+  /// A sentence for each model that changed.
+  Expected<QStringList> save_landmarks();
   void watch_files_of(const std::filesystem::path& case_folder);
   void watch_no_files();
   void outline_nudged();
+  void register_in_operation();
+  std::optional<operation::TunnelOutcome> verified(Equipment& equipment, const std::string& tunnel);
   Change came(std::vector<pipeline::ViewResult> images);
 
   ApplicationState state_;

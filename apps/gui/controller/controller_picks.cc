@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "gui/controller/controller.h"
+#include "gui/controller/model_landmarks.h"
 #include "gui/controller/pick_checks.h"
 #include "gui/controller/steps.h"
 #include "gui/controller/unsaved_picks.h"
@@ -17,7 +18,9 @@ Controller::Edit Controller::edit_named(const QString& what) const {
           state_.bones_of,
           state_.registration,
           state_.registered_picks,
-          state_.nudged};
+          state_.nudged,
+          state_.model_landmarks,
+          state_.registered_landmarks};
 }
 
 void Controller::remember_edit(const QString& what) {
@@ -50,9 +53,18 @@ void Controller::step_edits(std::vector<Edit>& from, std::vector<Edit>& to) {
   state_.tunnels = std::move(edit.tunnels);
   state_.landmarks = std::move(edit.landmarks);
   state_.bones_of = std::move(edit.bones_of);
-  state_.registration = std::move(edit.registration);
-  state_.registered_picks = std::move(edit.registered_picks);
-  state_.nudged = std::move(edit.nudged);
+  if (!are_same(edit.model_landmarks, state_.model_landmarks)) {
+    state_.model_landmarks = std::move(edit.model_landmarks);
+    keep_landmarks();
+  }
+  if (!is_operation(state_)) {
+    state_.registration = std::move(edit.registration);
+    state_.registered_picks = std::move(edit.registered_picks);
+    state_.registered_landmarks = std::move(edit.registered_landmarks);
+    state_.nudged = std::move(edit.nudged);
+  } else if (edit.registration == state_.registration) {  // an operation returns to no earlier one
+    state_.nudged = std::move(edit.nudged);
+  }
   if (!outlining_) outline_nudged();
   if (!other_picks) return emit changed();
   keep_unsaved_picks();
@@ -74,14 +86,16 @@ void Controller::save_picks() {
   for (const operation::OperationTunnel& tunnel : state_.tunnels)
     tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
   watch_no_files();  // this change is its own
-  const auto saved = gui::save_picks(*state_.case_folder, state_.picks, tunnels);
+  const auto saved = gui::save_picks(*state_.case_folder, state_.picks, tunnels).and_then([this] {
+    return save_landmarks();
+  });
   watch_files_of(*state_.case_folder);
   state_.has_unsaved_picks = !saved;
   state_.picks_not_kept = saved ? std::nullopt : std::optional(saved.error());
   emit changed();
-  emit told(saved ? tr("The picks are saved in %1.")
-                        .arg(QString::fromStdString((*state_.case_folder / "case.json").string()))
-                  : sentence_of(saved.error()));
+  if (!saved) return emit told(sentence_of(saved.error()));
+  const QString file = QString::fromStdString((*state_.case_folder / "case.json").string());
+  emit told((QStringList{tr("The picks are saved in %1.").arg(file)} + *saved).join(' '));
 }
 
 void Controller::add_landmark(const std::string& name, std::optional<pipeline::BoneLabel> bone) {

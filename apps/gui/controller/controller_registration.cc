@@ -2,17 +2,20 @@
 // Registration of a case's models, and moving one by hand.
 #include "gui/controller/controller.h"
 #include "gui/controller/equipment.h"
+#include "gui/controller/model_landmarks.h"
 
 namespace helicarm::gui {
 
 using case_registration::CaseRegistration;
 
 Expected<CaseRegistration> register_models(Equipment& equipment, const std::vector<pipeline::Pick>& picks,
+                                           const ModelLandmarks& landmarks,
                                            const std::optional<NudgedModel>& from,
                                            const std::function<void(const std::string& step)>& tell) {
   return guarded([&] {
     pipeline::Case the_case = *equipment.the_case;
     the_case.picks = picks;
+    start_from_landmarks(the_case, landmarks, from ? std::optional(from->model) : std::nullopt);
     if (from) the_case.models.at(from->model).world_from_model = from->world_from_model;
     const case_registration::RegisterOptions& options = equipment.options;
     equipment.registered_by = options;
@@ -40,20 +43,62 @@ bool same_place(const NudgedModel& a, const NudgedModel& b) {
 
 void Controller::register_models() {
   if (!equipment_ || !can_register(state_)) return;
+  if (equipment_->operation) return register_in_operation();
   begin(Phase::registration, "reading the models",
-        [this, equipment = equipment_, picks = state_.picks, from = state_.nudged]() -> Change {
+        [this, equipment = equipment_, picks = state_.picks, landmarks = state_.model_landmarks,
+         from = state_.nudged]() -> Change {
           const auto tell = [this](const std::string& step) {
             meanwhile([step](ApplicationState& state) { state.doing = step; });
           };
           const auto done = std::make_shared<const CaseRegistration>(
-              value_or_throw(gui::register_models(*equipment, picks, from, tell)));
-          return [this, done, picks](ApplicationState& state) {
+              value_or_throw(gui::register_models(*equipment, picks, landmarks, from, tell)));
+          return [this, done, picks, landmarks](ApplicationState& state) {
             remember_edit(tr("registration"));
             state.registration = done;
             state.registered_picks = picks;
+            state.registered_landmarks = landmarks;
             state.nudged.reset();
           };
         });
+}
+
+void Controller::register_in_operation() {
+  if (state_.busy) return;
+  state_.order.reset();  // those to the models' tunnels end with the registration
+  state_.path = {};
+  begin(Phase::registration, "reading the models",
+        [this, equipment = equipment_, from = state_.nudged, names = state_.models]() -> Change {
+          std::vector<operation::ModelStart> starts;
+          if (from) starts.push_back({names.at(from->model), from->world_from_model});
+          const auto done = equipment->operation->register_models(starts, [equipment] {
+            if (equipment->stopped) throw BadInput(Reason::interrupted, "cancelled");
+          });
+          const auto& found = equipment->operation->registration();
+          const auto registered = found ? std::make_shared<const CaseRegistration>(*found) : nullptr;
+          const Change now = [registered](ApplicationState& state) {
+            state.registration = registered;
+            state.registered_picks = state.picks;
+            state.is_confirmed = false;
+            state.nudged.reset();
+          };
+          if (!done && !registered) {
+            meanwhile(now);
+            throw BadInput(done.error());
+          }
+          return now;
+        });
+}
+
+void Controller::confirm_registration() {
+  if (!equipment_ || !equipment_->operation || !awaits_confirmation(state_) || state_.nudged) return;
+  begin(Phase::registration, "confirming the registration", [this, equipment = equipment_]() -> Change {
+    value_or_throw(equipment->operation->confirm_registration());
+    auto live = equipment->operation->live_tool();
+    return [this, live = live ? std::optional(*std::move(live)) : std::nullopt](ApplicationState& state) {
+      state.is_confirmed = true;
+      live_tool_ = live;
+    };
+  });
 }
 
 void Controller::nudge(std::size_t model, const registration::RigidStep& step, bool continues) {
@@ -71,6 +116,8 @@ void Controller::nudge(std::size_t model, const registration::RigidStep& step, b
   if (!step.isZero(0) && registered.model)
     state_.nudged = {model, step, registration::moved_about(from.world_from_model, from.centre, step),
                      std::move(until_then)};
+  state_.order.reset();
+  state_.path = {};
   emit changed();
   if (!outlining_) outline_nudged();
 }

@@ -197,7 +197,7 @@ TEST_F(ControllerRegistration, CancelDuringTheSearchEndsIt) {
   equipment.the_case = pipeline::read_case(folder_->path()).value();
   ASSERT_TRUE(measure(equipment, {}));
   std::vector<std::string> told;
-  const auto done = gui::register_models(equipment, {}, {}, [&](const std::string& step) {
+  const auto done = gui::register_models(equipment, {}, {}, {}, [&](const std::string& step) {
     told.push_back(step);
     equipment.stopped = step == "bone: search";
   });

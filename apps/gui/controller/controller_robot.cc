@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // Controller: robot, pointer and live data.
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 #include "gui/controller/controller.h"
 #include "gui/controller/equipment.h"
 #include "gui/controller/stale.h"
+#include "helicarm/rehearsal/rehearse.h"
 
 namespace helicarm::gui {
 namespace {
 
 constexpr std::chrono::seconds robot_patience{5};
+constexpr double look_s = 0.1;  // between two decisions on a drill in the hand
 /// If the tool is nearer than this to its initial position, no retreat is needed.
 constexpr double at_rest_mm = 1;
 
@@ -114,6 +117,57 @@ void Controller::plan_order(const std::string& tunnel) {
         });
 }
 
+void Controller::guide_drill(const std::string& tunnel) {
+  if (!equipment_ || !equipment_->operation || !state_.drill || state_.busy) return;
+  follow(tunnel);
+  state_.guided = tunnel;
+  equipment_->verifies = false;
+  equipment_->newest_guidance.set({});
+  const auto named = std::ranges::find(state_.tunnels, tunnel, &operation::OperationTunnel::name);
+  const guidance::Bone bone = named == state_.tunnels.end() ? guidance::Bone() : named->bone;
+  begin(Phase::navigate, "guiding the drill to " + tunnel,
+        [this, equipment = equipment_, tunnel, bone]() -> Change {
+          if (equipment->virtual_or) rehearsal::raise_drill(bone, equipment->virtual_or->drill());
+          value_or_throw(equipment->operation->guide(tunnel));
+          while (!equipment->stopped) {
+            const operation::Guidance shown = value_or_throw(equipment->operation->guidance());
+            equipment->newest_guidance.set(shown);
+            if (equipment->virtual_or)
+              rehearsal::follow_guidance(shown, equipment->virtual_or->drill(), look_s);
+            if (equipment->verifies.exchange(false))
+              if (const auto outcome = verified(*equipment, tunnel))
+                return [outcome](ApplicationState& state) {
+                  state.outcomes.insert_or_assign(outcome->tunnel, *outcome);
+                };
+            std::this_thread::sleep_for(std::chrono::duration<double>(look_s));
+          }
+          return [](ApplicationState&) {};
+        });
+}
+
+/// Nothing where the drill must be held still or brought into the tunnel first: it is guided on.
+std::optional<operation::TunnelOutcome> Controller::verified(Equipment& equipment,
+                                                             const std::string& tunnel) {
+  auto outcome = equipment.operation->verify_drilled(tunnel);
+  if (outcome) return *std::move(outcome);
+  const Failure& why = outcome.error();
+  if (!operation::is_of_a_reading(why) && why.reason != Reason::off_target) throw BadInput(why);
+  meanwhile([why](ApplicationState& state) { state.refusals.insert_or_assign(Phase::navigate, why); });
+  value_or_throw(equipment.operation->guide(tunnel));
+  return std::nullopt;
+}
+
+void Controller::verify_drilled() {
+  if (!equipment_ || !state_.drill || state_.busy != Phase::navigate) return;
+  state_.refusals.erase(Phase::navigate);
+  equipment_->verifies = true;
+  emit changed();
+}
+
+void Controller::end_guidance() {
+  if (equipment_ && state_.drill && state_.busy == Phase::navigate) equipment_->stopped = true;
+}
+
 void Controller::drop_plan(const Failure& why) {
   if (state_.busy || !state_.order) return;
   const robot::RobotOrder order = *std::exchange(state_.order, std::nullopt);
@@ -168,6 +222,7 @@ void Controller::withdraw() {
 void Controller::stop() {
   if (!equipment_ || !equipment_->devices) return;
   equipment_->stopped = true;
+  if (!equipment_->devices->robot_if_any()) return;
   stops_.start([equipment = equipment_] { equipment->devices->robot().stop(); });
 }
 
@@ -177,11 +232,15 @@ LiveState Controller::live() const {
   if (!equipment_ || !equipment_->operation) return now;
   const tracker::PoseBoard& board = equipment_->devices->board();
   now.indicators = tracker_indicators(equipment_->tracker, board.tools(now.at_s));
-  now.robot = equipment_->devices->robot().status();
-  now.indicators.push_back(robot_indicator(now.robot));
+  robot::RobotLink* robot = equipment_->devices->robot_if_any();
+  if (robot) {
+    now.robot = robot->status();
+    now.indicators.push_back(robot_indicator(now.robot));
+  }
+  if (state_.drill && state_.busy == Phase::navigate) now.drill = equipment_->newest_guidance.get();
   now.indicators.push_back(c_arm_indicator(equipment_->devices->c_arm(), now.at_s));
-  if (state_.order && !state_.busy && plan_watch_) {
-    const auto holds = plan_watch_->holds(board, equipment_->devices->robot().track(), now.at_s);
+  if (robot && state_.order && !state_.busy && plan_watch_) {
+    const auto holds = plan_watch_->holds(board, robot->track(), now.at_s);
     if (!holds && holds.error().reason == Reason::plan_stale) now.stale = holds.error();
   }
   if (!live_tool_ || state_.tunnels.empty()) return now;

@@ -4,10 +4,13 @@
 
 #include "gui/controller/controller.h"
 #include "gui/controller/equipment.h"
+#include "gui/controller/model_landmarks.h"
 #include "gui/controller/pick_checks.h"
 #include "gui/controller/unsaved_picks.h"
+#include "helicarm/core/private_files.h"
 #include "helicarm/operation/plan_fields.h"
 #include "helicarm/pipeline/case.h"
+#include "helicarm/rehearsal/ct_plan.h"
 #include "helicarm/rehearsal/rehearse.h"
 
 namespace helicarm::gui {
@@ -37,6 +40,15 @@ std::vector<operation::OperationTunnel> tunnels_of(const pipeline::Case& the_cas
   const bool has_none =
       std::ranges::all_of(tunnels, [&](const auto& tunnel) { return is_unpicked(picked, tunnel); });
   return unsaved.empty() || !has_none ? tunnels : std::vector<operation::OperationTunnel>{};
+}
+
+/// Those that keep what case.json does not hold.
+QStringList unsaved_files(const fs::path& case_folder) {
+  QStringList files;
+  std::error_code unreadable;
+  for (const char* file : {"unsaved_picks.json", "unsaved_landmarks.json"})
+    if (fs::exists(case_folder / file, unreadable)) files << file;
+  return files;
 }
 
 /// Every file of the folder that a JSON value names.
@@ -76,7 +88,7 @@ std::string words_of(operation::Step step) {
     case operation::Step::plan:
       return "planning the path to ";
     case operation::Step::navigate:
-      return "the robot moves: ";
+      return "to the tunnel: ";
     case operation::Step::verify:
       return "verifying the tool at ";
   }
@@ -92,8 +104,9 @@ void Controller::open(Source source, const fs::path& folder, std::string doing,
     return cancel();
   }
   if (state_.has_unsaved_picks && state_.case_folder && !state_.picks_not_kept)
-    emit told(tr("The changed picks of %1 are kept in its unsaved_picks.json.")
-                  .arg(QString::fromStdString(state_.case_folder->string())));
+    emit told(tr("The changes of %1 that are not in its case.json are kept in %2.")
+                  .arg(QString::fromStdString(state_.case_folder->string()),
+                       unsaved_files(*state_.case_folder).join(tr(" and "))));
   auto old = std::exchange(equipment_, nullptr);
   live_tool_.reset();
   earlier_.clear();
@@ -121,22 +134,31 @@ void Controller::open(Source source, const fs::path& folder, std::string doing,
 void Controller::start_operation(Equipment& equipment, operation::OperationPlan plan,
                                  const fs::path& folder) {
   equipment.tracker = plan.tracker;
-  equipment.operation = value_or_throw(operation::Operation::begin(
-      std::move(plan), folder, equipment.devices->board(), equipment.devices->robot(),
-      [this](operation::Step step, const std::string& what) {
-        meanwhile([words = words_of(step) + what](ApplicationState& state) { state.doing = words; });
-      }));
+  const auto notify = [this](operation::Step step, const std::string& what) {
+    meanwhile([words = words_of(step) + what](ApplicationState& state) { state.doing = words; });
+  };
+  const tracker::PoseBoard& board = equipment.devices->board();
+  equipment.operation =
+      value_or_throw(plan.drill ? operation::Operation::begin_freehand(std::move(plan), folder, board, notify)
+                                : operation::Operation::begin(std::move(plan), folder, board,
+                                                              equipment.devices->robot(), notify));
   equipment.operation->confirmed_by("the person at the screen");
 }
 
 void Controller::open_virtual_or(const virtual_devices::VirtualDevicesOptions& options,
-                                 const operation::OperationPlan& wished, const fs::path& folder) {
+                                 const operation::OperationPlan& wished, const fs::path& folder, bool by_ct) {
   const auto work = [=, this, freshness = freshness_](Equipment& equipment) -> Change {
     equipment.virtual_or = value_or_throw(virtual_devices::VirtualDevices::open(options));
     operation::OperationPlan plan =
         rehearsal::plan_for(*equipment.virtual_or, equipment.virtual_or->tracker().port());
     for (const auto& field : operation::plan_fields)
       if (field.get(wished) != field.get(operation::OperationPlan())) field.set(plan, field.get(wished));
+    if (by_ct) {
+      const fs::path ct = folder.parent_path() / (folder.filename().string() + "-ct");
+      value_or_throw(make_private_folder(ct));
+      plan = rehearsal::with_ct_plan(std::move(plan),
+                                     equipment.virtual_or->simulated_scene().simulated_case(), ct);
+    }
     const auto offered = std::exchange(plan.picks, {});
     equipment.devices = std::make_unique<operation::Connections>(
         plan, value_or_throw(receiver::Inbox::open(folder / "inbox")),
@@ -148,7 +170,8 @@ void Controller::open_virtual_or(const virtual_devices::VirtualDevicesOptions& o
     const auto bones = std::make_shared<const simulation::BoneMeshes>(simulation::moved(
         simulation::bone_meshes(bone_step_mm),
         equipment.virtual_or->simulated_scene().simulated_case().calibrator_from_knee.value()));
-    return [change = with_plan(plan, offered), bones](ApplicationState& state) {
+    return [change = with_plan(plan, equipment.operation->plan().models, offered),
+            bones](ApplicationState& state) {
       change(state);
       state.bones = bones;
     };
@@ -166,11 +189,12 @@ void Controller::open_devices(const fs::path& file, const receiver::ReceiverOpti
         plan, value_or_throw(receiver::Inbox::open(folder / "inbox")));
     value_or_throw(equipment.devices->listen(receiver));
     start_operation(equipment, plan, folder);
-    return with_plan(plan, offered);
+    return with_plan(plan, equipment.operation->plan().models, offered);
   });
 }
 
 Controller::Change Controller::with_plan(const operation::OperationPlan& plan,
+                                         const std::vector<pipeline::CaseModel>& models,
                                          const std::vector<pipeline::Pick>& offered) {
   const phantom::Calibrator calibrator = value_or_throw(operation::files_of(plan)).calibrator;
   return [=](ApplicationState& state) {
@@ -178,7 +202,13 @@ Controller::Change Controller::with_plan(const operation::OperationPlan& plan,
     state.calibrator = calibrator;
     state.tunnels = plan.tunnels;
     for (const auto& point : plan.check_points) state.check_points.push_back(point.name);
+    state.drill = plan.drill;
     state.offered_picks = offered;
+    state.has_models = !models.empty();
+    for (const pipeline::CaseModel& model : models) {
+      state.models.push_back(model.name);
+      state.model_volumes.push_back(model.volume);
+    }
     Images none(plan.views.size());
     for (std::size_t i = 0; i < none.size(); ++i) none[i].name = plan.views[i];
     state.result = result_with(std::move(none));
@@ -190,10 +220,16 @@ void Controller::open_case(const fs::path& folder, bool keeps_picks) {
   open(Source::files, folder, "reading " + folder.filename().string(),
        [=, this](Equipment& equipment) -> Change {
          pipeline::Case the_case = value_or_throw(pipeline::read_case(folder));
-         if (!keeps_picks) return with_case(std::move(the_case), equipment);
+         if (!keeps_picks)
+           return [this, landmarks = opened_landmarks(the_case, false),
+                   change = with_case(std::move(the_case), equipment)](ApplicationState& state) {
+             change(state);
+             take_landmarks(landmarks);
+           };
          const auto unsaved = unsaved_picks(folder, the_case);
+         const OpenedLandmarks landmarks = opened_landmarks(the_case, true);
          return [this, change = with_case(std::move(the_case), equipment, unsaved.value_or(std::nullopt)),
-                 folder, unsaved](ApplicationState& state) {
+                 folder, unsaved, landmarks](ApplicationState& state) {
            change(state);
            if (unsaved)
              state.case_folder = folder;
@@ -203,6 +239,7 @@ void Controller::open_case(const fs::path& folder, bool keeps_picks) {
              emit told(
                  tr("Picks that are not in case.json are restored: Ctrl+S saves them, Ctrl+Z takes those "
                     "of case.json."));
+           take_landmarks(landmarks);
          };
        });
 }
@@ -241,8 +278,9 @@ QString Controller::loss() const {
                             return view.xray_image != nullptr;
                           });
   if (operates && (has_images || state_.busy)) return tr("End this operation? Its record is kept.");
-  const bool has_other_picks =
-      std::ranges::any_of(earlier_, [&](const Edit& edit) { return !are_same(edit.picks, state_.picks); });
+  const bool has_other_picks = std::ranges::any_of(earlier_, [&](const Edit& edit) {
+    return !are_same(edit.picks, state_.picks) || !are_same(edit.model_landmarks, state_.model_landmarks);
+  });
   if (has_other_picks && (state_.picks_not_kept || !state_.case_folder))
     return tr("The changed picks are not kept in a file. Discard them?");
   return {};
@@ -277,6 +315,7 @@ Controller::Change Controller::with_case(pipeline::Case the_case, Equipment& equ
     state.has_models = !models.empty();
     state.models = models;
     state.model_volumes = volumes;
+    state.case_models = the_case.models;
   };
 }
 

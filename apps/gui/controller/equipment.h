@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <map>
+#include <mutex>
 
 #include "gui/controller/application_state.h"
 #include "helicarm/case_registration/register_case.h"
@@ -11,6 +12,23 @@
 #include "helicarm/virtual_devices/virtual_devices.h"
 
 namespace helicarm::gui {
+
+/// The newest decision on a hand-held drill; from any thread.
+class NewestGuidance {
+ public:
+  void set(std::optional<operation::Guidance> guidance) {
+    const std::lock_guard lock(mutex_);
+    newest_ = std::move(guidance);
+  }
+  std::optional<operation::Guidance> get() const {
+    const std::lock_guard lock(mutex_);
+    return newest_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::optional<operation::Guidance> newest_;
+};
 
 /// Resources of a source. The operation and the case belong to the worker; devices and virtual devices may be
 /// used from any thread.
@@ -29,8 +47,10 @@ struct Equipment {
   case_registration::RegisterOptions options;
   std::optional<case_registration::RegisterOptions> registered_by;  ///< of the registered models
   std::optional<robot::RobotOrder> last_order;
-  robot::RobotState rest;             ///< the robot's state before the order
-  std::atomic<bool> stopped = false;  ///< no further move of a tour, no wait for an image
+  robot::RobotState rest;  ///< the robot's state before the order
+  NewestGuidance newest_guidance;
+  std::atomic<bool> verifies = false;  ///< the guided drill is in its tunnel and shall be compared with it
+  std::atomic<bool> stopped = false;   ///< no further move of a tour, no wait for an image
   std::atomic<virtual_devices::CArmFault> c_arm_fault = virtual_devices::CArmFault::none;
 };
 
@@ -51,11 +71,12 @@ Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipel
 
 inline constexpr std::size_t most_loose_images = 20;
 
-/// Registers the case's models to its calibrated views. `from`: a model's start in place of the case's.
+/// Registers the case's models to its calibrated views. `landmarks`, placed in the models: as
+/// `start_from_landmarks`. `from`: a model's start in place of the case's.
 /// `tell` is called with each step. Refuses interrupted once `equipment.stopped`.
 Expected<case_registration::CaseRegistration> register_models(
-    Equipment& equipment, const std::vector<pipeline::Pick>& picks, const std::optional<NudgedModel>& from,
-    const std::function<void(const std::string& step)>& tell);
+    Equipment& equipment, const std::vector<pipeline::Pick>& picks, const ModelLandmarks& landmarks,
+    const std::optional<NudgedModel>& from, const std::function<void(const std::string& step)>& tell);
 
 /// Images of files, for looking; each with its file.
 struct LooseImages {

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "gui/controller/model_landmarks.h"
 #include "gui/controller/pick_checks.h"
 #include "gui/controller/steps.h"
 #include "helicarm/case_registration/register_case.h"
@@ -91,6 +92,9 @@ QString stale_model(const ApplicationState& state, std::size_t model) {
   if (is_moved(state, model))
     return stale_tr("%1 is moved by hand and not registered there")
         .arg(as_text(registered.registration.name));
+  if (const auto landmark = landmark_moved_in_model(state, model))
+    return stale_tr("landmark %1 has been moved in the model: register the models again")
+        .arg(as_text(*landmark));
   if (const auto landmark = moved_landmark(state, registered))
     return stale_tr("landmark %1 has changed: register the models again").arg(as_text(*landmark));
   return {};
@@ -175,7 +179,7 @@ QStringList lacks_of_export(const ApplicationState& state) {
     return {stale_tr("%1; nothing is exported until it is measured again (F5)").arg(all)};
   std::vector<std::string> points;
   for (const operation::OperationTunnel& tunnel : state.tunnels)
-    for (const std::string& end : {tunnel.start, tunnel.end}) points.push_back(end);
+    for (const std::string& end : ends_to_pick(tunnel)) points.push_back(end);
   points.insert(points.end(), state.landmarks.begin(), state.landmarks.end());
   for (const std::string& point : points)
     if (const QString lack = lack_of(state, point); !lack.isEmpty()) lacks << lack;

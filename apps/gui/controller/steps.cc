@@ -131,16 +131,21 @@ void navigate(StepCard& card, const ApplicationState& state) {
     card.why = tr("images from files: no robot");
     return;
   }
-  if (!state.hand_eye_rms_mm) {
+  if (state.drill) {
+    card.why = tr("guide the drill to a tunnel");
+  } else if (!state.hand_eye_rms_mm) {
     card.why = tr("unlock the robot, then register it");
     return;
+  } else {
+    card.figure = tr("registered, %1 mm rms").arg(*state.hand_eye_rms_mm, 0, 'f', 2);
   }
-  card.figure = tr("registered, %1 mm rms").arg(*state.hand_eye_rms_mm, 0, 'f', 2);
   if (state.order) card.why = tr("%1: inspect the path, then confirm").arg(text(state.order->name));
   if (state.outcomes.empty()) return;
   double worst = 0;
   for (const auto& [name, outcome] : state.outcomes)
-    if (!outcome.loop.empty()) worst = std::max(worst, outcome.loop.back().distance_mm);
+    worst = std::max(worst, outcome.loop.empty()
+                                ? std::max(outcome.start.distance_mm(), outcome.end.distance_mm())
+                                : outcome.loop.back().distance_mm);
   card.figure = tr("%1 of %2 tunnels, %3 mm")
                     .arg(state.outcomes.size())
                     .arg(state.tunnels.size())
@@ -238,6 +243,9 @@ void registered(StepCard& card, const ApplicationState& state) {
   }
   card.figure = tr("within %1 mm (95 %)").arg(worst, 0, 'f', 2);
   doubt(card, warnings);
+  if (!awaits_confirmation(state)) return;
+  card.status = StepStatus::waiting;
+  card.why = tr("compare the outlines with the bones, then confirm");
 }
 
 }  // namespace

@@ -147,16 +147,16 @@ void BonesWindow::run(const QString& doing, std::function<std::function<void()>(
   });
 }
 
-void BonesWindow::open_ct(const fs::path& file, std::vector<CtTunnel> tunnels) {
+void BonesWindow::open_ct(const fs::path& file, CtPlan plan) {
   file_ = file;
   setWindowTitle(tr("CT: %1").arg(text(file.filename().string())));
-  run(tr("%1 is read.").arg(text(file.string())), [this, file, tunnels = std::move(tunnels)] {
+  run(tr("%1 is read.").arg(text(file.string())), [this, file, plan = std::move(plan)] {
     auto read = std::make_shared<Expected<volume::Volume>>(volume::read_volume(file));
-    return [this, read, tunnels] {
+    return [this, read, plan] {
       if (!*read) return says_->setText(sentence_of(read->error()));
       scene_ = {};
       scene_.ct = std::make_shared<const volume::Volume>(**read);
-      scene_.tunnels = tunnels;
+      scene_.plan = plan;
       scene_.cursor = 0.5 * (scene_.ct->size.cast<double>().array() - 1).matrix();
       QStringList words;
       for (const Warning& warning : scene_.ct->warnings) words << sentence_of(warning);

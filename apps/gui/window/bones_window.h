@@ -29,7 +29,7 @@ class BonesWindow : public QDialog {
   explicit BonesWindow(QWidget* parent = nullptr);
   ~BonesWindow() override;
 
-  void open_ct(const std::filesystem::path& file, std::vector<CtTunnel> tunnels);
+  void open_ct(const std::filesystem::path& file, CtPlan plan = {});
   bool is_busy() const { return busy_; }
   const CtScene& scene() const { return scene_; }
   const std::vector<segmentation::Seed>& seeds() const { return seeds_; }

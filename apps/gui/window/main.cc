@@ -75,7 +75,7 @@ int main(int argc, char** argv) {
   else if (!kept.value("tour/offered").toBool())
     window.start_tour();  // at the first start
   else
-    window.open_rehearsal();
+    window.open_rehearsal({});
   QSettings().setValue("tour/offered", true);
   for (const int signal : {SIGTERM, SIGINT}) std::signal(signal, [](int) { told_to_end = 1; });
   QTimer listener;

@@ -16,6 +16,8 @@
 
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
+#include "gui/window/ask_files.h"
+#include "gui/window/landmarks_window.h"
 #include "gui/window/points_panel.h"
 #include "gui/window/register_page.h"
 #include "gui/window/style.h"
@@ -34,8 +36,8 @@ constexpr double epipolar_reach_mm = 150;
 /// The first step that is not done; the plan is the last one of a case of files.
 Phase open_phase(const std::array<StepCard, phases.size()>& cards, const ApplicationState& state) {
   if (state.source == Source::images) return Phase::acquire;
-  const bool registered = state.hand_eye_rms_mm.has_value();
-  if (can_register(state) && !state.registration) return Phase::registration;
+  const bool registered = state.hand_eye_rms_mm.has_value() || state.drill;
+  if (can_register(state) && (!state.registration || awaits_confirmation(state))) return Phase::registration;
   for (const StepCard& card : cards) {
     if (card.phase == Phase::registration) continue;  // a step that may be left out
     if (card.phase == Phase::navigate && state.source == Source::files && !registered) return Phase::plan;
@@ -167,12 +169,16 @@ void MainWindow::build_pages() {
     pages_->addWidget(scrolled);
     all_pages_.push_back(page);
   }
-  connect(acquire, &AcquirePage::rehearsal_wanted, this, &MainWindow::open_rehearsal);
+  connect(acquire, &AcquirePage::rehearsal_wanted, this, [this] { open_rehearsal({}); });
   connect(acquire, &AcquirePage::tour_wanted, this, &MainWindow::ask_tour);
   connect(acquire, &AcquirePage::folder_wanted, this, &MainWindow::ask_folder);
   connect(acquire, &AcquirePage::new_case_wanted, this, &MainWindow::ask_new_case);
   connect(rectify, &RectifyPage::layer_wanted, panels_, &XrayPanels::set_layer);
   connect(register_, &RegisterPage::slices_wanted, this, &MainWindow::open_ct_of);
+  connect(register_, &RegisterPage::landmarks_wanted, this, [this](std::size_t model) {
+    if (model < controller_.state().case_models.size())
+      show_beside(new LandmarksWindow(controller_, model, this));
+  });
   connect(register_, &RegisterPage::held_changed, this, &MainWindow::show_handles);
   connect(plan_, &PlanPage::target_changed, this, &MainWindow::show_picks);
   connect(plan_, &PlanPage::map_wanted, this, [this](const std::optional<TreCut>& cut) {
@@ -503,7 +509,7 @@ void MainWindow::show_live() {
 void MainWindow::look_at_the_robot(const LiveScene& scene) {
   const ApplicationState& state = controller_.state();
   const bool is_known = scene.calibrator_from_base && scene.joints;
-  const bool registers = state.busy == Phase::navigate && !state.hand_eye_rms_mm && !is_known;
+  const bool registers = state.busy == Phase::navigate && !state.hand_eye_rms_mm && !state.drill && !is_known;
   if (out_of_date_.isEmpty())
     scene_->set_notice(registers ? tr("The robot is drawn as soon as it is registered") : QString());
   const RobotView wanted = !is_known ? RobotView::unknown : state.order ? RobotView::path : RobotView::whole;

@@ -29,7 +29,7 @@ namespace helicarm::gui {
 
 class PointsPanel;
 class RegisterPage;
-struct CtTunnel;
+struct CtPlan;
 class Tour;
 struct TourStep;
 
@@ -50,7 +50,11 @@ class MainWindow : public QMainWindow {
   SceneView& scene() { return *scene_; }
   LiveBar& live_bar() { return *live_bar_; }
 
-  void open_rehearsal();
+  struct RehearsalKind {
+    bool by_ct = false;    ///< its tunnels are planned in a CT
+    bool by_hand = false;  ///< a virtual person holds the drill; there is no robot
+  };
+  void open_rehearsal(const RehearsalKind& kind);
   /// Makes and opens a simulated case, and walks through the window with it.
   void start_tour();
   void open_plan(const std::filesystem::path& plan);
@@ -98,7 +102,7 @@ class MainWindow : public QMainWindow {
   /// A run of images of a calibrator, in a window of its own.
   void open_run(const std::filesystem::path& folder);
   /// Slices of a CT, to find its bones, in a window of its own.
-  void open_ct(const std::filesystem::path& file, std::vector<CtTunnel> tunnels);
+  void open_ct(const std::filesystem::path& file, CtPlan plan);
   void open_ct_of(std::size_t model);
   void open_session(const std::filesystem::path& session);
   std::filesystem::path new_session() const;
@@ -162,7 +166,7 @@ class MainWindow : public QMainWindow {
   void leave_for(const std::vector<std::filesystem::path>& paths);
   /// `offers_one`: as a new case also a single image.
   void open_images(const std::vector<std::filesystem::path>& files, bool offers_one = false);
-  void ask_rehearsal();
+  void ask_rehearsal(const RehearsalKind& kind);
   void ask_folder();
   void ask_new_case();
   void offer_case(const std::vector<pipeline::NewImage>& images);

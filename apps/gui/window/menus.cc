@@ -26,7 +26,12 @@ QString path_text(const fs::path& path) { return QString::fromStdString(path.str
 void MainWindow::build_menus() {
   QMenu* file = menuBar()->addMenu(tr("&File"));
   file->addAction(tr("&New rehearsal with virtual devices"), QKeySequence::New, this,
-                  &MainWindow::ask_rehearsal);
+                  [this] { ask_rehearsal({}); });
+  QMenu* rehearsals = file->addMenu(tr("New &rehearsal of another kind"));
+  rehearsals->addAction(tr("&Tunnels planned in a CT"), this, [this] { ask_rehearsal({.by_ct = true}); });
+  rehearsals->addAction(tr("&Drill held by hand"), this, [this] { ask_rehearsal({.by_hand = true}); });
+  rehearsals->addAction(tr("Tunnels planned in a &CT, drill held by hand"), this,
+                        [this] { ask_rehearsal({.by_ct = true, .by_hand = true}); });
   file->addAction(tr("&Connect the devices of a plan..."), this, [this] {
     ask_files(this, tr("Plan"), QFileDialog::ExistingFile, tr("Plan (*.json)"),
               [this](const std::vector<fs::path>& chosen) {

@@ -45,6 +45,14 @@ std::vector<fs::path> images_in(const fs::path& folder) {
   return images;
 }
 
+/// From the usual stand-off to where the tunnel enters the bone.
+std::optional<std::pair<Eigen::Vector3d, Eigen::Vector3d>> approach_of(const registration::BoneCheck& check) {
+  if (!check.entry) return std::nullopt;
+  const Eigen::Vector3d out = (*check.entry - check.end).normalized();
+  return std::pair<Eigen::Vector3d, Eigen::Vector3d>(
+      *check.entry + robot::ApproachOptions().stand_off_mm * out, *check.entry);
+}
+
 }  // namespace
 
 void MainWindow::remember(Folder kind, const fs::path& folder) {
@@ -57,8 +65,8 @@ fs::path MainWindow::new_session() const {
   return sessions_ / now.toStdString();
 }
 
-void MainWindow::ask_rehearsal() {
-  leave_then([this] { open_rehearsal(); });
+void MainWindow::ask_rehearsal(const RehearsalKind& kind) {
+  leave_then([this, kind] { open_rehearsal(kind); });
 }
 
 void MainWindow::leave_then(std::function<void()> act) {
@@ -111,11 +119,12 @@ void MainWindow::ask_folder() {
             [this](const std::vector<fs::path>& chosen) { leave_for(chosen); });
 }
 
-void MainWindow::open_rehearsal() {
+void MainWindow::open_rehearsal(const RehearsalKind& kind) {
   virtual_devices::VirtualDevicesOptions virtual_or = settings_.virtual_or;
   virtual_or.tracker_port = virtual_or.rtde_port = virtual_or.dashboard_port = virtual_or.script_port = 0;
+  virtual_or.freehand = kind.by_hand;
   const fs::path folder = new_session();
-  controller_.open_virtual_or(virtual_or, settings_.plan, folder);
+  controller_.open_virtual_or(virtual_or, settings_.plan, folder, kind.by_ct);
 }
 
 void MainWindow::open_plan(const fs::path& plan) {
@@ -158,10 +167,10 @@ void MainWindow::open_run(const fs::path& folder) {
   run->open_case(folder);
 }
 
-void MainWindow::open_ct(const fs::path& file, std::vector<CtTunnel> tunnels) {
+void MainWindow::open_ct(const fs::path& file, CtPlan plan) {
   auto* bones = new BonesWindow(this);
   show_beside(bones);
-  bones->open_ct(file, std::move(tunnels));
+  bones->open_ct(file, std::move(plan));
 }
 
 void MainWindow::open_ct_of(std::size_t model) {
@@ -169,15 +178,19 @@ void MainWindow::open_ct_of(std::size_t model) {
   if (!state.registration || model >= state.model_volumes.size() || !state.model_volumes[model]) return;
   const case_registration::RegisteredModel& registered = state.registration->models.at(model);
   const geometry::RigidTransform model_from_world = registered.registration.world_from_model.inverse();
-  std::vector<CtTunnel> tunnels;
-  if (stale_model(state, model).isEmpty() && !registered.registration.failure)
+  CtPlan plan;
+  if (stale_model(state, model).isEmpty() && !registered.registration.failure) {
     for (std::size_t i = 0; i < registered.tunnel_ends.size(); ++i) {
       const auto& [start, end] = registered.tunnel_ends[i];
-      tunnels.push_back({registered.tunnels[i].name,
-                         model_from_world * registered.points[start].place.in_calibrator,
-                         model_from_world * registered.points[end].place.in_calibrator});
+      plan.tunnels.push_back({registered.tunnels[i].name,
+                              model_from_world * registered.points[start].place.in_calibrator,
+                              model_from_world * registered.points[end].place.in_calibrator});
+      if (i < registered.bone_checks.size() && registered.bone_checks[i])
+        plan.tunnels.back().approach = approach_of(*registered.bone_checks[i]);
     }
-  open_ct(*state.model_volumes[model], std::move(tunnels));
+    for (const Eigen::Vector3d& at : state.path.in_calibrator) plan.path.push_back(model_from_world * at);
+  }
+  open_ct(*state.model_volumes[model], std::move(plan));
 }
 
 void MainWindow::open_images(const std::vector<fs::path>& files, bool offers_one) {

@@ -9,6 +9,7 @@
 #include "gui/controller/controller.h"
 #include "gui/controller/steps.h"
 #include "gui/scene/tre_slice.h"
+#include "gui/window/drill_target.h"
 #include "gui/window/hold_button.h"
 #include "gui/window/page_table.h"
 #include "gui/xray/layers.h"
@@ -156,12 +157,18 @@ class NavigatePage : public Page {
   void tell();
   QString next_step() const;
   QString where_the_tool_is() const;
+  QString next_by_hand() const;
+  QString what_lacks() const;
+  void add_drill();
   bool is_held() const;
+  /// Nothing without tunnels.
+  const operation::OperationTunnel* chosen() const;
 
   QLabel* says_;
   QComboBox* tunnel_;
   HoldButton *unlock_, *register_, *go_, *withdraw_;
-  QPushButton* plan_;
+  QPushButton *plan_, *guide_, *verify_, *end_;
+  DrillTarget* target_;
   robot::LinkPhase phase_ = robot::LinkPhase::disconnected;
   std::optional<Failure> why_;
   std::optional<operation::TunnelAim> aim_;  ///< of the tool, in tenths of a millimetre

@@ -39,9 +39,9 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
     emit target_changed();
   });
   tunnels_ = add_table(plan_tunnels_table({}), "tunnelTable");
-  of_models_ =
-      new QLabel(tr("Tunnels of a model's plan are for looking and for the export: the robot moves to picked "
-                    "tunnels only."));
+  of_models_ = new QLabel(tr(
+      "Tunnels of a model's plan are for looking and for the export here: the tool is guided to them in an "
+      "operation whose plan names the models."));
   of_models_->setObjectName("tunnelsOfModels");
   of_models_->setWordWrap(true);
   layout()->addWidget(of_models_);
@@ -205,9 +205,7 @@ std::optional<WantedPick> PlanPage::target() const {
 void PlanPage::show_state(const ApplicationState& state) {
   std::vector<PlannedPoint> points;
   for (const operation::OperationTunnel& tunnel : state.tunnels)
-    for (const std::string& end : {tunnel.start, tunnel.end}) {
-      points.push_back({end, kind_of(state, tunnel, end)});
-    }
+    for (const std::string& end : ends_to_pick(tunnel)) points.push_back({end, kind_of(state, tunnel, end)});
   for (const std::string& landmark : state.landmarks) points.push_back({landmark, tr("landmark")});
   clickable_ = points.size();
   for (const auto& [model, out_of_date] : usable_models(state))
@@ -221,7 +219,7 @@ void PlanPage::show_state(const ApplicationState& state) {
   const auto tunnels = plan_tunnels(state);
   tunnels_->fill(plan_tunnels_table(tunnels));
   tunnels_->setVisible(std::ranges::any_of(tunnels, &PlanTunnelRow::is_of_model));
-  of_models_->setVisible(tunnels_->isVisibleTo(this));
+  of_models_->setVisible(tunnels_->isVisibleTo(this) && !is_operation(state));
   offered_->setVisible(!state.offered_picks.empty());
   landmark_row_->setVisible(state.source == Source::files);
   no_tunnels_->setVisible(

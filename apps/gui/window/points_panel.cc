@@ -19,7 +19,7 @@ constexpr int before_views = 2;  // columns
 std::vector<std::string> points_of(const ApplicationState& state) {
   std::vector<std::string> points;
   for (const operation::OperationTunnel& tunnel : state.tunnels)
-    for (const std::string& end : {tunnel.start, tunnel.end}) points.push_back(end);
+    for (const std::string& end : ends_to_pick(tunnel)) points.push_back(end);
   points.insert(points.end(), state.landmarks.begin(), state.landmarks.end());
   return points;
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "gui/controller/model_landmarks.h"
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
@@ -95,6 +96,13 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
     leave_as_registered();  // the case's start
     controller_.register_models();
   });
+  confirm_ = add_button(tr("The outlines follow the bones in every view: &confirm"), "confirmRegistration",
+                        [this] { controller_.confirm_registration(); });
+  confirm_->setToolTip(tr("Tunnels of the models' plans guide the tool from then on"));
+  pictures_ = new PosePictures;
+  pictures_->setObjectName("posePictures");
+  connect(pictures_, &PosePictures::chosen, this, &RegisterPage::move_to);
+  layout()->addWidget(pictures_);
   says_ = new QLabel;
   says_->setObjectName("registerSays");
   says_->setWordWrap(true);
@@ -110,6 +118,12 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
   ct_ = add_button(tr("Slices of the CT..."), "ctSlices",
                    [this] { emit slices_wanted(std::size_t(std::max(0, model_->currentIndex()))); });
   ct_->setToolTip(tr("The chosen model's CT in three directions, with its planned tunnels"));
+  in_model_ = add_button(tr("&Landmarks in the model..."), "modelLandmarks",
+                         [this] { emit landmarks_wanted(chosen_model()); });
+  in_model_->setToolTip(
+      tr("Three landmarks of the model that are picked in two X-ray images each start its "
+         "registration"));
+  connect(models_, &QTableWidget::currentCellChanged, this, [this] { allow_landmarks(controller_.state()); });
   points_ = add_table(case_registration::points_table({}), "modelPointTable");
   measures_ = add_table(case_registration::measures_table({}), "modelMeasureTable");
   static_cast<QVBoxLayout*>(layout())->addStretch();
@@ -144,6 +158,7 @@ void RegisterPage::add_hand() {
   }
   connect(model_, &QComboBox::currentIndexChanged, this, [this] {
     leave_as_registered();
+    show_pictures(controller_.state());
     emit held_changed();
   });
   layout()->addWidget(hand_);
@@ -172,6 +187,36 @@ double field_of(const registration::RigidStep& step, std::size_t field) {
 void RegisterPage::leave_as_registered() {
   if (model_->currentIndex() >= 0)
     controller_.nudge(std::size_t(model_->currentIndex()), registration::RigidStep::Zero());
+}
+
+namespace {
+
+/// From the registered pose to that of a picture.
+registration::RigidStep step_to(const registration::Registration& found, std::size_t pose) {
+  if (pose == 0) return registration::RigidStep::Zero();
+  return registration::step_about(found.world_from_model, found.alternatives.at(pose - 1).world_from_model,
+                                  found.centre);
+}
+
+}  // namespace
+
+void RegisterPage::move_to(std::size_t pose) {
+  if (!shown_ || model_->currentIndex() < 0) return;
+  const auto model = std::size_t(model_->currentIndex());
+  controller_.nudge(model, step_to(shown_->models.at(model).registration, pose));
+  show_pictures(controller_.state());  // also where nothing has moved
+}
+
+void RegisterPage::show_pictures(const ApplicationState& state) {
+  const auto model = std::size_t(std::max(0, model_->currentIndex()));
+  pictures_->show_model(state.registration, model);
+  if (!state.registration || model >= state.registration->models.size()) return;
+  const bool is_moved = state.nudged && state.nudged->model == model;
+  const registration::Registration& found = state.registration->models[model].registration;
+  std::optional<std::size_t> displayed;
+  for (std::size_t pose = 0; pose <= found.alternatives.size(); ++pose)
+    if (is_moved ? state.nudged->step == step_to(found, pose) : pose == 0) displayed = pose;
+  pictures_->mark(displayed);
 }
 
 void RegisterPage::nudge(std::size_t field, double value) {
@@ -204,10 +249,12 @@ void RegisterPage::show_state(const ApplicationState& state) {
   const bool can = can_register(state) && !state.busy && stale(state, Phase::calibrate).isEmpty();
   register_->setEnabled(can);
   hand_->setEnabled(can && state.registration);
+  confirm_->setVisible(is_operation(state) && state.has_models);
+  confirm_->setEnabled(can && awaits_confirmation(state) && !state.nudged);
   from_here_->setEnabled(can && state.nudged);
   const std::size_t chosen = std::size_t(std::max(0, model_->currentIndex()));
   ct_->setEnabled(state.registration && chosen < state.model_volumes.size() && state.model_volumes[chosen]);
-  says_->setText(words_of(state));
+  says_->setText(with_landmark_words(words_of(state), state));
   std::vector<RegisteredModel> models = listed_models(state);
   models_->fill(table_of_models(state, models));
   points_->fill(case_registration::points_table(models));
@@ -220,6 +267,20 @@ void RegisterPage::show_state(const ApplicationState& state) {
   show_slices();
   list_models(state);
   show_hand(state);
+  allow_landmarks(state);
+  show_pictures(state);
+  pictures_->setEnabled(hand_->isEnabled());
+}
+
+std::size_t RegisterPage::chosen_model() const {
+  const int chosen = model_->count() > 0 ? model_->currentIndex() : models_->currentRow();
+  return std::size_t(std::max(0, chosen));
+}
+
+void RegisterPage::allow_landmarks(const ApplicationState& state) {
+  const std::size_t model = chosen_model();
+  in_model_->setEnabled(model < state.case_models.size() &&
+                        (state.case_models[model].volume || state.case_models[model].surface));
 }
 
 void RegisterPage::list_models(const ApplicationState& state) {
@@ -274,7 +335,10 @@ QString RegisterPage::words_of(const ApplicationState& state) const {
   const bool is_ended = refusal != state.refusals.end() && is_cancelled(refusal->first, refusal->second);
   if (refusal != state.refusals.end() && !is_ended) return sentence_of(refusal->second);
   if (!state.has_models)
-    return tr("This case has no models: name a CT volume or a surface under \"models\" in case.json.");
+    return is_operation(state)
+               ? tr("This operation has no models: name a CT volume or a surface under \"models\" in its "
+                    "plan.")
+               : tr("This case has no models: name a CT volume or a surface under \"models\" in case.json.");
   if (state.measured && state.result->failure)
     return tr("The measurement is refused (%1): no model is registered to it.")
         .arg(text(std::string(code(state.result->failure->reason))));
@@ -285,7 +349,13 @@ QString RegisterPage::words_of(const ApplicationState& state) const {
                      .arg(changed)
                : changed + ".";
   const QString ended = is_ended ? tr("The registration was cancelled. ") : QString();
-  if (state.registration) return ended + reasons_of(*state.registration);
+  QString guides;
+  if (awaits_confirmation(state))
+    guides =
+        tr("Compare the outlines with the bones in every view: no tunnel of these models guides the tool "
+           "before you confirm.\n");
+  if (state.is_confirmed) guides = tr("Confirmed: the tunnels of these models guide the tool (Alt+5).\n");
+  if (state.registration) return ended + guides + reasons_of(*state.registration);
   return ended + tr("No model is registered yet.");
 }
 

@@ -7,6 +7,7 @@
 #include "gui/scene/scene_values.h"
 #include "gui/window/pages.h"
 #include "gui/window/pose_box.h"
+#include "gui/window/pose_pictures.h"
 #include "gui/xray/live_marks.h"
 #include "helicarm/case_registration/register_case.h"
 
@@ -27,6 +28,7 @@ class RegisterPage : public Page {
   void held_changed();
   /// Of the CT of a model.
   void slices_wanted(std::size_t model);
+  void landmarks_wanted(std::size_t model);
 
  protected:
   void resizeEvent(QResizeEvent* event) override;
@@ -34,19 +36,26 @@ class RegisterPage : public Page {
  private:
   void add_hand();
   void show_slices();
+  /// The one chosen, before a registration in the table; else the first.
+  std::size_t chosen_model() const;
+  void allow_landmarks(const ApplicationState& state);
   /// The field's part of the chosen model's step from its registered pose.
   void nudge(std::size_t field, double value);
   void leave_as_registered();
+  /// To one of the chosen model's pictures.
+  void move_to(std::size_t pose);
+  void show_pictures(const ApplicationState& state);
   void list_models(const ApplicationState& state);
   void show_hand(const ApplicationState& state);
   QString words_of(const ApplicationState& state) const;
 
-  QPushButton *register_, *from_here_, *ct_;
+  QPushButton *register_, *from_here_, *ct_, *in_model_, *confirm_;
   QLabel* says_;
   PageTable *models_, *tunnels_, *points_, *measures_;
   QLabel* slices_;  ///< of the selected tunnel, or the first
   std::vector<case_registration::RegisteredModel> listed_;
   std::pair<int, int> drawn_{-1, 0};  ///< row, and width of the page, of the slices that are shown
+  PosePictures* pictures_;
   QWidget* hand_;
   QComboBox* model_;
   std::array<PoseBox*, 6> by_{};  ///< mm, then degrees

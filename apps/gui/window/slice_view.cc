@@ -164,12 +164,21 @@ void SliceView::paintEvent(QPaintEvent*) {
   painter.setRenderHint(QPainter::Antialiasing);
   const Eigen::Affine3d voxel_from_patient = scene_.ct->patient_from_voxel.inverse();
   constexpr double near_voxels = 2;
-  for (const CtTunnel& tunnel : scene_.tunnels) {
+  for (const CtTunnel& tunnel : scene_.plan.tunnels) {
     const Eigen::Vector3d start = voxel_from_patient * tunnel.start, end = voxel_from_patient * tunnel.end;
     painter.setPen(QPen(ink::tunnel, 2, Qt::DashLine));  // projected onto the slice
     painter.drawLine(place_of(start), place_of(end));
+    if (tunnel.approach) {
+      painter.setPen(QPen(ink::tunnel, 1, Qt::DotLine));
+      painter.drawLine(place_of(voxel_from_patient * tunnel.approach->first),
+                       place_of(voxel_from_patient * tunnel.approach->second));
+    }
     outlined_text(painter, place_of(end) + QPointF(6, -6), text(tunnel.name), ink::tunnel);
   }
+  painter.setPen(QPen(ink::tool, 2));
+  for (std::size_t i = 1; i < scene_.plan.path.size(); ++i)
+    painter.drawLine(place_of(voxel_from_patient * scene_.plan.path[i - 1]),
+                     place_of(voxel_from_patient * scene_.plan.path[i]));
   for (const auto& [name, seed] : scene_.seeds) {
     const bool is_near = std::abs(seed[axis_] - scene_.cursor[axis_]) <= near_voxels;
     if (!is_near) continue;

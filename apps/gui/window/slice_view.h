@@ -3,6 +3,7 @@
 
 #include <QWidget>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "helicarm/volume/volume.h"
@@ -13,6 +14,13 @@ namespace helicarm::gui {
 struct CtTunnel {
   std::string name;
   Eigen::Vector3d start, end;
+  std::optional<std::pair<Eigen::Vector3d, Eigen::Vector3d>> approach = {};  ///< on its axis, to the bone
+};
+
+/// What is planned in a CT.
+struct CtPlan {
+  std::vector<CtTunnel> tunnels;
+  std::vector<Eigen::Vector3d> path = {};  ///< of the tool's tip, patient frame, mm
 };
 
 /// What slices of a CT show; places are voxels.
@@ -20,7 +28,7 @@ struct CtScene {
   std::shared_ptr<const volume::Volume> ct;
   std::shared_ptr<const std::vector<std::uint8_t>> labels;  ///< of the bones; null: none found yet
   std::vector<std::pair<QString, Eigen::Vector3d>> seeds;
-  std::vector<CtTunnel> tunnels;
+  CtPlan plan;
   Eigen::Vector3d cursor = Eigen::Vector3d::Zero();
   double low_hu = -200, high_hu = 1200;
 };

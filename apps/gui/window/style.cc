@@ -53,7 +53,7 @@ constexpr const char* rules = R"(
     QLabel[class="recording"] { color: @red; }
     QPushButton { background: @raised; border: 1px solid @line; border-radius: 5px; padding: 7px 12px; }
     QPushButton:hover { background: @pressed; }
-    QPushButton:checked { background: @chosen; }
+    QPushButton:checked, QToolButton:checked { background: @chosen; }
     QPushButton:focus { border: 2px solid @text; }
     QPushButton:disabled { color: @disabled; background: @panel; }
     QPushButton[class="hold"] { border: 1px solid @amber; }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <QDoubleSpinBox>
+#include <QToolButton>
 
 #include "gui/controller/case_with_model_test.h"
 #include "gui/window/plan_tables.h"
@@ -91,6 +92,42 @@ TEST_F(Window, AModelIsRegisteredAndMovedByHand) {
   ends->setCurrentItem(found[0]);
   EXPECT_FALSE(find("deletePick")->isEnabled());  // it is not picked
   screenshot("plan-of-model");
+}
+
+TEST_F(Window, AModelThatIsRefusedOffersItsBestPosesAsPictures) {
+  write_case_with_model(folder_ / "case");
+  std::string ct = to_nrrd(bone_in_tissue());
+  const std::string along = "space directions: (1.2,", mirrored = "space directions: (-1.2,";
+  ct.replace(ct.find(along), along.size(), mirrored);
+  ASSERT_TRUE(write_file(folder_ / "case/ct.nrrd", ct));
+  Json json = read_json(folder_ / "case/case.json").value();
+  json["models"][0].erase("start");
+  json["models"][0].erase("plan");
+  ASSERT_TRUE(write_file(folder_ / "case/case.json", to_text(json)));
+  window_->open_paths({folder_ / "case"});
+  ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
+  EXPECT_FALSE(find<QWidget>("posePictures")->isVisible());
+  click("registerModels");
+  ASSERT_TRUE(wait("the search has ended", [&] { return state().registration && !state().busy; }));
+  const registration::Registration found = state().registration->models[0].registration;
+  ASSERT_TRUE(found.failure);
+  ASSERT_FALSE(found.alternatives.empty());
+  EXPECT_TRUE(find<QWidget>("posePictures")->isVisible());
+  EXPECT_TRUE(find<QToolButton>("pose0")->isChecked());
+  screenshot("register-alternatives");
+  screenshot("register-alternatives-pictures", find<QWidget>("posePictures"));
+  find<QToolButton>("pose1")->click();
+  ASSERT_TRUE(state().nudged);
+  EXPECT_LT(
+      (state().nudged->world_from_model.matrix() - found.alternatives[0].world_from_model.matrix()).norm(),
+      1e-9);
+  EXPECT_TRUE(find<QToolButton>("pose1")->isChecked());
+  EXPECT_FALSE(find<QToolButton>("pose0")->isChecked());
+  EXPECT_TRUE(find("registerFromHere")->isEnabled());
+  find<QDoubleSpinBox>("shiftX")->setValue(find<QDoubleSpinBox>("shiftX")->value() + 1);
+  EXPECT_FALSE(find<QToolButton>("pose1")->isChecked());
+  find<QToolButton>("pose0")->click();
+  EXPECT_FALSE(state().nudged);
 }
 
 TEST_F(Window, ACaseWithoutModelsHasNoRegisterStep) {

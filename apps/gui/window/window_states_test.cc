@@ -6,6 +6,7 @@
 #include <QScrollArea>
 
 #include "gui/controller/case_with_model_test.h"
+#include "gui/controller/model_landmarks.h"
 #include "gui/controller/stale.h"
 #include "gui/window/plan_tables.h"
 #include "gui/window/window_test.h"
@@ -127,6 +128,11 @@ class WindowStates : public Window, public testing::WithParamInterface<InputChan
       pick.uv_raw.x() += 2;
       return window_->controller().pick(pick);
     }
+    if (name == "LandmarkMovedInTheModel") {
+      pipeline::PointInModel landmark = state().model_landmarks.at(0).at(0);
+      landmark.in_model.x() += 1;
+      return window_->controller().place_landmarks(0, {landmark});
+    }
     if (name == "AnotherLayerShown") return window_->xrays().set_layer(Layer::raw);
     FAIL() << name;
   }
@@ -228,6 +234,7 @@ class WindowStates : public Window, public testing::WithParamInterface<InputChan
   void expect_as_measured_afresh() {
     pipeline::Case the_case = pipeline::read_case(folder_ / "case").value();
     the_case.picks = state().picks;
+    start_from_landmarks(the_case, state().model_landmarks, std::nullopt);
     const auto lacks = [&](const std::string& end) {
       return std::ranges::find(the_case.picks, end, &pipeline::Pick::name) == the_case.picks.end();
     };
@@ -301,6 +308,7 @@ INSTANTIATE_TEST_SUITE_P(Table, WindowStates,
                              InputChange{"AnotherLayerShown", "- - - . - . -", false},
                              InputChange{"ModelMovedByHand", "- - - S S . .", true},
                              InputChange{"LandmarkMoved", "- - - S S . S", true},
+                             InputChange{"LandmarkMovedInTheModel", "- - - S S . .", true},
                              InputChange{"ModelFileChanged", "S S S S S S S", true},
                              InputChange{"CalibratorChanged", "S S S S S S S", true},
                              InputChange{"SettingsChanged", "- S S S S S S", true}),

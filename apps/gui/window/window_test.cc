@@ -3,6 +3,7 @@
 
 #include <QStandardPaths>
 
+#include "gui/window/bones_window.h"
 #include "gui/window/flat_memory.h"
 #include "gui/window/style.h"
 
@@ -118,6 +119,74 @@ TEST_F(WholeOperation, CompletesAllSixStepsByMouseAndKeyboard) {
   ASSERT_NO_FATAL_FAILURE(expect_export_and_replay());
   open_rehearsal();
   EXPECT_FALSE(window_->recorded()) << "a tool of previous images";
+}
+
+TEST_F(WholeOperation, ReachesATunnelThatWasPlannedInTheCt) {
+  open_rehearsal({.by_ct = true});
+  shoot_both();
+  EXPECT_TRUE(window_->strip().button(Phase::registration)->isChecked());  // opens there
+  auto* confirm = find("confirmRegistration");
+  EXPECT_TRUE(confirm->isVisible());
+  EXPECT_FALSE(confirm->isEnabled());
+  click("registerModels");
+  ASSERT_TRUE(wait("the models are registered", [&] { return state().registration && !state().busy; }));
+  EXPECT_EQ(card(Phase::registration).status, StepStatus::waiting);
+  EXPECT_TRUE(confirm->isEnabled());
+  screenshot("ct-register");
+  ASSERT_NO_FATAL_FAILURE(register_robot());
+  EXPECT_FALSE(find("planWay")->isEnabled());
+  EXPECT_THAT(find<QLabel>("robotSays")->text().toStdString(), HasSubstr("confirm their outlines"));
+  click("confirmRegistration");
+  ASSERT_TRUE(wait("the registration is confirmed", [&] { return state().is_confirmed && !state().busy; }));
+  EXPECT_NE(card(Phase::registration).status, StepStatus::waiting);
+  EXPECT_FALSE(confirm->isEnabled());
+  ASSERT_NO_FATAL_FAILURE(move_to_each_tunnel());
+  EXPECT_EQ(card(Phase::navigate).status, StepStatus::good);
+  ASSERT_NO_FATAL_FAILURE(expect_outcomes_as_measured());
+  click("ctSlices");
+  ASSERT_TRUE(wait("the CT is shown", [&] {
+    auto* bones = window_->findChild<BonesWindow*>("bones");
+    return bones && bones->scene().ct;
+  }));
+  const CtScene& scene = window_->findChild<BonesWindow*>("bones")->scene();
+  ASSERT_EQ(scene.plan.tunnels.size(), 1U);
+  ASSERT_TRUE(scene.plan.tunnels[0].approach);
+  screenshot("ct-slices", window_->findChild<QDialog*>("bones"));
+  ASSERT_NO_FATAL_FAILURE(expect_export_and_replay());
+}
+
+TEST_F(Window, ADrillInTheHandIsGuidedAndTheTunnelVerified) {
+  open_rehearsal({.by_hand = true});
+  EXPECT_FALSE(find<HoldButton>("unlock")->isVisibleTo(find<QWidget>("pages")));
+  shoot_both();
+  window_->controller().take_offered_picks();
+  ASSERT_TRUE(
+      wait("the picks are located", [&] { return state().result->points.size() > 3 && !state().busy; }));
+  QTest::mouseClick(window_->strip().button(Phase::navigate), Qt::LeftButton);
+  find<QComboBox>("tunnel")->setCurrentText("femur");
+  auto* target = find<DrillTarget>("drillTarget");
+  EXPECT_EQ(target->words(), "not guided");
+  EXPECT_FALSE(find("verifyDrilled")->isEnabled());
+  const auto is_at_the_end = [&] {
+    return live().drill && live().drill->aim && live().drill->aim->depth_mm >= live().drill->aim->length_mm;
+  };
+  for (int left = most_attempts; left > 0 && state().outcomes.empty(); --left) {
+    click("guideDrill");
+    ASSERT_TRUE(wait("the drill is shown", [&] { return live().drill || !state().busy; }));
+    screenshot("drill-guided");
+    ASSERT_TRUE(wait("the drill is at the tunnel's end", [&] { return is_at_the_end() || !state().busy; }));
+    if (!state().busy) continue;
+    EXPECT_THAT(target->words().toStdString(), HasSubstr("mm off axis"));
+    click("verifyDrilled");
+    ASSERT_TRUE(wait("the tunnel is verified or refused",
+                     [&] { return !state().busy || state().refusals.contains(Phase::navigate); }));
+    if (state().busy) click("endGuidance");
+    ASSERT_TRUE(wait_idle());
+  }
+  ASSERT_TRUE(state().outcomes.contains("femur"));
+  EXPECT_EQ(target->words(), "not guided");
+  EXPECT_THAT(card(Phase::navigate).figure.toStdString(), HasSubstr("1 of 2 tunnels"));
+  screenshot("drill-verified");
 }
 
 TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {

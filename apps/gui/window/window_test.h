@@ -228,8 +228,8 @@ class Window : public testing::Test {
       (of ? of : window_.get())->grab().save(QString("%1/%2.png").arg(place, name));
   }
 
-  void open_rehearsal() {
-    window_->open_rehearsal();
+  void open_rehearsal(const MainWindow::RehearsalKind& kind = {}) {
+    window_->open_rehearsal(kind);
     ASSERT_TRUE(
         wait("the rehearsal is open", [&] { return state().source == Source::virtual_or && !state().busy; }));
   }

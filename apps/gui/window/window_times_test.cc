@@ -49,7 +49,7 @@ TEST_F(Window, ReportsItsTimes) {
   fresh.show();
   ASSERT_TRUE(QTest::qWaitForWindowExposed(&fresh));
   std::printf("window on the screen after %lld ms\n", since.elapsed());
-  fresh.open_rehearsal();
+  fresh.open_rehearsal({});
   ASSERT_TRUE(
       wait("the rehearsal is open", [&] { return fresh.controller().state().source == Source::virtual_or; }));
   std::printf("rehearsal ready after %lld ms\n", since.elapsed());

@@ -15,11 +15,7 @@
 
 namespace helicarm::gui {
 
-NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
-    : Page(tr("Nothing moves unless you hold a yellow button until it is full; one hold starts all its "
-              "moves. Space "
-              "bar: stop."),
-           controller, parent) {
+NavigatePage::NavigatePage(Controller& controller, QWidget* parent) : Page({}, controller, parent) {
   says_ = new QLabel;
   says_->setObjectName("robotSays");
   says_->setWordWrap(true);
@@ -33,8 +29,10 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
   tunnel_->setObjectName("tunnel");
   tunnel_->setAccessibleName(tr("Tunnel"));
   layout()->addWidget(tunnel_);
-  connect(tunnel_, &QComboBox::currentTextChanged, this,
-          [this](const QString& name) { controller_.follow(name.toStdString()); });
+  connect(tunnel_, &QComboBox::currentTextChanged, this, [this](const QString& name) {
+    controller_.follow(name.toStdString());
+    allow();
+  });
   plan_ = add_button(tr("3  &Plan the path and show it in both images"), "planWay",
                      [this] { controller_.plan_order(tunnel_->currentText().toStdString()); });
   go_ = add_hold(tr("4  &Move to the tunnel"), "go", [this] { controller_.go(); });
@@ -42,13 +40,31 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
   auto* ends = new QHBoxLayout;  // in one row: on a small screen all buttons are in sight
   for (QWidget* button : {go_, withdraw_}) ends->addWidget(button, 1);
   static_cast<QVBoxLayout*>(layout())->addLayout(ends);
+  add_drill();
   for (HoldButton* button : {unlock_, register_, go_, withdraw_})
     connect(button, &HoldButton::released, this, &NavigatePage::tell);
   tell_why_last();  // the buttons stay where they are
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
+void NavigatePage::add_drill() {
+  target_ = new DrillTarget;
+  target_->setObjectName("drillTarget");
+  layout()->addWidget(target_);
+  guide_ = add_button(tr("&Guide the drill to the tunnel"), "guideDrill",
+                      [this] { controller_.guide_drill(tunnel_->currentText().toStdString()); });
+  verify_ = add_button(tr("The drill is in the drilled tunnel: &verify it"), "verifyDrilled",
+                       [this] { controller_.verify_drilled(); });
+  verify_->setToolTip(tr("Hold the drill still in the tunnel meanwhile"));
+  end_ = add_button(tr("&End the guidance"), "endGuidance", [this] { controller_.end_guidance(); });
+}
+
 void NavigatePage::show_state(const ApplicationState& state) {
+  findChild<QLabel*>("lead")->setText(
+      state.drill
+          ? tr("Shows a drill in the hand against its tunnel, at the bone's present pose.")
+          : tr("Nothing moves unless you hold a yellow button until it is full; one hold starts all its "
+               "moves. Space bar: stop."));
   QStringList names;
   for (const operation::OperationTunnel& tunnel : state.tunnels) names << text(tunnel.name);
   QStringList shown;
@@ -61,6 +77,7 @@ void NavigatePage::show_state(const ApplicationState& state) {
 }
 
 void NavigatePage::show_live(const LiveState& live) {
+  if (const auto& drill = controller_.state().drill) return target_->show_guidance(live.drill, *drill);
   const auto coarse = [](const std::optional<operation::TunnelAim>& aim) {
     return aim ? std::round(10 * aim->distance_mm) : -1;
   };
@@ -84,13 +101,46 @@ QString NavigatePage::where_the_tool_is() const {
       .arg(tunnel, off);
 }
 
+const operation::OperationTunnel* NavigatePage::chosen() const {
+  const auto& tunnels = controller_.state().tunnels;
+  const auto tunnel =
+      std::ranges::find(tunnels, tunnel_->currentText().toStdString(), &operation::OperationTunnel::name);
+  return tunnel == tunnels.end() ? nullptr : &*tunnel;
+}
+
+QString NavigatePage::next_by_hand() const {
+  const ApplicationState& state = controller_.state();
+  const auto refusal = state.refusals.find(Phase::navigate);
+  const QString refused = refusal == state.refusals.end() ? QString() : sentence_of(refusal->second) + ". ";
+  if (state.busy == Phase::navigate)
+    return refused +
+           tr("Bring the drill to the middle and drill while it is on target. At the tunnel's end hold "
+              "it still and verify it.");
+  if (state.busy) return text(state.doing);
+  if (!state.measured) return tr("Acquire the X-ray images first (Alt+1).");
+  if (const QString lacks = what_lacks(); !lacks.isEmpty()) return lacks;
+  return refused + tr("Select a tunnel and begin the guidance.");
+}
+
+/// Before a path to the chosen tunnel, or guidance.
+QString NavigatePage::what_lacks() const {
+  const ApplicationState& state = controller_.state();
+  if (next_pick(state)) return tr("Place the tunnels' ends first (Alt+4).");
+  if (const auto* tunnel = chosen(); tunnel && tunnel->of_model && !may_guide(state, *tunnel))
+    return state.nudged ? tr("A model is moved by hand: register it there, or set its fields to 0 (Alt+7).")
+                        : tr("Register the models and confirm their outlines first (Alt+7).");
+  if (const auto refusal = state.refusals.find(Phase::plan); refusal != state.refusals.end())
+    return sentence_of(refusal->second) + tr(". Pick its ends again (Alt+4).");
+  return {};
+}
+
 QString NavigatePage::next_step() const {
   const ApplicationState& state = controller_.state();
-  if (state.source != Source::virtual_or && state.source != Source::devices)
-    return state.registration ? tr("Images from files: no robot is connected. Tunnels of a model's plan "
-                                   "cannot be given to a robot "
-                                   "here; export them (Alt+6).")
+  if (!is_operation(state))
+    return state.registration ? tr("Images from files: no robot is connected. Export the tunnels (Alt+6), or "
+                                   "connect the devices of a plan that names the models.")
                               : tr("Images from files: no robot is connected.");
+  if (state.drill) return next_by_hand();
   if (state.busy) return text(state.doing);
   const QString why = why_ ? sentence_of(*why_) + ". " : QString();
   switch (phase_) {
@@ -111,9 +161,7 @@ QString NavigatePage::next_step() const {
   if (state.order) return tr("Inspect the path in both X-ray images, then hold button 4. %1").arg(state.way);
   if (!state.measured) return tr("Acquire the X-ray images first (Alt+1).");
   if (!state.hand_eye_rms_mm) return tr("Hold button 2 to register the robot. %1").arg(state.tour);
-  if (next_pick(state)) return tr("Place the tunnels' ends first (Alt+4).");
-  if (const auto refusal = state.refusals.find(Phase::plan); refusal != state.refusals.end())
-    return sentence_of(refusal->second) + tr(". Pick its ends again (Alt+4).");
+  if (const QString lacks = what_lacks(); !lacks.isEmpty()) return lacks;
   if (const auto refusal = state.refusals.find(Phase::navigate);
       refusal != state.refusals.end() && refusal->second.reason == Reason::plan_stale)
     return sentence_of(refusal->second) +
@@ -123,15 +171,26 @@ QString NavigatePage::next_step() const {
 
 void NavigatePage::allow() {
   const ApplicationState& state = controller_.state();
-  const bool free = !state.busy && (state.source == Source::virtual_or || state.source == Source::devices);
+  const bool free = !state.busy && is_operation(state);
   const bool ready = free && phase_ == robot::LinkPhase::ready;
-  const bool placed = state.measured && !next_pick(state) && !state.refusals.contains(Phase::plan);
+  const operation::OperationTunnel* tunnel = chosen();
+  const bool placed = state.measured && !next_pick(state) && !state.refusals.contains(Phase::plan) &&
+                      tunnel && may_guide(state, *tunnel);
   tell();
   unlock_->setEnabled(free && (phase_ == robot::LinkPhase::idle || phase_ == robot::LinkPhase::stopped));
   register_->setEnabled(ready && !state.tool_is_out);
   plan_->setEnabled(ready && placed && state.hand_eye_rms_mm && !state.tool_is_out);
   go_->setEnabled(ready && state.order.has_value());
   withdraw_->setEnabled(ready && state.tool_is_out);
+  for (QWidget* of_robot : std::initializer_list<QWidget*>{unlock_, register_, plan_, go_, withdraw_})
+    of_robot->setVisible(!state.drill);
+  for (QWidget* of_hand : std::initializer_list<QWidget*>{target_, guide_, verify_, end_})
+    of_hand->setVisible(state.drill.has_value());
+  const bool is_guided = state.drill && state.busy == Phase::navigate;
+  guide_->setEnabled(free && placed);
+  verify_->setEnabled(is_guided);
+  end_->setEnabled(is_guided);
+  tunnel_->setEnabled(!is_guided);
 }
 
 bool NavigatePage::is_held() const {

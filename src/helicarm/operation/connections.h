@@ -59,6 +59,8 @@ class Connections {
   const tracker::PoseBoard& board() const { return board_; }
   /// Throws BadInput (usage) for a plan with a hand-held drill.
   robot::RobotLink& robot();
+  /// Null for a plan with a hand-held drill.
+  robot::RobotLink* robot_if_any() { return robot_.get(); }
   /// State before `listen`: no image received.
   CArmStatus c_arm() const;
 

@@ -10,6 +10,7 @@
 
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/localization/error_bound.h"
+#include "helicarm/registration/causes.h"
 #include "helicarm/registration/checks.h"
 #include "helicarm/registration/covariance.h"
 #include "helicarm/registration/mirror.h"
@@ -35,7 +36,8 @@ constexpr double voxel_edge_sigma = 0.2;
 // changing thickness) shifts edges over longer ways than residuals show. Without it chi-square of simulated
 // wrist bones' poses was up to 30 for 6 degrees of freedom.
 constexpr double voxel_residual_inflation = 3;
-constexpr double alone_prior_mm = 10;  // keeps a single view from running along its rays
+constexpr double part_shift_mm = 8, part_turn_deg = 10;  // searched for the parts of a refused model
+constexpr double alone_prior_mm = 10;                    // keeps a single view from running along its rays
 
 /// Levels from coarse to fine for this model and these views.
 std::vector<SearchStage> stages_for(const RegistrationProblem& scene, const Vector3d& at) {
@@ -343,10 +345,9 @@ Registration registered_anywhere(const Model& model, const std::vector<Registrat
   return found;
 }
 
-}  // namespace
-
-Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
-                            const std::vector<RigidTransform>& starts, const RegistrationOptions& options) {
+Registration registered_or_refused(const Model& model, const std::vector<RegistrationView>& views,
+                                   const std::vector<RigidTransform>& starts,
+                                   const RegistrationOptions& options) {
   if (starts.empty()) return registered_anywhere(model, views, starts, options);
   Registration result = registered(model, views, starts, options, starts, false);
   if (views.size() < 2 || options.search.candidates == 0 || !options.search.anywhere_after_refusal ||
@@ -363,6 +364,34 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
     nearest = std::min(nearest, separation(model, start, wider.world_from_model));
   wider.notes.push_back(found_anywhere(result, wider, nearest));
   return wider;
+}
+
+/// A part of a refused model about a pose near it, for `causes_of`. From a shaft's piece a wider search ends
+/// elsewhere along the bone.
+Registration registered_part(const Model& part, const std::vector<RegistrationView>& views,
+                             const RigidTransform& start, const RegistrationOptions& options) {
+  RegistrationOptions own = options;
+  own.search.shift_mm = part_shift_mm;
+  own.search.turn_deg = part_turn_deg;
+  own.max_error_mm = std::nullopt;
+  own.on_step = {};
+  return registered(part, views, {start}, own, Poses{start}, false);
+}
+
+}  // namespace
+
+Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
+                            const std::vector<RigidTransform>& starts, const RegistrationOptions& options) {
+  Registration result = registered_or_refused(model, views, starts, options);
+  RegisterPart register_part;
+  // A refusal after which the caller searches on needs no cause yet.
+  if (options.search.candidates > 0 && options.search.anywhere_after_refusal)
+    register_part = [&](const Model& part, const RigidTransform& start) {
+      return registered_part(part, views, start, options);
+    };
+  for (Warning& cause : causes_of(model, views, result, register_part))
+    result.notes.push_back(std::move(cause));
+  return result;
 }
 
 }  // namespace helicarm::registration

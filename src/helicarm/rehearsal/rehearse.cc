@@ -172,9 +172,9 @@ struct Stage {
   std::unique_ptr<operation::Operation> operation;
 };
 
-/// A person who turns and shifts the drill by half of what is shown, and advances while on target.
+/// Until the tunnel's end.
 void drill_by_guidance(operation::Operation& operation, virtual_devices::HeldDrill& drill) {
-  constexpr double look_s = 0.1, part = 0.5, advance_mm = 1.5;
+  constexpr double look_s = 0.1;
   const auto until = std::chrono::steady_clock::now() + drilling_patience;
   for (;;) {
     const operation::Guidance shown = value_or_throw(operation.guidance());
@@ -182,13 +182,7 @@ void drill_by_guidance(operation::Operation& operation, virtual_devices::HeldDri
     if (std::chrono::steady_clock::now() > until)
       throw BadInput(Reason::off_target, fmt::format("the tunnel was not drilled in {} s; last decision: {}",
                                                      drilling_patience.count(), shown.decision()));
-    if (const auto& aim = shown.aim) {
-      const Eigen::AngleAxisd turn(geometry::rotation_between(Eigen::Vector3d::UnitZ(), aim->axis));
-      const double way_mm = shown.why_not ? 0 : advance_mm;
-      drill.correct({Eigen::AngleAxisd(part * turn.angle(), turn.axis()).toRotationMatrix(),
-                     part * aim->to_axis_mm + way_mm * aim->axis},
-                    look_s);
-    }
+    follow_guidance(shown, drill, look_s);
     std::this_thread::sleep_for(std::chrono::duration<double>(look_s));
   }
 }
@@ -202,6 +196,22 @@ void conduct(operation::Operation& operation, const Work& work) {
 }
 
 }  // namespace
+
+void follow_guidance(const operation::Guidance& shown, virtual_devices::HeldDrill& drill, double seconds) {
+  constexpr double part = 0.5, advance_mm = 1.5;
+  if (!shown.aim) return;
+  const operation::TunnelAim& aim = *shown.aim;
+  const Eigen::AngleAxisd turn(geometry::rotation_between(Eigen::Vector3d::UnitZ(), aim.axis));
+  const double way_mm = shown.why_not || aim.depth_mm >= aim.length_mm ? 0 : advance_mm;
+  drill.correct({Eigen::AngleAxisd(part * turn.angle(), turn.axis()).toRotationMatrix(),
+                 part * aim.to_axis_mm + way_mm * aim.axis},
+                seconds);
+}
+
+void raise_drill(const guidance::Bone& bone, virtual_devices::HeldDrill& drill) {
+  drill.move(bone, drill.on_tunnel(bone, -40, 4, 5), raise_s);
+  std::this_thread::sleep_for(std::chrono::duration<double>(raise_s) + before_exposure);
+}
 
 operation::OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t tracker_port) {
   operation::OperationPlan plan;
@@ -281,8 +291,7 @@ Expected<Rehearsal> rehearse_freehand(std::uint64_t seed, const std::filesystem:
     Rehearsal done{seed, {}};
     conduct(operation, [&] {
       for (const operation::OperationTunnel& tunnel : operation.plan().tunnels) {
-        drill.move(tunnel.bone, drill.on_tunnel(tunnel.bone, -40, 4, 5), raise_s);
-        std::this_thread::sleep_for(std::chrono::duration<double>(raise_s) + before_exposure);
+        raise_drill(tunnel.bone, drill);
         value_or_throw(operation.guide(tunnel.name));
         drill_by_guidance(operation, drill);
         add_ends(done, tunnel, value_or_throw(operation.verify_drilled(tunnel.name)), *stage.virtual_or);

@@ -41,6 +41,13 @@ struct Rehearsal {
   int replans = 0;      ///< orders planned and confirmed again after a late pose, state or heartbeat
 };
 
+/// A virtual person turns and shifts the drill by half of what is shown, and advances it while it is on
+/// target and before the tunnel's end. The hand moves for `seconds`.
+void follow_guidance(const operation::Guidance& shown, virtual_devices::HeldDrill& drill, double seconds);
+/// The same person brings the drill before the tunnel of a bone, 4 mm and 5 degrees off its axis, and waits
+/// until the tracker has seen it at rest.
+void raise_drill(const guidance::Bone& bone, virtual_devices::HeldDrill& drill);
+
 /// The plan for an operation with the virtual devices; the picks lie near the balls, as a surgeon's clicks
 /// would.
 operation::OperationPlan plan_for(virtual_devices::VirtualDevices& virtual_or, std::uint16_t tracker_port);

@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/controller/model_landmarks.h"
+
+#include <QCoreApplication>
+#include <algorithm>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "helicarm/case_registration/plan.h"
+#include "helicarm/case_registration/register_case.h"
+#include "helicarm/core/csv.h"
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+#include "helicarm/registration/landmarks.h"
+
+namespace helicarm::gui {
+namespace fs = std::filesystem;
+using pipeline::CaseModel;
+using pipeline::PointInModel;
+
+namespace {
+
+using Points = std::vector<PointInModel>;
+
+QString landmark_tr(const char* words) { return QCoreApplication::translate("Landmarks", words); }
+
+QString in_words(const std::string& name) { return QString::fromStdString(name); }
+
+bool are_same_points(const Points& a, const Points& b) {
+  return std::ranges::equal(a, b, [](const PointInModel& one, const PointInModel& other) {
+    return one.name == other.name && one.in_model == other.in_model;
+  });
+}
+
+fs::path unsaved_landmarks_file(const fs::path& case_folder) {
+  return case_folder / "unsaved_landmarks.json";
+}
+
+const Points& of_model(const ModelLandmarks& landmarks, std::size_t model) {
+  static const Points none;
+  return model < landmarks.size() ? landmarks[model] : none;
+}
+
+constexpr Range place_range{-1e5, 1e5};  // mm, wider than every scanner's coordinates
+constexpr int least_views = 2;           // whose rays meet in a point
+
+/// The landmarks of one model of unsaved_landmarks.json.
+Points points_from(JsonReader& model) {
+  Points points;
+  for (JsonReader& point : model.objects("landmarks", true)) {
+    PointInModel read;
+    read.name = point.text("name");
+    const std::vector<double> at = point.numbers("in_model", 3, place_range);
+    read.in_model = {at[0], at[1], at[2]};
+    point.finish();
+    if (std::ranges::find(points, read.name, &PointInModel::name) != points.end())
+      point.refuse(Reason::name_clash, "name", fmt::format("\"{}\" is given twice", read.name));
+    points.push_back(std::move(read));
+  }
+  return points;
+}
+
+/// Models that the case does not name any more are left out.
+ModelLandmarks with_unsaved(const Json& json, const std::vector<CaseModel>& models,
+                            ModelLandmarks landmarks) {
+  JsonReader reader(json, "unsaved_landmarks.json");
+  for (JsonReader& model : reader.objects("models", true)) {
+    const std::string name = model.text("name");
+    Points points = points_from(model);
+    model.finish();
+    const auto same = std::ranges::find(models, name, &CaseModel::name);
+    if (same != models.end()) landmarks[std::size_t(same - models.begin())] = std::move(points);
+  }
+  reader.finish();
+  return landmarks;
+}
+
+/// NAME-landmarks.csv with the characters of a portable file name, numbered where another file has it.
+std::string csv_name(const fs::path& case_folder, std::string name, const Json& model) {
+  for (char& c : name) {
+    const bool is_good =
+        (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+    if (!is_good) c = '_';
+  }
+  constexpr std::size_t longest = 64;
+  name.resize(std::min(name.size(), longest));
+  const auto is_start = [&](const std::string& file) {
+    return model.contains("start") && model["start"].is_object() &&
+           model["start"].value("landmarks", Json()) == Json(file);
+  };
+  std::string file = name + "-landmarks.csv";
+  for (int number = 2; fs::exists(case_folder / file) && !is_start(file); ++number)
+    file = fmt::format("{}-landmarks-{}.csv", name, number);
+  return file;
+}
+
+std::string to_csv(const Points& landmarks) {
+  std::string csv = "name,x_mm,y_mm,z_mm\n";
+  for (const PointInModel& point : landmarks)  // the shortest digits that give the same number
+    csv += fmt::format("{},{},{},{}\n", csv_field(point.name), point.in_model.x(), point.in_model.y(),
+                       point.in_model.z());
+  return csv;
+}
+
+/// The element of case.json's "models" of this name.
+Json& model_in(Json& json, const std::string& name) {
+  if (json.is_object() && json.contains("models") && json["models"].is_array())
+    for (Json& model : json["models"])
+      if (model.is_object() && model.value("name", Json()) == Json(name)) return model;
+  throw BadInput(Reason::bad_value, fmt::format("case.json: \"models\" names no \"{}\" any more", name));
+}
+
+/// Names the file as the model's start. Returns what the user is told of it.
+QString name_as_start(Json& model, const std::string& name, const std::string& file) {
+  const bool had_pose = model.contains("start") && model["start"].is_object() &&
+                        model["start"].contains("world_from_model") &&
+                        !model["start"]["world_from_model"].is_null();
+  model["start"] = Json{{"landmarks", file}};
+  return (had_pose ? landmark_tr("The landmarks of %1 are saved in %2; they replace its \"world_from_model\" "
+                                 "as the start.")
+                   : landmark_tr("The landmarks of %1 are saved in %2, its start."))
+      .arg(in_words(name), in_words(file));
+}
+
+QString not_saved_words(const std::string& name, std::size_t usable) {
+  return landmark_tr(
+             "The landmarks of %1 are not its start yet, since %2 of them are picked in two X-ray "
+             "images, of %3 at least; they are kept in unsaved_landmarks.json.")
+      .arg(in_words(name))
+      .arg(usable)
+      .arg(registration::least_landmarks);
+}
+
+bool is_end_or_target(const ApplicationState& state, const std::string& name) {
+  return std::ranges::any_of(state.tunnels,
+                             [&](const operation::OperationTunnel& tunnel) {
+                               return tunnel.start == name || tunnel.end == name;
+                             }) ||
+         std::ranges::find(state.calibrator.targets, name, &phantom::CalibratorTarget::name) !=
+             state.calibrator.targets.end();
+}
+
+bool has_point(const Points& points, const std::string& name) {
+  return std::ranges::find(points, name, &PointInModel::name) != points.end();
+}
+
+}  // namespace
+
+bool are_same(const ModelLandmarks& a, const ModelLandmarks& b) {
+  return std::ranges::equal(a, b, are_same_points);
+}
+
+ModelLandmarks landmarks_of_models(const std::vector<CaseModel>& models) {
+  ModelLandmarks landmarks;
+  for (const CaseModel& model : models)
+    landmarks.push_back(
+        guarded([&] { return case_registration::start_landmarks(model); }).value_or(Points()));
+  return landmarks;
+}
+
+OpenedLandmarks opened_landmarks(const pipeline::Case& the_case, bool keeps) {
+  OpenedLandmarks opened{landmarks_of_models(the_case.models)};
+  const fs::path file = unsaved_landmarks_file(the_case.folder);
+  if (!keeps || the_case.models.empty() || !fs::exists(file)) return opened;
+  auto unsaved = read_json(file).and_then([&](const Json& json) {
+    return guarded([&] { return with_unsaved(json, the_case.models, opened.of_case); });
+  });
+  if (!unsaved)
+    opened.unreadable = std::move(unsaved.error());
+  else if (!are_same(*unsaved, opened.of_case))
+    opened.unsaved = *std::move(unsaved);
+  return opened;
+}
+
+Expected<void> keep_unsaved_landmarks(const fs::path& case_folder, const std::vector<CaseModel>& models,
+                                      const ModelLandmarks& placed, const ModelLandmarks& saved) {
+  const fs::path file = unsaved_landmarks_file(case_folder);
+  Json changed = Json::array();
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    if (are_same_points(of_model(placed, i), of_model(saved, i))) continue;
+    Json points = Json::array();
+    for (const PointInModel& point : of_model(placed, i))
+      points.push_back(
+          {{"name", point.name}, {"in_model", {point.in_model.x(), point.in_model.y(), point.in_model.z()}}});
+    changed.push_back({{"name", models[i].name}, {"landmarks", std::move(points)}});
+  }
+  if (!changed.empty()) return write_file_in_folder(file, to_text({{"models", std::move(changed)}}) + "\n");
+  std::error_code gone;
+  fs::remove(file, gone);
+  return {};
+}
+
+int views_with(const std::vector<pipeline::Pick>& picks, const std::string& point) {
+  std::set<std::string> views;
+  for (const pipeline::Pick& pick : picks)
+    if (pick.name == point) views.insert(pick.view);
+  return int(views.size());
+}
+
+std::size_t count_usable(const Points& landmarks, const std::vector<pipeline::Pick>& picks) {
+  return std::size_t(std::ranges::count_if(
+      landmarks, [&](const PointInModel& point) { return views_with(picks, point.name) >= least_views; }));
+}
+
+Expected<SavedLandmarks> save_landmarks(const fs::path& case_folder, const std::vector<CaseModel>& models,
+                                        const ModelLandmarks& placed, const ModelLandmarks& saved,
+                                        const std::vector<pipeline::Pick>& picks) {
+  return guarded([&] {
+    SavedLandmarks done{saved, {}};
+    done.saved.resize(models.size());
+    const fs::path file = case_folder / "case.json";
+    std::optional<Json> json;
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      const Points& points = of_model(placed, i);
+      if (are_same_points(points, of_model(saved, i))) continue;
+      const std::size_t usable = count_usable(points, picks);
+      if (usable < registration::least_landmarks) {
+        done.told.push_back(not_saved_words(models[i].name, usable));
+        continue;
+      }
+      if (!json) json = value_or_throw(read_json(file));
+      Json& model = model_in(*json, models[i].name);
+      const std::string name = csv_name(case_folder, models[i].name, model);
+      value_or_throw(write_file_in_folder(case_folder / name, to_csv(points)));
+      done.told.push_back(name_as_start(model, models[i].name, name));
+      done.saved[i] = points;
+    }
+    if (json) {
+      value_or_throw(pipeline::case_from_json(*json, "case.json", case_folder));
+      value_or_throw(write_file_in_folder(file, to_text(*json) + "\n"));
+    }
+    value_or_throw(keep_unsaved_landmarks(case_folder, models, placed, done.saved));
+    return done;
+  });
+}
+
+void start_from_landmarks(pipeline::Case& the_case, const ModelLandmarks& placed,
+                          const std::optional<std::size_t>& moved) {
+  if (placed.size() != the_case.models.size()) return;
+  const ModelLandmarks of_case = landmarks_of_models(the_case.models);
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    CaseModel& model = the_case.models[i];
+    if (moved == i || are_same_points(placed[i], of_case[i]) ||
+        count_usable(placed[i], the_case.picks) < registration::least_landmarks)
+      continue;
+    model.placed_landmarks = placed[i];
+    model.world_from_model.reset();
+  }
+}
+
+QString why_no_landmark(const ApplicationState& state, std::size_t model, const std::string& name) {
+  if (name.empty()) return landmark_tr("A landmark needs a name.");
+  for (std::size_t i = 0; i < state.model_landmarks.size(); ++i)
+    if (i != model && has_point(state.model_landmarks[i], name))
+      return landmark_tr("%1 is a landmark of %2 already.")
+          .arg(in_words(name), in_words(i < state.models.size() ? state.models[i] : ""));
+  if (!has_point(of_model(state.model_landmarks, model), name) && is_end_or_target(state, name))
+    return landmark_tr("There is a point of this name already.");
+  return {};
+}
+
+std::string free_landmark_name(const ApplicationState& state, std::size_t model, const std::string& prefix,
+                               int from) {
+  const auto is_taken = [&](const std::string& name) {
+    return !why_no_landmark(state, model, name).isEmpty() ||
+           has_point(of_model(state.model_landmarks, model), name) ||
+           std::ranges::find(state.landmarks, name) != state.landmarks.end() ||
+           views_with(state.picks, name) > 0;
+  };
+  for (int i = from;; ++i)
+    if (const std::string name = fmt::format("{}{}", prefix, i); !is_taken(name)) return name;
+}
+
+QString landmark_start_words(const ApplicationState& state, std::size_t model) {
+  const Points& placed = of_model(state.model_landmarks, model);
+  if (placed.empty() || model >= state.models.size() ||
+      are_same_points(placed, of_model(state.case_landmarks, model)))
+    return {};
+  const std::size_t usable = count_usable(placed, state.picks);
+  const QString name = in_words(state.models[model]);
+  if (usable >= registration::least_landmarks)
+    return landmark_tr("%1 starts from its %2 landmarks that are picked in two X-ray images.")
+        .arg(name)
+        .arg(usable);
+  return landmark_tr(
+             "%1: %2 of its placed landmarks are picked in two X-ray images, %3 more must be; "
+             "until then it starts as case.json states.")
+      .arg(name)
+      .arg(usable)
+      .arg(registration::least_landmarks - usable);
+}
+
+QString with_landmark_words(const QString& words, const ApplicationState& state) {
+  QStringList lines{words};
+  for (std::size_t i = 0; i < state.model_landmarks.size(); ++i)
+    if (const QString start = landmark_start_words(state, i); !start.isEmpty()) lines << start;
+  return lines.join('\n');
+}
+
+std::optional<std::string> landmark_moved_in_model(const ApplicationState& state, std::size_t model) {
+  if (!state.registration || model >= state.registered_landmarks.size()) return std::nullopt;
+  const Points &before = state.registered_landmarks[model], &now = of_model(state.model_landmarks, model);
+  for (const registration::Landmark& used : state.registration->models[model].used_landmarks) {
+    const auto then = std::ranges::find(before, used.name, &PointInModel::name);
+    const auto present = std::ranges::find(now, used.name, &PointInModel::name);
+    if (then == before.end()) continue;  // of another start
+    if (present == now.end() || present->in_model != then->in_model) return used.name;
+  }
+  return std::nullopt;
+}
+
+void ask_for_landmarks(ApplicationState& state) {
+  for (const Points& landmarks : state.model_landmarks) {
+    if (count_usable(landmarks, state.picks) >= registration::least_landmarks) continue;
+    for (const PointInModel& point : landmarks)
+      if (!is_end_or_target(state, point.name) &&
+          std::ranges::find(state.landmarks, point.name) == state.landmarks.end())
+        state.landmarks.push_back(point.name);
+  }
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QString>
+#include <QStringList>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gui/controller/application_state.h"
+
+/// Landmarks that a person places in a case's models. Three of them that are picked in two views each start a
+/// model's registration. Until they are in case.json they are kept in unsaved_landmarks.json beside it.
+namespace helicarm::gui {
+
+bool are_same(const ModelLandmarks& a, const ModelLandmarks& b);
+
+/// Of each model, those of its start; none where their file cannot be read, which the registration refuses.
+ModelLandmarks landmarks_of_models(const std::vector<pipeline::CaseModel>& models);
+
+/// Those of a case that is opened.
+struct OpenedLandmarks {
+  ModelLandmarks of_case;
+  std::optional<ModelLandmarks> unsaved = {};  ///< of all models
+  std::optional<Failure> unreadable = {};      ///< unsaved_landmarks.json
+};
+/// `keeps`: those that were kept are taken.
+OpenedLandmarks opened_landmarks(const pipeline::Case& the_case, bool keeps);
+
+/// Keeps those that differ from the saved ones; removes the file where none does. Fails as `write_file`.
+Expected<void> keep_unsaved_landmarks(const std::filesystem::path& case_folder,
+                                      const std::vector<pipeline::CaseModel>& models,
+                                      const ModelLandmarks& placed, const ModelLandmarks& saved);
+
+/// Whether this many views show picks of the point, by which its rays meet.
+int views_with(const std::vector<pipeline::Pick>& picks, const std::string& point);
+
+/// The landmarks of a model by which its registration can start: those picked in two views or more.
+std::size_t count_usable(const std::vector<pipeline::PointInModel>& landmarks,
+                         const std::vector<pipeline::Pick>& picks);
+
+/// What `save_landmarks` did.
+struct SavedLandmarks {
+  ModelLandmarks saved;  ///< those of case.json now
+  QStringList told;      ///< a sentence for each model that changed
+};
+/// Writes the changed landmarks of each model with three usable ones as NAME-landmarks.csv, then names these
+/// files as the models' starts in case.json. Those of other models stay unsaved, because a start of fewer
+/// landmarks would be refused. Fails as `write_file`, `read_json` and `case_from_json`.
+Expected<SavedLandmarks> save_landmarks(const std::filesystem::path& case_folder,
+                                        const std::vector<pipeline::CaseModel>& models,
+                                        const ModelLandmarks& placed, const ModelLandmarks& saved,
+                                        const std::vector<pipeline::Pick>& picks);
+
+/// Starts each model whose landmarks are not those of the case from the placed ones, if three of them are
+/// usable. `moved`: the model that starts from its pose by hand.
+void start_from_landmarks(pipeline::Case& the_case, const ModelLandmarks& placed,
+                          const std::optional<std::size_t>& moved);
+
+/// Why the point cannot be a landmark of this model; empty if it can, also where the model has it already.
+QString why_no_landmark(const ApplicationState& state, std::size_t model, const std::string& name);
+
+/// The first of L1, L2, ... (with the prefix L), from a number on, that is the name of no point.
+std::string free_landmark_name(const ApplicationState& state, std::size_t model, const std::string& prefix,
+                               int from = 1);
+
+/// What the placed landmarks of a model still lack to start its registration, or that they do; empty without
+/// any that the case does not have.
+QString landmark_start_words(const ApplicationState& state, std::size_t model);
+
+/// The same of all models, a line each, after these words.
+QString with_landmark_words(const QString& words, const ApplicationState& state);
+
+/// A landmark used by a registered model that lies elsewhere in the model since.
+std::optional<std::string> landmark_moved_in_model(const ApplicationState& state, std::size_t model);
+
+/// Adds the landmarks of models that cannot start from them yet to the points to be clicked.
+void ask_for_landmarks(ApplicationState& state);
+
+}  // namespace helicarm::gui

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "helicarm/registration/register_model.h"
+
+namespace helicarm::registration {
+
+/// Registers a part of a model from a pose near it.
+using RegisterPart =
+    std::function<Registration(const Model& part, const geometry::RigidTransform& world_from_model)>;
+
+/// A body whose two parts lie in the images otherwise than in its CT.
+struct BrokenBone {
+  Eigen::Vector3d cut = Eigen::Vector3d::Zero();  ///< between the parts, on the long axis; model coordinates
+  Eigen::Vector3d end = Eigen::Vector3d::Zero();  ///< the nearer end of that axis
+  double from_end_mm = 0;                         ///< of the cut, along the axis
+  double moved_mm = 0;  ///< of the shorter part against the other: rms over its samples
+  double turned_deg = 0;
+};
+
+/// Whether a volume that no single pose explains in two or more views is explained by two: one part agrees in
+/// every view, the rest does not, separated by a plane across the long axis, and each part alone is
+/// registered (not refused), at another pose than the other.
+std::optional<BrokenBone> broken_bone(const Model& model, const std::vector<RegistrationView>& views,
+                                      const Registration& refused, const RegisterPart& register_part);
+
+}  // namespace helicarm::registration
