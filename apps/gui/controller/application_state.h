@@ -133,7 +133,7 @@ struct ApplicationState {
 /// Whether devices, real or virtual ones, carry out an operation.
 bool is_operation(const ApplicationState& state);
 
-/// Whether the models of an operation are registered, none refused, and nobody has compared their outlines.
+/// Whether the models of an operation are registered, none refused, and their outlines are not compared yet.
 bool awaits_confirmation(const ApplicationState& state);
 
 /// Whether there are models and a measurement that was not refused, to which they can be registered.

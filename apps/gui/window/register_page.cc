@@ -99,10 +99,10 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
   confirm_ = add_button(tr("The outlines follow the bones in every view: &confirm"), "confirmRegistration",
                         [this] { controller_.confirm_registration(); });
   confirm_->setToolTip(tr("Tunnels of the models' plans guide the tool from then on"));
-  pictures_ = new PosePictures;
-  pictures_->setObjectName("posePictures");
-  connect(pictures_, &PosePictures::chosen, this, &RegisterPage::move_to);
-  layout()->addWidget(pictures_);
+  pose_images_ = new PoseImages;
+  pose_images_->setObjectName("poseImages");
+  connect(pose_images_, &PoseImages::chosen, this, &RegisterPage::move_to);
+  layout()->addWidget(pose_images_);
   says_ = new QLabel;
   says_->setObjectName("registerSays");
   says_->setWordWrap(true);
@@ -158,7 +158,7 @@ void RegisterPage::add_hand() {
   }
   connect(model_, &QComboBox::currentIndexChanged, this, [this] {
     leave_as_registered();
-    show_pictures(controller_.state());
+    show_pose_images(controller_.state());
     emit held_changed();
   });
   layout()->addWidget(hand_);
@@ -191,7 +191,7 @@ void RegisterPage::leave_as_registered() {
 
 namespace {
 
-/// From the registered pose to that of a picture.
+/// From the registered pose to that of an image.
 registration::RigidStep step_to(const registration::Registration& found, std::size_t pose) {
   if (pose == 0) return registration::RigidStep::Zero();
   return registration::step_about(found.world_from_model, found.alternatives.at(pose - 1).world_from_model,
@@ -204,19 +204,19 @@ void RegisterPage::move_to(std::size_t pose) {
   if (!shown_ || model_->currentIndex() < 0) return;
   const auto model = std::size_t(model_->currentIndex());
   controller_.nudge(model, step_to(shown_->models.at(model).registration, pose));
-  show_pictures(controller_.state());  // also where nothing has moved
+  show_pose_images(controller_.state());  // also where nothing has moved
 }
 
-void RegisterPage::show_pictures(const ApplicationState& state) {
+void RegisterPage::show_pose_images(const ApplicationState& state) {
   const auto model = std::size_t(std::max(0, model_->currentIndex()));
-  pictures_->show_model(state.registration, model);
+  pose_images_->show_model(state.registration, model);
   if (!state.registration || model >= state.registration->models.size()) return;
   const bool is_moved = state.nudged && state.nudged->model == model;
   const registration::Registration& found = state.registration->models[model].registration;
   std::optional<std::size_t> displayed;
   for (std::size_t pose = 0; pose <= found.alternatives.size(); ++pose)
     if (is_moved ? state.nudged->step == step_to(found, pose) : pose == 0) displayed = pose;
-  pictures_->mark(displayed);
+  pose_images_->mark(displayed);
 }
 
 void RegisterPage::nudge(std::size_t field, double value) {
@@ -268,8 +268,8 @@ void RegisterPage::show_state(const ApplicationState& state) {
   list_models(state);
   show_hand(state);
   allow_landmarks(state);
-  show_pictures(state);
-  pictures_->setEnabled(hand_->isEnabled());
+  show_pose_images(state);
+  pose_images_->setEnabled(hand_->isEnabled());
 }
 
 std::size_t RegisterPage::chosen_model() const {

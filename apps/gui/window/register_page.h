@@ -7,7 +7,7 @@
 #include "gui/scene/scene_values.h"
 #include "gui/window/pages.h"
 #include "gui/window/pose_box.h"
-#include "gui/window/pose_pictures.h"
+#include "gui/window/pose_images.h"
 #include "gui/xray/live_marks.h"
 #include "helicarm/case_registration/register_case.h"
 
@@ -42,9 +42,9 @@ class RegisterPage : public Page {
   /// The field's part of the chosen model's step from its registered pose.
   void nudge(std::size_t field, double value);
   void leave_as_registered();
-  /// To one of the chosen model's pictures.
+  /// To one of the chosen model's pose images.
   void move_to(std::size_t pose);
-  void show_pictures(const ApplicationState& state);
+  void show_pose_images(const ApplicationState& state);
   void list_models(const ApplicationState& state);
   void show_hand(const ApplicationState& state);
   QString words_of(const ApplicationState& state) const;
@@ -55,7 +55,7 @@ class RegisterPage : public Page {
   QLabel* slices_;  ///< of the selected tunnel, or the first
   std::vector<case_registration::RegisteredModel> listed_;
   std::pair<int, int> drawn_{-1, 0};  ///< row, and width of the page, of the slices that are shown
-  PosePictures* pictures_;
+  PoseImages* pose_images_;
   QWidget* hand_;
   QComboBox* model_;
   std::array<PoseBox*, 6> by_{};  ///< mm, then degrees

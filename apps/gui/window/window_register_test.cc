@@ -94,7 +94,7 @@ TEST_F(Window, AModelIsRegisteredAndMovedByHand) {
   screenshot("plan-of-model");
 }
 
-TEST_F(Window, AModelThatIsRefusedOffersItsBestPosesAsPictures) {
+TEST_F(Window, AModelThatIsRefusedOffersItsBestPosesAsImages) {
   write_case_with_model(folder_ / "case");
   std::string ct = to_nrrd(bone_in_tissue());
   const std::string along = "space directions: (1.2,", mirrored = "space directions: (-1.2,";
@@ -106,16 +106,16 @@ TEST_F(Window, AModelThatIsRefusedOffersItsBestPosesAsPictures) {
   ASSERT_TRUE(write_file(folder_ / "case/case.json", to_text(json)));
   window_->open_paths({folder_ / "case"});
   ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
-  EXPECT_FALSE(find<QWidget>("posePictures")->isVisible());
+  EXPECT_FALSE(find<QWidget>("poseImages")->isVisible());
   click("registerModels");
   ASSERT_TRUE(wait("the search has ended", [&] { return state().registration && !state().busy; }));
   const registration::Registration found = state().registration->models[0].registration;
   ASSERT_TRUE(found.failure);
   ASSERT_FALSE(found.alternatives.empty());
-  EXPECT_TRUE(find<QWidget>("posePictures")->isVisible());
+  EXPECT_TRUE(find<QWidget>("poseImages")->isVisible());
   EXPECT_TRUE(find<QToolButton>("pose0")->isChecked());
   screenshot("register-alternatives");
-  screenshot("register-alternatives-pictures", find<QWidget>("posePictures"));
+  screenshot("register-alternatives-images", find<QWidget>("poseImages"));
   find<QToolButton>("pose1")->click();
   ASSERT_TRUE(state().nudged);
   EXPECT_LT(

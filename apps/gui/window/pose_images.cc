@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gui/window/pose_pictures.h"
+#include "gui/window/pose_images.h"
 
 #include <QPainter>
 #include <QVBoxLayout>
@@ -14,11 +14,11 @@ namespace {
 using case_registration::CaseRegistration;
 using case_registration::RegisteredModel;
 
-constexpr int view_px = 150;  // side of a view in a picture
+constexpr int view_px = 150;  // side of a view
 
 /// A view with the outline, as high as wide.
-QImage picture_of(const registration::RegistrationView& view, const std::vector<Eigen::Vector2d>& outline,
-                  const QColor& ink) {
+QImage image_of(const registration::RegistrationView& view, const std::vector<Eigen::Vector2d>& outline,
+                const QColor& ink) {
   QImage image(view_px, view_px, QImage::Format_RGB32);
   image.fill(Qt::black);
   const double scale = double(view_px) / std::max(view.grey.width(), view.grey.height());
@@ -33,20 +33,20 @@ QImage picture_of(const registration::RegistrationView& view, const std::vector<
   return image;
 }
 
-QPixmap picture_of(const CaseRegistration& registration, std::size_t model,
-                   const std::vector<std::vector<Eigen::Vector2d>>& outlines) {
+QPixmap image_of(const CaseRegistration& registration, std::size_t model,
+                 const std::vector<std::vector<Eigen::Vector2d>>& outlines) {
   const std::size_t views = std::min(outlines.size(), registration.loaded.views.size());
   QPixmap pixels(int(views) * view_px, view_px);
   QPainter painter(&pixels);
   for (std::size_t i = 0; i < views; ++i)
     painter.drawImage(int(i) * view_px, 0,
-                      picture_of(registration.loaded.views[i], outlines[i], ink::of_model(model)));
+                      image_of(registration.loaded.views[i], outlines[i], ink::of_model(model)));
   return pixels;
 }
 
 }  // namespace
 
-PosePictures::PosePictures(QWidget* parent) : QWidget(parent) {
+PoseImages::PoseImages(QWidget* parent) : QWidget(parent) {
   auto* column = new QVBoxLayout(this);
   column->setContentsMargins(0, 0, 0, 0);
   auto* lead = new QLabel(tr(
@@ -57,8 +57,7 @@ PosePictures::PosePictures(QWidget* parent) : QWidget(parent) {
   hide();
 }
 
-void PosePictures::show_model(const std::shared_ptr<const CaseRegistration>& registration,
-                              std::size_t model) {
+void PoseImages::show_model(const std::shared_ptr<const CaseRegistration>& registration, std::size_t model) {
   if (shown_ == registration && model_ == model) return;
   shown_ = registration;
   model_ = model;
@@ -76,7 +75,7 @@ void PosePictures::show_model(const std::shared_ptr<const CaseRegistration>& reg
     button->setAutoExclusive(false);
     button->setToolButtonStyle(Qt::ToolButtonTextUnderIcon);
     const QPixmap pixels =
-        picture_of(*registration, model, pose == 0 ? of.outlines : of.alternative_outlines[pose - 1]);
+        image_of(*registration, model, pose == 0 ? of.outlines : of.alternative_outlines[pose - 1]);
     button->setIcon(pixels);
     button->setIconSize(pixels.size());
     if (pose == 0) {
@@ -95,7 +94,7 @@ void PosePictures::show_model(const std::shared_ptr<const CaseRegistration>& reg
   }
 }
 
-void PosePictures::mark(std::optional<std::size_t> pose) {
+void PoseImages::mark(std::optional<std::size_t> pose) {
   for (std::size_t i = 0; i < buttons_.size(); ++i) buttons_[i]->setChecked(pose == i);
 }
 

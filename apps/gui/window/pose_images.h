@@ -10,13 +10,13 @@
 
 namespace helicarm::gui {
 
-/// The poses that a refused registration found, to choose from: a picture of each, with the model's outline
+/// The poses that a refused registration found, to choose from: an image of each, with the model's outline
 /// over every view.
-class PosePictures : public QWidget {
+class PoseImages : public QWidget {
   Q_OBJECT
 
  public:
-  explicit PosePictures(QWidget* parent = nullptr);
+  explicit PoseImages(QWidget* parent = nullptr);
 
   /// Of this model; hidden unless it is refused and has alternatives.
   void show_model(const std::shared_ptr<const case_registration::CaseRegistration>& registration,
