@@ -38,6 +38,16 @@ void print_verified(const operation::TunnelOutcome& outcome, Console& console) {
   console.out << std::flush;
 }
 
+/// Throws what another reading does not help.
+void tell_again(const Failure& why, Console& console) {
+  if (!operation::is_of_a_reading(why) && why.reason != Reason::off_target &&
+      why.reason != Reason::plan_stale)
+    throw BadInput(why);
+  console.progress << fmt::format("{}: {}; again\n", code(why.reason),
+                                  without_control_characters(why.message))
+                   << std::flush;
+}
+
 /// Until a line is entered; the last decision.
 std::string follow(const std::string& tunnel, operation::Operation& operation, LineInput& input,
                    const Ending& ending, Console& console) {
@@ -103,23 +113,20 @@ void guide_by_hand(const operation::OperationTunnel& tunnel, operation::Operatio
     ending.check();
     for (const std::string& check : operation.checks_to_come(tunnel.bone))
       touch_point(operation, check, input, ending, console);
-    const auto done = guarded([&] {
-      value_or_throw(operation.guide(tunnel.name));
-      console.progress
-          << fmt::format("{}: press Enter with the drill held still in the drilled tunnel to verify it\n",
-                         name)
-          << std::flush;
-      if (follow(tunnel.name, operation, input, ending, console) == code(Reason::plan_stale)) return false;
-      print_verified(value_or_throw(operation.verify_drilled(tunnel.name)), console);
-      return true;
-    });
-    if (done && *done) return;
-    if (done) continue;
-    if (!operation::is_of_a_reading(done.error()) && done.error().reason != Reason::off_target)
-      throw BadInput(done.error());
-    console.progress << fmt::format("{}: {}; again\n", code(done.error().reason),
-                                    without_control_characters(done.error().message))
+    const auto begun = operation.guide(tunnel.name);
+    if (!begun) {
+      tell_again(begun.error(), console);
+      continue;
+    }
+    console.progress << fmt::format(
+                            "{}: press Enter with the drill held still in the drilled tunnel to verify it\n",
+                            name)
                      << std::flush;
+    while (follow(tunnel.name, operation, input, ending, console) != code(Reason::plan_stale)) {
+      const auto outcome = operation.verify_drilled(tunnel.name);
+      if (outcome) return print_verified(*outcome, console);
+      tell_again(outcome.error(), console);
+    }
   }
 }
 

@@ -99,7 +99,8 @@ struct ApplicationState {
   bool has_models = false;  ///< the case names models to be registered
   std::shared_ptr<const case_registration::CaseRegistration> registration = {};
   std::optional<NudgedModel> nudged = {};
-  std::vector<pipeline::Pick> registered_picks = {};  ///< at the registration
+  std::vector<operation::ModelStart> starts_by_hand = {};  ///< of the registration
+  std::vector<pipeline::Pick> registered_picks = {};       ///< at the registration
   bool is_confirmed = false;  ///< the registration, of an operation: a person compared the outlines
   std::vector<std::string> models = {};                                  ///< names of the case's or plan's
   std::vector<std::optional<std::filesystem::path>> model_volumes = {};  ///< their CTs
@@ -110,7 +111,7 @@ struct ApplicationState {
   ModelLandmarks registered_landmarks = {};  ///< at the registration
 
   std::optional<operation::HandDrill> drill = {};  ///< held by a person; the plan has no robot then
-  std::string guided = {};                         ///< tunnel to which the drill is guided, or was last
+  double stand_off_mm = robot::ApproachOptions().stand_off_mm;  ///< before a tunnel
 
   QString tour;      ///< description of the registration moves
   QString way = {};  ///< of the moves of `order`

@@ -36,6 +36,13 @@ void forget_measurement(ApplicationState& state) {
   state.has_arrived = false;
 }
 
+void forget_registration(ApplicationState& state) {
+  state.registration.reset();
+  state.is_confirmed = false;
+  state.nudged.reset();
+  state.starts_by_hand.clear();
+}
+
 /// Writes the DICOM report and registrations if images and volumes are of DICOM; returns what went wrong.
 QString dicom_written(const Equipment& equipment, const case_registration::Measurement& measured,
                       const fs::path& folder) {
@@ -100,6 +107,7 @@ void Controller::finish(Phase phase, const Expected<Change>& done) {
     (*done)(state_);
   else
     state_.refusals.insert_or_assign(phase, done.error());
+  if (!outlining_) outline_nudged();
   emit changed();
   if (!done) emit refused(phase, sentence_of(done.error()));
   if (std::exchange(measures_again_, false)) measure();
@@ -132,27 +140,35 @@ void Controller::expect(const std::string& view) {
 void Controller::shoot(const std::string& view) {
   if (!equipment_ || !equipment_->virtual_or) return;
   begin(Phase::acquire, "acquiring " + view, [this, view, equipment = equipment_]() -> Change {
-    return came(value_or_throw(shoot_and_take(*equipment, view)));
+    return came(*equipment, shoot_and_take(*equipment, view));
   });
 }
 
 void Controller::take_waiting_image() {
+  const bool is_guiding = state_.drill && state_.busy == Phase::navigate;
+  if (is_guiding && equipment_ && equipment_->devices->next_image(0))
+    return emit told(tr("An image that came while the drill is guided is kept in the session and not used."));
   if (state_.busy || !equipment_ || !equipment_->operation) return;
   const auto view_image = equipment_->devices->next_image(0);
   if (!view_image) return;
   begin(Phase::acquire, "image received",
         [this, view = state_.next_view, equipment = equipment_, view_image]() -> Change {
-          return came(value_or_throw(take(*equipment, view, *view_image)));
+          return came(*equipment, take(*equipment, view, *view_image));
         });
 }
 
-Controller::Change Controller::came(Images images) {
-  return [this, images = std::move(images)](ApplicationState& state) {
+Controller::Change Controller::came(Equipment& equipment, const Expected<Images>& images) {
+  const Change forget = [this](ApplicationState& state) {
     forget_measurement(state);
-    state.registration.reset();  // as the operation does
-    state.is_confirmed = false;
-    state.nudged.reset();
+    forget_registration(state);
     live_tool_.reset();  // its lines belong to the previous images
+  };
+  if (!images) {  // an earlier image may have been found to be delayed
+    if (!equipment.operation->measured_case()) meanwhile(forget);
+    throw BadInput(images.error());
+  }
+  return [this, forget, images = *images](ApplicationState& state) {
+    forget(state);
     state.result = result_with(images);
     state.failed_picks = failed_picks(state, {});
     state.next_view = missing_view(state);
@@ -177,9 +193,7 @@ Controller::Change Controller::measured(Equipment& equipment, const std::vector<
     state.measured_picks = picks;
     state.has_other_options = !case_registration::give_the_same(options_, options);
     if (other_models || result->failure) {
-      state.registration.reset();
-      state.is_confirmed = false;
-      state.nudged.reset();
+      forget_registration(state);
       forget_registrations();
     }
     state.result = result;

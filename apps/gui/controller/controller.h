@@ -163,6 +163,7 @@ class Controller : public QObject {
     Picks registered_picks;
     std::optional<NudgedModel> nudged;
     ModelLandmarks model_landmarks, registered_landmarks;
+    std::vector<operation::ModelStart> starts_by_hand;
   };
 
   void begin(Phase phase, std::string doing, std::function<Change()> work);
@@ -198,8 +199,12 @@ class Controller : public QObject {
   void watch_no_files();
   void outline_nudged();
   void register_in_operation();
+  std::vector<operation::ModelStart> starts_by_hand() const;
+  /// Null for a tunnel that is not known or, told then, `may_guide` does not hold for.
+  const operation::OperationTunnel* tunnel_that_may_guide(const std::string& name);
   std::optional<operation::TunnelOutcome> verified(Equipment& equipment, const std::string& tunnel);
-  Change came(std::vector<pipeline::ViewResult> images);
+  /// `images`: of all views, or why the new one was refused.
+  Change came(Equipment& equipment, const Expected<std::vector<pipeline::ViewResult>>& images);
 
   ApplicationState state_;
   std::shared_ptr<Equipment> equipment_;

@@ -72,7 +72,6 @@ void Controller::rename_landmark(std::size_t model, const std::string& from, con
   for (pipeline::Pick& pick : state_.picks)
     if (pick.name == from) pick.name = to, has_picks = true;
   if (!has_picks) return landmarks_changed();
-  keep_landmarks();
   keep_unsaved_picks();
   picks_changed(has_all_images());
 }

@@ -133,10 +133,10 @@ TEST_F(ControllerLandmarks, AModelMovedByHandStartsThere) {
       the_case.picks.emplace_back().name = point.name;
       the_case.picks.back().view = view;
     }
-  start_from_landmarks(the_case, {in_bone}, 0);
+  start_from_landmarks(the_case, {in_bone}, {{the_case.models[0].name, {}}});
   EXPECT_TRUE(the_case.models[0].placed_landmarks.empty());
   EXPECT_TRUE(the_case.models[0].world_from_model);
-  start_from_landmarks(the_case, {in_bone}, std::nullopt);
+  start_from_landmarks(the_case, {in_bone}, {});
   EXPECT_EQ(the_case.models[0].placed_landmarks.size(), 3U);
   EXPECT_FALSE(the_case.models[0].world_from_model);
 }

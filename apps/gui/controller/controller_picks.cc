@@ -20,7 +20,8 @@ Controller::Edit Controller::edit_named(const QString& what) const {
           state_.registered_picks,
           state_.nudged,
           state_.model_landmarks,
-          state_.registered_landmarks};
+          state_.registered_landmarks,
+          state_.starts_by_hand};
 }
 
 void Controller::remember_edit(const QString& what) {
@@ -61,9 +62,12 @@ void Controller::step_edits(std::vector<Edit>& from, std::vector<Edit>& to) {
     state_.registration = std::move(edit.registration);
     state_.registered_picks = std::move(edit.registered_picks);
     state_.registered_landmarks = std::move(edit.registered_landmarks);
+    state_.starts_by_hand = std::move(edit.starts_by_hand);
     state_.nudged = std::move(edit.nudged);
   } else if (edit.registration == state_.registration) {  // an operation returns to no earlier one
     state_.nudged = std::move(edit.nudged);
+    state_.order.reset();
+    state_.path = {};
   }
   if (!outlining_) outline_nudged();
   if (!other_picks) return emit changed();
@@ -76,7 +80,10 @@ void Controller::keep_unsaved_picks() {
   state_.failed_picks = failed_picks(state_, state_.failed_picks);
   if (!state_.case_folder) return;
   state_.has_unsaved_picks = true;
-  const auto kept = keep_unsaved(*state_.case_folder, state_.picks);
+  const auto kept = keep_unsaved(*state_.case_folder, state_.picks).and_then([&] {
+    return keep_unsaved_landmarks(*state_.case_folder, state_.case_models, state_.model_landmarks,
+                                  state_.saved_landmarks);
+  });
   state_.picks_not_kept = kept ? std::nullopt : std::optional(kept.error());
 }
 

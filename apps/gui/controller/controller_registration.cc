@@ -10,13 +10,15 @@ using case_registration::CaseRegistration;
 
 Expected<CaseRegistration> register_models(Equipment& equipment, const std::vector<pipeline::Pick>& picks,
                                            const ModelLandmarks& landmarks,
-                                           const std::optional<NudgedModel>& from,
+                                           const std::vector<operation::ModelStart>& starts,
                                            const std::function<void(const std::string& step)>& tell) {
   return guarded([&] {
     pipeline::Case the_case = *equipment.the_case;
     the_case.picks = picks;
-    start_from_landmarks(the_case, landmarks, from ? std::optional(from->model) : std::nullopt);
-    if (from) the_case.models.at(from->model).world_from_model = from->world_from_model;
+    start_from_landmarks(the_case, landmarks, starts);
+    for (const operation::ModelStart& start : starts)
+      std::ranges::find(the_case.models, start.model, &pipeline::CaseModel::name)->world_from_model =
+          start.world_from_model;
     const case_registration::RegisterOptions& options = equipment.options;
     equipment.registered_by = options;
     const case_registration::Progress progress{
@@ -46,20 +48,32 @@ void Controller::register_models() {
   if (equipment_->operation) return register_in_operation();
   begin(Phase::registration, "reading the models",
         [this, equipment = equipment_, picks = state_.picks, landmarks = state_.model_landmarks,
-         from = state_.nudged]() -> Change {
+         starts = starts_by_hand()]() -> Change {
           const auto tell = [this](const std::string& step) {
             meanwhile([step](ApplicationState& state) { state.doing = step; });
           };
           const auto done = std::make_shared<const CaseRegistration>(
-              value_or_throw(gui::register_models(*equipment, picks, landmarks, from, tell)));
-          return [this, done, picks, landmarks](ApplicationState& state) {
+              value_or_throw(gui::register_models(*equipment, picks, landmarks, starts, tell)));
+          return [this, done, picks, landmarks, starts](ApplicationState& state) {
             remember_edit(tr("registration"));
             state.registration = done;
             state.registered_picks = picks;
             state.registered_landmarks = landmarks;
+            state.starts_by_hand = starts;
             state.nudged.reset();
           };
         });
+}
+
+/// With the model that is moved now those that were registered from a pose by hand before; none where no
+/// model is moved.
+std::vector<operation::ModelStart> Controller::starts_by_hand() const {
+  if (!state_.nudged) return {};
+  std::vector<operation::ModelStart> starts = state_.starts_by_hand;
+  const std::string& name = state_.models.at(state_.nudged->model);
+  std::erase_if(starts, [&](const operation::ModelStart& start) { return start.model == name; });
+  starts.push_back({name, state_.nudged->world_from_model});
+  return starts;
 }
 
 void Controller::register_in_operation() {
@@ -67,19 +81,22 @@ void Controller::register_in_operation() {
   state_.order.reset();  // those to the models' tunnels end with the registration
   state_.path = {};
   begin(Phase::registration, "reading the models",
-        [this, equipment = equipment_, from = state_.nudged, names = state_.models]() -> Change {
-          std::vector<operation::ModelStart> starts;
-          if (from) starts.push_back({names.at(from->model), from->world_from_model});
+        [this, equipment = equipment_, starts = starts_by_hand()]() -> Change {
           const auto done = equipment->operation->register_models(starts, [equipment] {
             if (equipment->stopped) throw BadInput(Reason::interrupted, "cancelled");
           });
           const auto& found = equipment->operation->registration();
           const auto registered = found ? std::make_shared<const CaseRegistration>(*found) : nullptr;
-          const Change now = [registered](ApplicationState& state) {
+          const auto live = equipment->operation->live_tool();  // without the models' tunnels
+          const Change now = [this, registered, live, starts](ApplicationState& state) {
             state.registration = registered;
+            state.starts_by_hand = registered ? starts : decltype(starts)();
             state.registered_picks = state.picks;
             state.is_confirmed = false;
             state.nudged.reset();
+            for (const operation::OperationTunnel& tunnel : state.tunnels)
+              if (tunnel.of_model) state.outcomes.erase(tunnel.name);
+            live_tool_ = live ? std::optional(*live) : std::nullopt;
           };
           if (!done && !registered) {
             meanwhile(now);

@@ -183,6 +183,10 @@ TEST_F(ControllerCtRehearsal, AConfirmedRegistrationGuidesTheToolToTheTunnelsOfT
   ASSERT_TRUE(register_models());
   EXPECT_TRUE(awaits_confirmation(state()));
   EXPECT_EQ(refusal_of_plan(), Reason::registration_not_confirmed);
+  controller_->nudge(1, step);
+  ASSERT_TRUE(register_models());
+  ASSERT_EQ(state().starts_by_hand.size(), 2U);  // each keeps its own
+  EXPECT_EQ(state().starts_by_hand[0].model, state().models[0]);
   controller_->undo();  // to no earlier registration
   EXPECT_TRUE(state().registration);
   EXPECT_FALSE(state().nudged);

@@ -7,6 +7,7 @@
 #include "gui/controller/controller.h"
 #include "gui/controller/equipment.h"
 #include "gui/controller/stale.h"
+#include "gui/controller/steps.h"
 #include "helicarm/rehearsal/rehearse.h"
 
 namespace helicarm::gui {
@@ -100,8 +101,21 @@ void Controller::register_robot() {
   });
 }
 
+const operation::OperationTunnel* Controller::tunnel_that_may_guide(const std::string& name) {
+  const auto tunnel = std::ranges::find(state_.tunnels, name, &operation::OperationTunnel::name);
+  if (tunnel == state_.tunnels.end()) return nullptr;
+  // Of the registration the operation decides; it knows nothing of a model that is moved by hand.
+  if (!tunnel->of_model || !state_.nudged) return &*tunnel;
+  const Failure moved{
+      Reason::plan_stale, name + ": a model is moved by hand and not registered there", {}, {}};
+  state_.refusals.insert_or_assign(Phase::navigate, moved);
+  emit changed();
+  emit refused(Phase::navigate, sentence_of(moved));
+  return nullptr;
+}
+
 void Controller::plan_order(const std::string& tunnel) {
-  if (!equipment_ || !equipment_->operation) return;
+  if (!equipment_ || !equipment_->operation || !tunnel_that_may_guide(tunnel)) return;
   follow(tunnel);
   begin(Phase::navigate, "planning the path to " + tunnel,
         [this, equipment = equipment_, tunnel]() -> Change {
@@ -119,12 +133,12 @@ void Controller::plan_order(const std::string& tunnel) {
 
 void Controller::guide_drill(const std::string& tunnel) {
   if (!equipment_ || !equipment_->operation || !state_.drill || state_.busy) return;
+  const operation::OperationTunnel* named = tunnel_that_may_guide(tunnel);
+  if (!named) return;
   follow(tunnel);
-  state_.guided = tunnel;
   equipment_->verifies = false;
   equipment_->newest_guidance.set({});
-  const auto named = std::ranges::find(state_.tunnels, tunnel, &operation::OperationTunnel::name);
-  const guidance::Bone bone = named == state_.tunnels.end() ? guidance::Bone() : named->bone;
+  const guidance::Bone bone = named->bone;
   begin(Phase::navigate, "guiding the drill to " + tunnel,
         [this, equipment = equipment_, tunnel, bone]() -> Change {
           if (equipment->virtual_or) rehearsal::raise_drill(bone, equipment->virtual_or->drill());
@@ -141,19 +155,20 @@ void Controller::guide_drill(const std::string& tunnel) {
                 };
             std::this_thread::sleep_for(std::chrono::duration<double>(look_s));
           }
-          return [](ApplicationState&) {};
+          equipment->operation->end_guidance();
+          return [](ApplicationState& state) { state.refusals.erase(Phase::navigate); };
         });
 }
 
-/// Nothing where the drill must be held still or brought into the tunnel first: it is guided on.
+/// Nothing where the drill must be held still or brought into the tunnel first: it is guided on as it was.
 std::optional<operation::TunnelOutcome> Controller::verified(Equipment& equipment,
                                                              const std::string& tunnel) {
+  equipment.newest_guidance.set({});  // none while it takes seconds
   auto outcome = equipment.operation->verify_drilled(tunnel);
   if (outcome) return *std::move(outcome);
   const Failure& why = outcome.error();
   if (!operation::is_of_a_reading(why) && why.reason != Reason::off_target) throw BadInput(why);
   meanwhile([why](ApplicationState& state) { state.refusals.insert_or_assign(Phase::navigate, why); });
-  value_or_throw(equipment.operation->guide(tunnel));
   return std::nullopt;
 }
 
@@ -179,7 +194,8 @@ void Controller::drop_plan(const Failure& why) {
 }
 
 void Controller::go() {
-  if (!equipment_ || !equipment_->operation || !state_.order) return;
+  if (!equipment_ || !equipment_->operation || !state_.order || !tunnel_that_may_guide(state_.order->name))
+    return;
   const robot::RobotOrder order = *state_.order;
   state_.bound_for = order.name;
   state_.has_arrived = false;
@@ -237,7 +253,7 @@ LiveState Controller::live() const {
     now.robot = robot->status();
     now.indicators.push_back(robot_indicator(now.robot));
   }
-  if (state_.drill && state_.busy == Phase::navigate) now.drill = equipment_->newest_guidance.get();
+  if (state_.drill && state_.busy == Phase::navigate) now.drill = equipment_->newest_guidance.at(now.at_s);
   now.indicators.push_back(c_arm_indicator(equipment_->devices->c_arm(), now.at_s));
   if (robot && state_.order && !state_.busy && plan_watch_) {
     const auto holds = plan_watch_->holds(board, robot->track(), now.at_s);
@@ -249,6 +265,11 @@ LiveState Controller::live() const {
   now.tool = live_tool_->overlay(board, now.bone);
   if (tunnel == state_.tunnels.end()) return now;
   now.tunnel = QString::fromStdString(followed_);
+  if (tunnel->of_model && !may_guide(state_, *tunnel)) {
+    now.aim =
+        fail(Reason::registration_not_confirmed, followed_ + ": its model is not registered and confirmed");
+    return now;
+  }
   now.aim = is_stale(state_, tunnel->start) || is_stale(state_, tunnel->end)
                 ? fail(Reason::plan_stale, followed_ + ": its picks have changed since the measurement")
                 : live_tool_->aim(board, followed_);

@@ -203,6 +203,7 @@ Controller::Change Controller::with_plan(const operation::OperationPlan& plan,
     state.tunnels = plan.tunnels;
     for (const auto& point : plan.check_points) state.check_points.push_back(point.name);
     state.drill = plan.drill;
+    state.stand_off_mm = plan.robot.approach.stand_off_mm;
     state.offered_picks = offered;
     state.has_models = !models.empty();
     for (const pipeline::CaseModel& model : models) {

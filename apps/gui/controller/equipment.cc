@@ -19,6 +19,22 @@ constexpr std::chrono::milliseconds before_exposure{1800};
 
 }  // namespace
 
+void NewestGuidance::set(std::optional<operation::Guidance> guidance) {
+  const std::lock_guard lock(mutex_);
+  newest_ = std::move(guidance);
+  set_s_ = tracker::monotonic_seconds();
+}
+
+std::optional<operation::Guidance> NewestGuidance::at(double now_s) const {
+  constexpr double longest_s = 0.5;  // five decisions
+  const std::lock_guard lock(mutex_);
+  if (!newest_ || now_s - set_s_ <= longest_s) return newest_;
+  operation::Guidance late;
+  late.why_not = Failure{Reason::stale_pose,
+                         fmt::format("no decision for {:.1f} s: the computer is busy", now_s - set_s_)};
+  return late;
+}
+
 std::shared_ptr<const pipeline::Result> result_with(Images images) {
   auto result = std::make_shared<pipeline::Result>();
   result->views = std::move(images);

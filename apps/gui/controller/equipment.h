@@ -16,18 +16,14 @@ namespace helicarm::gui {
 /// The newest decision on a hand-held drill; from any thread.
 class NewestGuidance {
  public:
-  void set(std::optional<operation::Guidance> guidance) {
-    const std::lock_guard lock(mutex_);
-    newest_ = std::move(guidance);
-  }
-  std::optional<operation::Guidance> get() const {
-    const std::lock_guard lock(mutex_);
-    return newest_;
-  }
+  void set(std::optional<operation::Guidance> guidance);
+  /// At this time (monotonic seconds). A decision that is not renewed is stale_pose.
+  std::optional<operation::Guidance> at(double now_s) const;
 
  private:
   mutable std::mutex mutex_;
   std::optional<operation::Guidance> newest_;
+  double set_s_ = 0;
 };
 
 /// Resources of a source. The operation and the case belong to the worker; devices and virtual devices may be
@@ -72,11 +68,12 @@ Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipel
 inline constexpr std::size_t most_loose_images = 20;
 
 /// Registers the case's models to its calibrated views. `landmarks`, placed in the models: as
-/// `start_from_landmarks`. `from`: a model's start in place of the case's.
+/// `start_from_landmarks`. `starts`: of models that a person moved, in place of the case's.
 /// `tell` is called with each step. Refuses interrupted once `equipment.stopped`.
 Expected<case_registration::CaseRegistration> register_models(
     Equipment& equipment, const std::vector<pipeline::Pick>& picks, const ModelLandmarks& landmarks,
-    const std::optional<NudgedModel>& from, const std::function<void(const std::string& step)>& tell);
+    const std::vector<operation::ModelStart>& starts,
+    const std::function<void(const std::string& step)>& tell);
 
 /// Images of files, for looking; each with its file.
 struct LooseImages {

@@ -236,12 +236,13 @@ Expected<SavedLandmarks> save_landmarks(const fs::path& case_folder, const std::
 }
 
 void start_from_landmarks(pipeline::Case& the_case, const ModelLandmarks& placed,
-                          const std::optional<std::size_t>& moved) {
+                          const std::vector<operation::ModelStart>& moved) {
   if (placed.size() != the_case.models.size()) return;
   const ModelLandmarks of_case = landmarks_of_models(the_case.models);
   for (std::size_t i = 0; i < placed.size(); ++i) {
     CaseModel& model = the_case.models[i];
-    if (moved == i || are_same_points(placed[i], of_case[i]) ||
+    const bool is_moved = std::ranges::find(moved, model.name, &operation::ModelStart::model) != moved.end();
+    if (is_moved || are_same_points(placed[i], of_case[i]) ||
         count_usable(placed[i], the_case.picks) < registration::least_landmarks)
       continue;
     model.placed_landmarks = placed[i];

@@ -53,9 +53,9 @@ Expected<SavedLandmarks> save_landmarks(const std::filesystem::path& case_folder
                                         const std::vector<pipeline::Pick>& picks);
 
 /// Starts each model whose landmarks are not those of the case from the placed ones, if three of them are
-/// usable. `moved`: the model that starts from its pose by hand.
+/// usable. `moved`: models that start from a pose by hand.
 void start_from_landmarks(pipeline::Case& the_case, const ModelLandmarks& placed,
-                          const std::optional<std::size_t>& moved);
+                          const std::vector<operation::ModelStart>& moved);
 
 /// Why the point cannot be a landmark of this model; empty if it can, also where the model has it already.
 QString why_no_landmark(const ApplicationState& state, std::size_t model, const std::string& name);

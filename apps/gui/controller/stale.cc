@@ -184,6 +184,7 @@ QStringList lacks_of_export(const ApplicationState& state) {
   for (const std::string& point : points)
     if (const QString lack = lack_of(state, point); !lack.isEmpty()) lacks << lack;
   if (state.has_models && !state.registration) lacks << stale_tr("the models are not registered");
+  if (awaits_confirmation(state)) lacks << stale_tr("the registration of the models is not confirmed");
   if (state.registration)
     for (const RegisteredModel& model : present_registration(state).models)
       if (model.registration.failure) lacks << sentence_of(*model.registration.failure);

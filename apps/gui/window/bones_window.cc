@@ -149,14 +149,15 @@ void BonesWindow::run(const QString& doing, std::function<std::function<void()>(
 
 void BonesWindow::open_ct(const fs::path& file, CtPlan plan) {
   file_ = file;
+  plan_ = std::move(plan);
   setWindowTitle(tr("CT: %1").arg(text(file.filename().string())));
-  run(tr("%1 is read.").arg(text(file.string())), [this, file, plan = std::move(plan)] {
+  run(tr("%1 is read.").arg(text(file.string())), [this, file] {
     auto read = std::make_shared<Expected<volume::Volume>>(volume::read_volume(file));
-    return [this, read, plan] {
+    return [this, read] {
       if (!*read) return says_->setText(sentence_of(read->error()));
       scene_ = {};
       scene_.ct = std::make_shared<const volume::Volume>(**read);
-      scene_.plan = plan;
+      scene_.plan = plan_;
       scene_.cursor = 0.5 * (scene_.ct->size.cast<double>().array() - 1).matrix();
       QStringList words;
       for (const Warning& warning : scene_.ct->warnings) words << sentence_of(warning);
@@ -165,6 +166,11 @@ void BonesWindow::open_ct(const fs::path& file, CtPlan plan) {
       show_scene();
     };
   });
+}
+
+void BonesWindow::show_plan(CtPlan plan) {
+  plan_ = scene_.plan = std::move(plan);
+  if (scene_.ct) show_scene();
 }
 
 double BonesWindow::value_at(const Eigen::Vector3d& voxel) const {

@@ -30,6 +30,8 @@ class BonesWindow : public QDialog {
   ~BonesWindow() override;
 
   void open_ct(const std::filesystem::path& file, CtPlan plan = {});
+  /// Instead of the earlier one.
+  void show_plan(CtPlan plan);
   bool is_busy() const { return busy_; }
   const CtScene& scene() const { return scene_; }
   const std::vector<segmentation::Seed>& seeds() const { return seeds_; }
@@ -51,6 +53,7 @@ class BonesWindow : public QDialog {
   double value_at(const Eigen::Vector3d& voxel) const;
 
   std::filesystem::path file_;
+  CtPlan plan_;
   CtScene scene_;
   std::vector<segmentation::Seed> seeds_;
   std::shared_ptr<const segmentation::SegmentAnswer> found_;  ///< of the present seeds

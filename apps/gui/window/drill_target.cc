@@ -13,21 +13,20 @@ namespace {
 
 constexpr double shown_tolerances = 4;  // from the middle to the rim
 
-/// From the middle, at most at the rim: what lies beyond stays in sight.
-QPointF from_middle(const Eigen::Vector2d& in_tolerances, double rim) {
-  const double length = in_tolerances.norm();
-  const Eigen::Vector2d shown = length > shown_tolerances
-                                    ? Eigen::Vector2d(in_tolerances * (shown_tolerances / length))
-                                    : in_tolerances;
-  return rim / shown_tolerances * QPointF(shown.x(), -shown.y());
-}
-
 void paint_cross(QPainter& painter, const QPointF& at, double arm) {
   painter.drawLine(at - QPointF(arm, 0), at + QPointF(arm, 0));
   painter.drawLine(at - QPointF(0, arm), at + QPointF(0, arm));
 }
 
 }  // namespace
+
+QPointF on_target(const Eigen::Vector2d& in_tolerances, double rim) {
+  const double length = in_tolerances.norm();
+  const Eigen::Vector2d shown = length > shown_tolerances
+                                    ? Eigen::Vector2d(in_tolerances * (shown_tolerances / length))
+                                    : in_tolerances;
+  return rim / shown_tolerances * QPointF(shown.x(), shown.y());
+}
 
 DrillTarget::DrillTarget(QWidget* parent) : QWidget(parent) {
   setAccessibleName(tr("Drill against its tunnel"));
@@ -80,12 +79,12 @@ void DrillTarget::paintEvent(QPaintEvent*) {
   if (guidance_ && guidance_->aim) {
     const operation::TunnelAim& aim = *guidance_->aim;
     painter.setPen(QPen(style::colours().text, 2));
-    paint_cross(painter, middle + from_middle(-aim.to_axis_mm.head<2>() / tolerance_mm_, rim), 7);
+    paint_cross(painter, middle + on_target(-aim.to_axis_mm.head<2>() / tolerance_mm_, rim), 7);
     const Eigen::Vector2d tilt = -aim.axis.head<2>();
     const double sine = tilt.norm();
     if (sine > 0) {
       painter.setPen(QPen(style::colours().blue, 2));
-      painter.drawEllipse(middle + from_middle(aim.angle_deg / tolerance_deg_ / sine * tilt, rim), 6, 6);
+      painter.drawEllipse(middle + on_target(aim.angle_deg / tolerance_deg_ / sine * tilt, rim), 6, 6);
     }
     const QRectF bar(middle.x() + rim + 14, 12, 14, height() - 24);
     const double share = std::clamp(aim.depth_mm / std::max(aim.length_mm, 1e-3), 0.0, 1.0);

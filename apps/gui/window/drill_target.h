@@ -8,9 +8,14 @@
 
 namespace helicarm::gui {
 
-/// A hand-held drill against its tunnel, seen along the tunnel: the tip as a cross and the drill's direction
-/// as a ring, in the drill's own axes, within circles of the tolerances; depth as a bar; the decision in
-/// words. Both go to the middle.
+/// Where an offset in the drill's axes, in tolerances, is drawn from the middle; at most at the rim, so that
+/// what lies beyond stays in sight. Seen from behind along the drill, whose z points forward: x to the right,
+/// y down.
+QPointF on_target(const Eigen::Vector2d& in_tolerances, double rim);
+
+/// A hand-held drill against its tunnel, seen from behind along it: the tip as a cross and the drill's
+/// direction as a ring, in the drill's own axes, within circles of the tolerances; depth as a bar; the
+/// decision in words. Both go to the middle.
 class DrillTarget : public QWidget {
   Q_OBJECT
 

@@ -267,6 +267,7 @@ void MainWindow::show_state() {
   show_outlines();
   show_models();
   show_handles();
+  show_ct_plan();
   points_->show_state(state);
   focus_->restore(pages_->currentWidget());
 }

@@ -29,6 +29,7 @@ namespace helicarm::gui {
 
 class PointsPanel;
 class RegisterPage;
+class BonesWindow;
 struct CtPlan;
 class Tour;
 struct TourStep;
@@ -104,6 +105,7 @@ class MainWindow : public QMainWindow {
   /// Slices of a CT, to find its bones, in a window of its own.
   void open_ct(const std::filesystem::path& file, CtPlan plan);
   void open_ct_of(std::size_t model);
+  void show_ct_plan();
   void open_session(const std::filesystem::path& session);
   std::filesystem::path new_session() const;
   void remember(Folder kind, const std::filesystem::path& folder);
@@ -212,6 +214,7 @@ class MainWindow : public QMainWindow {
   QPlainTextEdit* log_ = nullptr;
   QDockWidget* log_dock_ = nullptr;
   QMenu* rehearsal_menu_ = nullptr;
+  std::pair<QPointer<BonesWindow>, std::size_t> ct_of_model_;  ///< opened last, with its model
 
   QPointer<NewCaseDialog> new_case_;
   bool may_close_ = false;

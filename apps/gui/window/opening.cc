@@ -45,12 +45,35 @@ std::vector<fs::path> images_in(const fs::path& folder) {
   return images;
 }
 
-/// From the usual stand-off to where the tunnel enters the bone.
-std::optional<std::pair<Eigen::Vector3d, Eigen::Vector3d>> approach_of(const registration::BoneCheck& check) {
+/// Along its axis to where the tunnel enters the bone.
+std::optional<std::pair<Eigen::Vector3d, Eigen::Vector3d>> approach_of(const registration::BoneCheck& check,
+                                                                       double stand_off_mm) {
   if (!check.entry) return std::nullopt;
   const Eigen::Vector3d out = (*check.entry - check.end).normalized();
-  return std::pair<Eigen::Vector3d, Eigen::Vector3d>(
-      *check.entry + robot::ApproachOptions().stand_off_mm * out, *check.entry);
+  return std::pair<Eigen::Vector3d, Eigen::Vector3d>(*check.entry + stand_off_mm * out, *check.entry);
+}
+
+/// What the present registration plans in the CT of a model.
+CtPlan plan_in_ct(const ApplicationState& state, std::size_t model) {
+  CtPlan plan;
+  if (!state.registration || model >= state.registration->models.size()) return plan;
+  const case_registration::RegisteredModel& registered = state.registration->models[model];
+  if (!stale_model(state, model).isEmpty() || registered.registration.failure) return plan;
+  const geometry::RigidTransform model_from_world = registered.registration.world_from_model.inverse();
+  for (std::size_t i = 0; i < registered.tunnel_ends.size(); ++i) {
+    const auto& [start, end] = registered.tunnel_ends[i];
+    plan.tunnels.push_back({registered.tunnels[i].name,
+                            model_from_world * registered.points[start].place.in_calibrator,
+                            model_from_world * registered.points[end].place.in_calibrator});
+    if (i < registered.bone_checks.size() && registered.bone_checks[i])
+      plan.tunnels.back().approach = approach_of(*registered.bone_checks[i], state.stand_off_mm);
+  }
+  const std::string& bound = state.order ? state.order->name : state.bound_for;
+  const auto tunnel = std::ranges::find(state.tunnels, bound, &operation::OperationTunnel::name);
+  if (tunnel != state.tunnels.end() && tunnel->of_model &&
+      tunnel->of_model->model == registered.registration.name)
+    for (const Eigen::Vector3d& at : state.path.in_calibrator) plan.path.push_back(model_from_world * at);
+  return plan;
 }
 
 }  // namespace
@@ -176,21 +199,12 @@ void MainWindow::open_ct(const fs::path& file, CtPlan plan) {
 void MainWindow::open_ct_of(std::size_t model) {
   const ApplicationState& state = controller_.state();
   if (!state.registration || model >= state.model_volumes.size() || !state.model_volumes[model]) return;
-  const case_registration::RegisteredModel& registered = state.registration->models.at(model);
-  const geometry::RigidTransform model_from_world = registered.registration.world_from_model.inverse();
-  CtPlan plan;
-  if (stale_model(state, model).isEmpty() && !registered.registration.failure) {
-    for (std::size_t i = 0; i < registered.tunnel_ends.size(); ++i) {
-      const auto& [start, end] = registered.tunnel_ends[i];
-      plan.tunnels.push_back({registered.tunnels[i].name,
-                              model_from_world * registered.points[start].place.in_calibrator,
-                              model_from_world * registered.points[end].place.in_calibrator});
-      if (i < registered.bone_checks.size() && registered.bone_checks[i])
-        plan.tunnels.back().approach = approach_of(*registered.bone_checks[i]);
-    }
-    for (const Eigen::Vector3d& at : state.path.in_calibrator) plan.path.push_back(model_from_world * at);
-  }
-  open_ct(*state.model_volumes[model], std::move(plan));
+  open_ct(*state.model_volumes[model], plan_in_ct(state, model));
+  ct_of_model_ = {findChildren<BonesWindow*>("bones").back(), model};
+}
+
+void MainWindow::show_ct_plan() {
+  if (ct_of_model_.first) ct_of_model_.first->show_plan(plan_in_ct(controller_.state(), ct_of_model_.second));
 }
 
 void MainWindow::open_images(const std::vector<fs::path>& files, bool offers_one) {

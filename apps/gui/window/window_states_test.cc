@@ -234,7 +234,7 @@ class WindowStates : public Window, public testing::WithParamInterface<InputChan
   void expect_as_measured_afresh() {
     pipeline::Case the_case = pipeline::read_case(folder_ / "case").value();
     the_case.picks = state().picks;
-    start_from_landmarks(the_case, state().model_landmarks, std::nullopt);
+    start_from_landmarks(the_case, state().model_landmarks, {});
     const auto lacks = [&](const std::string& end) {
       return std::ranges::find(the_case.picks, end, &pipeline::Pick::name) == the_case.picks.end();
     };

@@ -155,6 +155,14 @@ TEST_F(WholeOperation, ReachesATunnelThatWasPlannedInTheCt) {
   ASSERT_NO_FATAL_FAILURE(expect_export_and_replay());
 }
 
+TEST(DrillTargets, AreSeenFromBehindTheDrill) {
+  const QPointF down = on_target({0, 1}, 40);
+  EXPECT_EQ(down.x(), 0);
+  EXPECT_EQ(down.y(), 10);
+  EXPECT_EQ(on_target({1, 0}, 40), QPointF(10, 0));
+  EXPECT_EQ(on_target({0, 100}, 40), QPointF(0, 40));  // at the rim
+}
+
 TEST_F(Window, ADrillInTheHandIsGuidedAndTheTunnelVerified) {
   open_rehearsal({.by_hand = true});
   EXPECT_FALSE(find<HoldButton>("unlock")->isVisibleTo(find<QWidget>("pages")));

@@ -36,6 +36,11 @@ void GuidanceGate::forget_registration(std::span<const OperationTunnel> tunnels)
     }
 }
 
+void GuidanceGate::forget_plans() {
+  planned_.clear();
+  end_guidance();
+}
+
 Expected<void> GuidanceGate::check_registered(const OperationTunnel& tunnel) const {
   if (!tunnel.of_model || is_confirmed()) return {};
   const std::string& model = tunnel.of_model->model;

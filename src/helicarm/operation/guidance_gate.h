@@ -33,6 +33,8 @@ class GuidanceGate {
   bool is_confirmed() const { return state_ == Registration::confirmed; }
   /// Images, picks or the measurement are others now: ends the orders and the guidance to models' tunnels.
   void forget_registration(std::span<const OperationTunnel> tunnels);
+  /// Images or measurement are others now: ends all orders and guidance.
+  void forget_plans();
   /// Refuses a model's tunnel without a confirmed registration (registration_not_confirmed,
   /// registration_stale).
   Expected<void> check_registered(const OperationTunnel& tunnel) const;

@@ -10,9 +10,11 @@
 namespace helicarm::operation {
 namespace {
 
-/// Refuses (off_target) a drill that cannot be at the end of its tunnel, however badly that was drilled.
+/// Refuses (off_target) a drill that cannot be at the end of its tunnel, however badly that was drilled, and
+/// (plan_stale) one whose bone or marker has moved.
 void check_in_tunnel(const Guidance& now) {
   constexpr double farthest_mm = 10, widest_deg = 20;
+  if (now.decision() == code(Reason::plan_stale)) throw BadInput(*now.why_not);
   if (!now.aim) return;
   const TunnelAim& aim = *now.aim;
   const double before_end_mm = aim.length_mm - aim.depth_mm;
@@ -84,11 +86,14 @@ Expected<TunnelOutcome> Operation::verify_drilled(const std::string& name) {
     if (!plan_.drill) throw BadInput(Reason::usage, "the plan has no hand-held drill");
     value_or_throw(gate_.check_registered(tunnel));
     if (gate_.guide()) check_in_tunnel(value_or_throw(guidance()));
+    notify_(Step::verify, name);
+    TunnelOutcome outcome = check(tunnel);
     gate_.end_guidance();
     in_place_.clear();
-    notify_(Step::verify, name);
-    return check(tunnel);
+    return outcome;
   });
 }
+
+void Operation::end_guidance() { gate_.end_guidance(); }
 
 }  // namespace helicarm::operation

@@ -158,10 +158,18 @@ pipeline::Result Operation::run(const guidance::Poses& now,
 
 /// The images are others now.
 void Operation::forget_measurement() {
-  forget_registration();
+  forget_result();
   measured_case_.reset();
-  result_.reset();
   by_images_.reset();
+}
+
+/// What was planned, guided, registered and verified by it ends too.
+void Operation::forget_result() {
+  forget_registration();
+  gate_.forget_plans();
+  result_.reset();
+  without_models_.reset();
+  newest_result_.reset();
   verifications_.clear();
 }
 
@@ -170,8 +178,7 @@ Expected<void> Operation::measure() {
     if (const auto missing = views_to_come(); !missing.empty())
       throw BadInput(Reason::usage, fmt::format("{}: no image received; acquire this view", missing.front()));
     notify_(Step::measure, fmt::format("{} views", views_.size()));
-    forget_registration();
-    verifications_.clear();
+    forget_result();
     result_ = without_models_ = run({}, {});
   });
 }

@@ -112,8 +112,8 @@ class Operation {
 
   /// Registers the plan's models to the measured images; the report and an overlay of each view are then in
   /// the session's folder. `starts`: of models that a person moved, instead of the plan's. Takes seconds to
-  /// minutes; `interrupt` ends it, and so does what `check` throws, which is called often, from other threads.
-  /// Fails with the refusal of a model. Until `confirm_registration` it guides nothing
+  /// minutes; `interrupt` ends it, and so does what `check` throws, which is called often, from other
+  /// threads. Fails with the refusal of a model. Until `confirm_registration` it guides nothing
   /// (registration_not_confirmed), nor after further images or another measurement (registration_stale).
   Expected<void> register_models(
       const std::vector<ModelStart>& starts = {}, const std::function<void()>& check = [] {});
@@ -176,8 +176,10 @@ class Operation {
   /// (usage) before `guide`, and (record_lost) without the log, which ends the guidance.
   Expected<Guidance> guidance();
   /// Compares the drill, held still in the drilled tunnel or along it, with the tunnel in the tracker's frame
-  /// and in the X-ray images. Ends its guidance.
+  /// and in the X-ray images. Ends its guidance, which goes on as it was begun where this is refused:
+  /// off_target (the drill is not there), plan_stale (as guided), and as a reading of poses.
   Expected<TunnelOutcome> verify_drilled(const std::string& tunnel);
+  void end_guidance();
 
  private:
   static constexpr std::chrono::seconds robot_patience{5};
@@ -211,6 +213,7 @@ class Operation {
   PoseWindow look(record::Look why);
   pipeline::Result run(const guidance::Poses& now, const std::vector<guidance::ToolLine>& tool_lines);
   void forget_measurement();
+  void forget_result();
   tracker::HandEyePair pair_at(const geometry::RigidTransform& base_from_tcp, const Confirm& confirm);
   std::vector<robot::Miss> carry_out(const robot::RobotOrder& order, const std::string& token,
                                      const robot::Measure& measure, const robot::Watch& watch);

@@ -79,11 +79,14 @@ Expected<void> Operation::confirm_registration() {
   });
 }
 
-/// What was planned to the models' tunnels ends with their registration.
+/// What was planned, guided and verified in the models' tunnels ends with their registration.
 void Operation::forget_registration() {
   registration_.reset();
   registered_digest_.clear();
   gate_.forget_registration(plan_.tunnels);
+  result_ = without_models_;
+  for (const OperationTunnel& tunnel : plan_.tunnels)
+    if (tunnel.of_model) verifications_.erase(tunnel.name);
 }
 
 }  // namespace helicarm::operation

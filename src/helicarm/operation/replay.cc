@@ -246,6 +246,7 @@ class Replay {
     ++report.registrations;
     list_files(record.files, record.folder, origin);
     registration_.reset(), is_confirmed_ = false;
+    result_ = without_models_;
     if (!measured_ || !measurement_) return differ(origin, "a registration without a measurement");
     auto now = register_models(plan_, *measured_, *measurement_, {}, record.starts);
     if (!now) return differ(origin, now.error().message);
@@ -285,11 +286,11 @@ class Replay {
   std::map<std::string, ListedFile> files_;
   std::filesystem::path session_;
   OperationPlan plan_;
-  std::optional<pipeline::Result> result_;  ///< of the last measurement
+  std::optional<pipeline::Result> result_;          ///< of the last measurement
   std::optional<pipeline::Result> without_models_;  ///< the same before the registration was confirmed
-  std::optional<pipeline::Result> newest_;  ///< also of a verification
-  bool earlier_ = false;                    ///< the last case is of an earlier version
-  bool verifies_ = false;                   ///< the last case is that of a verification
+  std::optional<pipeline::Result> newest_;          ///< also of a verification
+  bool earlier_ = false;                            ///< the last case is of an earlier version
+  bool verifies_ = false;                           ///< the last case is that of a verification
   std::optional<FreehandGuide> guide_;
   std::optional<pipeline::Case> derived_;        ///< of the last case record
   std::optional<pipeline::Result> measurement_;  ///< of the accepted images

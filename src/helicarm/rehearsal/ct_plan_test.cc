@@ -130,6 +130,26 @@ TEST_F(CtOperation, ARegistrationThatNobodyHasLookedAtGuidesNothing) {
   expect_replayed(folder_.path() / "session", 1);
 }
 
+TEST_F(CtOperation, AVerificationThatIsRefusedGuidesOnFromTheSamePoses) {
+  begin();
+  ASSERT_TRUE(operation_->register_models());
+  ASSERT_TRUE(operation_->confirm_registration());
+  ASSERT_TRUE(guided());
+  EXPECT_EQ(operation_->verify_drilled("femur").error().reason, Reason::off_target);  // far before its end
+  ASSERT_TRUE(operation_->guidance());
+  virtual_or_->simulated_scene().bump_marker("femur", {3, 0, 0});
+  const auto decision = [&] { return std::string(operation_->guidance().value().decision()); };
+  for (int look = 0; look < 100 && decision() != "plan_stale"; ++look)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_EQ(decision(), "plan_stale");
+  EXPECT_EQ(operation_->verify_drilled("femur").error().reason, Reason::plan_stale);
+  EXPECT_EQ(decision(), "plan_stale");
+  ASSERT_TRUE(operation_->measure());  // ends the guidance
+  EXPECT_EQ(operation_->guidance().error().reason, Reason::usage);
+  ASSERT_TRUE(operation_->finish());
+  expect_replayed(folder_.path() / "session", 1);
+}
+
 TEST_F(CtOperation, ARefusedRegistrationGuidesNothing) {
   begin({.off_mm = 2, .off_deg = 2, .diameter_mm = 4, .wrong_bone = true});
   const auto registered = operation_->register_models();
