@@ -106,6 +106,7 @@ struct ApplicationState {
   std::vector<std::optional<std::filesystem::path>> model_volumes = {};  ///< their CTs
   std::vector<pipeline::CaseModel> case_models = {};                     ///< of files only
   ModelLandmarks model_landmarks = {};       ///< placed; at first those of the case
+  ModelLandmarks planned_points = {};        ///< of the models' plans
   ModelLandmarks case_landmarks = {};        ///< of the case as it was read
   ModelLandmarks saved_landmarks = {};       ///< of case.json
   ModelLandmarks registered_landmarks = {};  ///< at the registration

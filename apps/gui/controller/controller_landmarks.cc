@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "gui/controller/controller.h"
+#include "gui/controller/equipment.h"
 #include "gui/controller/model_landmarks.h"
 #include "gui/controller/steps.h"
 
@@ -12,6 +13,7 @@ using pipeline::PointInModel;
 
 void Controller::take_landmarks(const OpenedLandmarks& opened) {
   state_.model_landmarks = state_.case_landmarks = state_.saved_landmarks = opened.of_case;
+  state_.planned_points = opened.planned;
   for (Edit& edit : earlier_) edit.model_landmarks = opened.of_case;
   if (opened.unreadable) {  // and not overwritten
     state_.picks_not_kept = opened.unreadable;
@@ -33,7 +35,7 @@ bool Controller::takes_landmarks(std::size_t model) const {
 void Controller::place_landmarks(std::size_t model, const std::vector<PointInModel>& points) {
   if (!takes_landmarks(model) || points.empty()) return;
   for (const PointInModel& point : points)
-    if (const QString why = why_no_landmark(state_, model, point.name); !why.isEmpty())
+    if (const QString why = why_no_landmark(state_, model, point.name, point.in_model); !why.isEmpty())
       return emit refused(Phase::registration, why);
   remember_edit(points.size() == 1 ? tr("landmark %1").arg(QString::fromStdString(points[0].name))
                                    : tr("%n landmarks", nullptr, int(points.size())));
@@ -55,6 +57,8 @@ void Controller::rename_landmark(std::size_t model, const std::string& from, con
   std::vector<PointInModel>& landmarks = state_.model_landmarks[model];
   const auto renamed = std::ranges::find(landmarks, from, &PointInModel::name);
   if (renamed == landmarks.end()) return;
+  if (const QString why = why_not_renamed(state_, model, from); !why.isEmpty())
+    return emit refused(Phase::registration, why);
   const bool is_known = std::ranges::find(landmarks, to, &PointInModel::name) != landmarks.end() ||
                         std::ranges::find(state_.landmarks, to) != state_.landmarks.end();
   if (const QString why =
@@ -105,7 +109,11 @@ Expected<QStringList> Controller::save_landmarks() {
   return gui::save_landmarks(*state_.case_folder, state_.case_models, state_.model_landmarks,
                              state_.saved_landmarks, state_.picks)
       .map([this](const SavedLandmarks& done) {
-        state_.saved_landmarks = done.saved;
+        state_.saved_landmarks = state_.case_landmarks = done.saved;
+        state_.case_models = done.models;
+        worker_.post([equipment = equipment_, models = done.models] {
+          if (equipment && equipment->the_case) equipment->the_case->models = models;
+        });
         return done.told;
       });
 }

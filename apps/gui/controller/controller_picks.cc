@@ -97,7 +97,7 @@ void Controller::save_picks() {
     return save_landmarks();
   });
   watch_files_of(*state_.case_folder);
-  state_.has_unsaved_picks = !saved;
+  state_.has_unsaved_picks = !saved || !are_same(state_.model_landmarks, state_.saved_landmarks);
   state_.picks_not_kept = saved ? std::nullopt : std::optional(saved.error());
   emit changed();
   if (!saved) return emit told(sentence_of(saved.error()));
@@ -178,9 +178,9 @@ void Controller::erase_picks(const std::string& point) {
   Picks picks = state_.picks;
   const auto erased = std::erase_if(picks, [&](const pipeline::Pick& pick) { return pick.name == point; });
   const bool is_landmark = std::ranges::find(state_.landmarks, point) != state_.landmarks.end();
-  if (!takes_picks() || (erased == 0 && !is_landmark)) return;
+  if (!takes_picks() || (erased == 0 && (!is_landmark || is_landmark_of_model(state_, point)))) return;
   remember_edit(tr("deletion of %1").arg(QString::fromStdString(point)));
-  std::erase(state_.landmarks, point);
+  if (!is_landmark_of_model(state_, point)) std::erase(state_.landmarks, point);
   if (erased == 0) return emit changed();
   state_.picks = std::move(picks);
   keep_unsaved_picks();

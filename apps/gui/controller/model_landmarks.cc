@@ -77,7 +77,10 @@ ModelLandmarks with_unsaved(const Json& json, const std::vector<CaseModel>& mode
 }
 
 /// NAME-landmarks.csv with the characters of a portable file name, numbered where another file has it.
-std::string csv_name(const fs::path& case_folder, std::string name, const Json& model) {
+std::string csv_name(const fs::path& case_folder, const CaseModel& of, const Json& model) {
+  std::string name = of.name;
+  // What it holds is not known where it cannot be read.
+  const bool is_readable = guarded([&] { return case_registration::start_landmarks(of); }).has_value();
   for (char& c : name) {
     const bool is_good =
         (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
@@ -90,7 +93,7 @@ std::string csv_name(const fs::path& case_folder, std::string name, const Json& 
            model["start"].value("landmarks", Json()) == Json(file);
   };
   std::string file = name + "-landmarks.csv";
-  for (int number = 2; fs::exists(case_folder / file) && !is_start(file); ++number)
+  for (int number = 2; fs::exists(case_folder / file) && !(is_readable && is_start(file)); ++number)
     file = fmt::format("{}-landmarks-{}.csv", name, number);
   return file;
 }
@@ -161,6 +164,11 @@ ModelLandmarks landmarks_of_models(const std::vector<CaseModel>& models) {
 
 OpenedLandmarks opened_landmarks(const pipeline::Case& the_case, bool keeps) {
   OpenedLandmarks opened{landmarks_of_models(the_case.models)};
+  for (const CaseModel& model : the_case.models) {
+    const auto plan =
+        model.plan ? case_registration::read_plan(*model.plan) : Expected<case_registration::MarkupPlan>();
+    opened.planned.push_back(plan ? plan->points : Points());
+  }
   const fs::path file = unsaved_landmarks_file(the_case.folder);
   if (!keeps || the_case.models.empty() || !fs::exists(file)) return opened;
   auto unsaved = read_json(file).and_then([&](const Json& json) {
@@ -207,10 +215,11 @@ Expected<SavedLandmarks> save_landmarks(const fs::path& case_folder, const std::
                                         const ModelLandmarks& placed, const ModelLandmarks& saved,
                                         const std::vector<pipeline::Pick>& picks) {
   return guarded([&] {
-    SavedLandmarks done{saved, {}};
+    SavedLandmarks done{saved, models, {}};
     done.saved.resize(models.size());
     const fs::path file = case_folder / "case.json";
     std::optional<Json> json;
+    std::vector<std::pair<std::string, std::string>> tables;  // file and text
     for (std::size_t i = 0; i < models.size(); ++i) {
       const Points& points = of_model(placed, i);
       if (are_same_points(points, of_model(saved, i))) continue;
@@ -221,13 +230,17 @@ Expected<SavedLandmarks> save_landmarks(const fs::path& case_folder, const std::
       }
       if (!json) json = value_or_throw(read_json(file));
       Json& model = model_in(*json, models[i].name);
-      const std::string name = csv_name(case_folder, models[i].name, model);
-      value_or_throw(write_file_in_folder(case_folder / name, to_csv(points)));
+      const std::string name = csv_name(case_folder, models[i], model);
       done.told.push_back(name_as_start(model, models[i].name, name));
       done.saved[i] = points;
+      done.models[i].landmarks = case_folder / name;
+      done.models[i].world_from_model.reset();
+      tables.emplace_back(name, to_csv(points));
     }
     if (json) {
       value_or_throw(pipeline::case_from_json(*json, "case.json", case_folder));
+      for (const auto& [name, table] : tables)
+        value_or_throw(write_file_in_folder(case_folder / name, table));
       value_or_throw(write_file_in_folder(file, to_text(*json) + "\n"));
     }
     value_or_throw(keep_unsaved_landmarks(case_folder, models, placed, done.saved));
@@ -250,14 +263,38 @@ void start_from_landmarks(pipeline::Case& the_case, const ModelLandmarks& placed
   }
 }
 
-QString why_no_landmark(const ApplicationState& state, std::size_t model, const std::string& name) {
+QString why_no_landmark(const ApplicationState& state, std::size_t model, const std::string& name,
+                        const std::optional<Eigen::Vector3d>& in_model) {
+  constexpr double same_place_mm = 1;  // as the registration takes it
   if (name.empty()) return landmark_tr("A landmark needs a name.");
+  for (std::size_t i = 0; i < state.planned_points.size(); ++i)
+    for (const PointInModel& planned : state.planned_points[i])
+      if (planned.name == name &&
+          !(i == model && in_model && (planned.in_model - *in_model).norm() < same_place_mm))
+        return landmark_tr("%1 is a point of a plan, elsewhere: give the landmark another name.")
+            .arg(in_words(name));
   for (std::size_t i = 0; i < state.model_landmarks.size(); ++i)
     if (i != model && has_point(state.model_landmarks[i], name))
       return landmark_tr("%1 is a landmark of %2 already.")
           .arg(in_words(name), in_words(i < state.models.size() ? state.models[i] : ""));
   if (!has_point(of_model(state.model_landmarks, model), name) && is_end_or_target(state, name))
     return landmark_tr("There is a point of this name already.");
+  return {};
+}
+
+bool is_landmark_of_model(const ApplicationState& state, const std::string& name) {
+  return std::ranges::any_of(state.model_landmarks,
+                             [&](const Points& points) { return has_point(points, name); });
+}
+
+QString why_not_renamed(const ApplicationState& state, std::size_t model, const std::string& name) {
+  if (is_end_or_target(state, name))
+    return landmark_tr("%1 is the end of a tunnel or a target too: remove the landmark and add another one.")
+        .arg(in_words(name));
+  for (std::size_t i = 0; i < state.model_landmarks.size(); ++i)
+    if (i != model && has_point(state.model_landmarks[i], name))
+      return landmark_tr("%1 is a landmark of %2 too: remove it here and add another one.")
+          .arg(in_words(name), in_words(i < state.models.size() ? state.models[i] : ""));
   return {};
 }
 

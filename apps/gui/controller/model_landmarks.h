@@ -21,6 +21,7 @@ ModelLandmarks landmarks_of_models(const std::vector<pipeline::CaseModel>& model
 /// Those of a case that is opened.
 struct OpenedLandmarks {
   ModelLandmarks of_case;
+  ModelLandmarks planned = {};  ///< points of the models' plans; none where these cannot be read
   std::optional<ModelLandmarks> unsaved = {};  ///< of all models
   std::optional<Failure> unreadable = {};      ///< unsaved_landmarks.json
 };
@@ -41,8 +42,9 @@ std::size_t count_usable(const std::vector<pipeline::PointInModel>& landmarks,
 
 /// What `save_landmarks` did.
 struct SavedLandmarks {
-  ModelLandmarks saved;  ///< those of case.json now
-  QStringList told;      ///< a sentence for each model that changed
+  ModelLandmarks saved;                     ///< those of case.json now
+  std::vector<pipeline::CaseModel> models;  ///< likewise
+  QStringList told;                         ///< a sentence for each model that changed
 };
 /// Writes the changed landmarks of each model with three usable ones as NAME-landmarks.csv, then names these
 /// files as the models' starts in case.json. Those of other models stay unsaved, because a start of fewer
@@ -58,7 +60,14 @@ void start_from_landmarks(pipeline::Case& the_case, const ModelLandmarks& placed
                           const std::vector<operation::ModelStart>& moved);
 
 /// Why the point cannot be a landmark of this model; empty if it can, also where the model has it already.
-QString why_no_landmark(const ApplicationState& state, std::size_t model, const std::string& name);
+/// `in_model`: where it is placed; nothing: not at a planned point of its name.
+QString why_no_landmark(const ApplicationState& state, std::size_t model, const std::string& name,
+                        const std::optional<Eigen::Vector3d>& in_model = {});
+
+bool is_landmark_of_model(const ApplicationState& state, const std::string& name);
+
+/// Why its picks may not take another name with it; empty if they may.
+QString why_not_renamed(const ApplicationState& state, std::size_t model, const std::string& name);
 
 /// The first of L1, L2, ... (with the prefix L), from a number on, that is the name of no point.
 std::string free_landmark_name(const ApplicationState& state, std::size_t model, const std::string& prefix,

@@ -189,7 +189,7 @@ LandmarksWindow::Loaded LandmarksWindow::loaded(const pipeline::CaseModel& model
       }
       if (model.volume)
         loaded.ct =
-            std::make_shared<const volume::Volume>(value_or_throw(volume::read_volume(*model.volume)));
+            std::make_shared<const volume::Volume>(value_or_throw(case_registration::volume_of(model)));
     } catch (const BadInput&) {
       throw;
     } catch (const std::exception& problem) {  // such as no memory
@@ -197,6 +197,8 @@ LandmarksWindow::Loaded LandmarksWindow::loaded(const pipeline::CaseModel& model
     }
   });
   if (!read) say(read.error());
+  if (const auto start = guarded([&] { return case_registration::start_landmarks(model); }); !start)
+    say(start.error());
   return loaded;
 }
 
@@ -330,6 +332,9 @@ void LandmarksWindow::show_places() {
 void LandmarksWindow::fill_table() {
   const ApplicationState& state = controller_.state();
   const QSignalBlocker quiet(table_);
+  const QTableWidgetItem* current =
+      table_->selectionModel()->hasSelection() ? table_->item(table_->currentRow(), 0) : nullptr;
+  const QString selected = current ? current->text() : QString();
   table_->setRowCount(int(landmarks().size()));
   for (int row = 0; row < table_->rowCount(); ++row) {
     const PointInModel& point = landmarks()[std::size_t(row)];
@@ -338,6 +343,14 @@ void LandmarksWindow::fill_table() {
         tr("%1 of %2 views").arg(views_with(state.picks, point.name)).arg(state.views.size())};
     for (int column = 0; column < words.size(); ++column)
       table_->setItem(row, column, new QTableWidgetItem(words[column]));
+  }
+  if (!current) return;
+  const auto same = std::ranges::find(landmarks(), selected.toStdString(), &PointInModel::name);
+  if (same == landmarks().end()) {  // the row holds another one now
+    table_->clearSelection();
+    name_->clear();
+  } else {
+    table_->selectRow(int(same - landmarks().begin()));
   }
 }
 

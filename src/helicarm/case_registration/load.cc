@@ -253,6 +253,10 @@ Expected<std::vector<RegistrationView>> with_images(const LoadedViews& loaded,
   });
 }
 
+Expected<volume::Volume> volume_of(const pipeline::CaseModel& case_model) {
+  return guarded([&] { return volume_at(case_model.volume.value(), case_model, case_model.tiff_offset_hu); });
+}
+
 Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,
                                  const std::optional<MarkupPlan>& plan) {
   return guarded([&]() -> LoadedModel {

@@ -52,6 +52,10 @@ struct LoadedModel {
   std::vector<std::optional<TunnelSlices>> tunnel_slices = {};
 };
 
+/// The CT of a model that has one. Fails as `read_volume` and `tiff_stack`, and bad_value for a TIFF stack
+/// without voxel_mm.
+Expected<volume::Volume> volume_of(const pipeline::CaseModel& case_model);
+
 /// The model's files; of a plan the tunnels against the bone.
 Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,
                                  const std::optional<MarkupPlan>& plan = {});

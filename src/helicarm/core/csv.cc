@@ -174,7 +174,9 @@ Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_
 }
 
 std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  const bool is_plain = text.find_first_of(",\"\r\n") == std::string::npos && !text.starts_with('#') &&
+                        !text.starts_with(' ') && !text.ends_with(' ');
+  if (is_plain) return text;
   std::string quoted = "\"";
   for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
   return quoted + '"';

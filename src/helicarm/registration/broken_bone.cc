@@ -174,16 +174,19 @@ std::optional<BrokenBone> broken_bone(const Model& model, const std::vector<Regi
   if (!plane) return std::nullopt;
   const auto& [axis, at_mm] = *plane;
   const bool is_upper_shorter = axis.high - at_mm < at_mm - axis.low;
-  const auto longer = part_of(model, *plane, !is_upper_shorter);
-  const auto shorter = part_of(model, *plane, is_upper_shorter);
-  if (!longer || !shorter) return std::nullopt;
-  const Registration one = register_part(*longer, refused.world_from_model);
+  // One part after the other: each is as large as the model.
+  std::optional<Model> part = part_of(model, *plane, !is_upper_shorter);
+  if (!part) return std::nullopt;
+  const Registration one = register_part(*part, refused.world_from_model);
   if (one.failure) return std::nullopt;
-  const Registration other = register_part(*shorter, one.world_from_model);
+  const double error_of_longer_mm = worst_error_mm(*part, one);
+  part = part_of(model, *plane, is_upper_shorter);
+  if (!part) return std::nullopt;
+  const Registration other = register_part(*part, one.world_from_model);
   if (other.failure) return std::nullopt;
   BrokenBone broken;
-  broken.moved_mm = separation(*shorter, one.world_from_model, other.world_from_model);
-  const double error_mm = std::hypot(worst_error_mm(*longer, one), worst_error_mm(*shorter, other));
+  broken.moved_mm = separation(*part, one.world_from_model, other.world_from_model);
+  const double error_mm = std::hypot(error_of_longer_mm, worst_error_mm(*part, other));
   if (broken.moved_mm < std::max(least_moved_mm, least_moved_errors * error_mm)) return std::nullopt;
   const Eigen::AngleAxisd turn(one.world_from_model.rotation.transpose() * other.world_from_model.rotation);
   broken.turned_deg = turn.angle() * 180 / EIGEN_PI;

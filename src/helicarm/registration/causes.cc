@@ -73,20 +73,22 @@ std::optional<Warning> metal(const Model& model, const RegistrationView& view,
 }
 
 Warning broken(const Model& model, const BrokenBone& bone) {
-  return {Reason::wrong_model,
-          fmt::format("{}: its parts on both sides of ({:.0f}, {:.0f}, {:.0f}), {:.0f} mm from its end at "
-                      "({:.0f}, {:.0f}, {:.0f}), are each registered alone, {:.1f} mm and {:.0f} degrees "
-                      "apart: the bone is broken there or has been moved since the CT; register its parts as "
-                      "models of their own, each with a mask of that part",
-                      model.name, bone.cut.x(), bone.cut.y(), bone.cut.z(), bone.from_end_mm, bone.end.x(),
-                      bone.end.y(), bone.end.z(), bone.moved_mm, bone.turned_deg),
-          {},
-          {{"x_mm", bone.cut.x()},
-           {"y_mm", bone.cut.y()},
-           {"z_mm", bone.cut.z()},
-           {"from_end_mm", bone.from_end_mm},
-           {"moved_mm", bone.moved_mm},
-           {"turned_deg", bone.turned_deg}}};
+  return {
+      Reason::wrong_model,
+      fmt::format("{}: its parts on both sides of ({:.0f}, {:.0f}, {:.0f}), {:.0f} mm from its end at "
+                  "({:.0f}, {:.0f}, {:.0f}), are each registered alone, {:.1f} mm and {:.0f} degrees "
+                  "apart: the bone is broken there or has been moved since the CT{}; register its parts as "
+                  "models of their own, each with a mask of that part",
+                  model.name, bone.cut.x(), bone.cut.y(), bone.cut.z(), bone.from_end_mm, bone.end.x(),
+                  bone.end.y(), bone.end.z(), bone.moved_mm, bone.turned_deg,
+                  model.outlined ? "" : ", or the model, which has no mask, is of two bones"),
+      {},
+      {{"x_mm", bone.cut.x()},
+       {"y_mm", bone.cut.y()},
+       {"z_mm", bone.cut.z()},
+       {"from_end_mm", bone.from_end_mm},
+       {"moved_mm", bone.moved_mm},
+       {"turned_deg", bone.turned_deg}}};
 }
 
 }  // namespace

@@ -49,11 +49,13 @@ Registration Follower::near(const std::vector<RegistrationView>& views,
   Registration result;
   RegistrationOptions narrow = options_;
   narrow.search.candidates = 0;
+  narrow.names_causes = false;
   if (before_) result = register_model(*model_, views, {expected, last_->pose}, narrow);
   if (before_ && !result.failure && result.agree >= 2) return result;
   RegistrationOptions wide = options_;
   wide.search.candidates = SearchOptions{}.candidates;
   wide.search.anywhere_after_refusal = false;
+  wide.names_causes = false;
   const double spent_s = result.seconds;
   result = register_model(*model_, views, {expected}, wide);
   result.seconds += spent_s;
@@ -65,7 +67,9 @@ Registration Follower::next(const std::vector<RegistrationView>& views, double t
   Registration result = expected ? near(views, *expected) : register_model(*model_, views, starts_, options_);
   if (expected && views.size() > 1 && options_.search.anywhere_after_refusal && may_have_missed(result) &&
       std::has_single_bit(refused_ + 1)) {
-    Registration sought = register_model(*model_, views, {}, options_);
+    RegistrationOptions anywhere = options_;
+    anywhere.names_causes = false;  // the refusal is that of the motion
+    Registration sought = register_model(*model_, views, {}, anywhere);
     result.seconds += sought.seconds;
     if (!sought.failure) {
       sought.seconds = result.seconds;

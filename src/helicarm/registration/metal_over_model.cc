@@ -21,8 +21,8 @@ constexpr int least_outline_rays = 200;
 // Contrast from which something is metal. In modelled knees bones reached 0.8 over 20 mm and more, fiducials
 // that lie in a row 1.1.
 constexpr float least_contrast = 1.5F;
-// Two fiducials of 8 mm that touch are up to 20 mm long; fiducials and wires in a row, where nothing excludes
-// them, have up to 54 mm^2, a screw of 4 mm and 35 mm has 140.
+// Two fiducials of 8 mm that touch are up to 20 mm long. Where nothing excludes them, fiducials in a row had
+// up to 54 mm^2, one wire of a calibrator 94, as a short screw has; a screw of 4 mm and 35 mm has 140.
 constexpr double least_length_mm = 20, least_area_mm2 = 100;
 constexpr float least_drop = 0.5F;  // of the contrast, within two rays at the metal's edge
 constexpr double least_comparisons_share = 0.05;

@@ -72,6 +72,16 @@ TEST(MetalOverModel, FiducialsAreNotNamed) {
   EXPECT_FALSE(scene.metal());
 }
 
+TEST(MetalOverModel, AScrewIsNamedAWireNot) {
+  Scene screw, wire;
+  screw.add([](double x, double y) { return std::abs(x) < 2 && std::abs(y) < 17.5; });
+  wire.add([](double x, double y) { return std::abs(x) < 1 && std::abs(y) < 21; });
+  const auto metal = screw.metal();
+  ASSERT_TRUE(metal);
+  EXPECT_NEAR(metal->area_mm2, 4 * 35, 12);
+  EXPECT_FALSE(wire.metal());
+}
+
 TEST(MetalOverModel, MetalBesideTheModelIsNotNamed) {
   Scene scene;
   scene.add([](double x, double) { return x < -34; });

@@ -54,6 +54,7 @@ TEST(PosesAnywhere, AreSearchedAfterARefusalAboutTheStart) {
   step << 0.5, -0.4, 0.3, 12, -9, 8;
   const RigidTransform start = moved_about(true_pose(), true_pose() * model.centre, step);
   options.search.anywhere_after_refusal = false;
+  options.names_causes = false;
   ASSERT_TRUE(register_model(model, two_views(volume), {start}, options).failure);
   options.search.anywhere_after_refusal = true;
   const auto result = register_model(model, two_views(volume), {start}, options);

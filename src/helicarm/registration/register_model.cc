@@ -383,14 +383,17 @@ Registration registered_part(const Model& part, const std::vector<RegistrationVi
 Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
                             const std::vector<RigidTransform>& starts, const RegistrationOptions& options) {
   Registration result = registered_or_refused(model, views, starts, options);
+  if (!result.failure || !options.names_causes) return result;
+  const auto begun = std::chrono::steady_clock::now();
+  if (options.on_step) options.on_step("causes");
   RegisterPart register_part;
-  // A refusal after which the caller searches on needs no cause yet.
-  if (options.search.candidates > 0 && options.search.anywhere_after_refusal)
+  if (options.search.candidates > 0)
     register_part = [&](const Model& part, const RigidTransform& start) {
       return registered_part(part, views, start, options);
     };
   for (Warning& cause : causes_of(model, views, result, register_part))
     result.notes.push_back(std::move(cause));
+  result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return result;
 }
 

@@ -31,6 +31,7 @@ struct RegistrationOptions {
   Eigen::MatrixXd camera_covariance = {};
   /// Motion of the model between the first view's acquisition and each later one, per axis, mm.
   double motion_sigma_mm = 0;
+  bool names_causes = true;  ///< of a refusal, as notes (`causes_of`), which take seconds
   /// Called with the name of each step. An exception ends the registration.
   std::function<void(std::string_view step)> on_step = {};
 };

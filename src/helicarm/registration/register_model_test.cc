@@ -31,6 +31,7 @@ RegistrationOptions quick() {
   options.threads = 1;
   options.search = {8, 8, 200};
   options.search.anywhere_after_refusal = false;
+  options.names_causes = false;
   return options;
 }
 
