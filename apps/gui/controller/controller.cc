@@ -33,7 +33,6 @@ void forget_measurement(ApplicationState& state) {
   state.outcomes.clear();
   state.refusals.clear();
   state.measured_picks.clear();
-  state.has_arrived = false;
 }
 
 void forget_registration(ApplicationState& state) {
@@ -234,7 +233,7 @@ bool Controller::has_all_images() const {
 
 void Controller::cancel() {
   if (!state_.busy || !equipment_) return;
-  if (equipment_->devices) return stop();
+  if (equipment_->devices && state_.busy == Phase::navigate) return stop();  // the robot too
   if (equipment_->stopped.exchange(true)) return;
   state_.doing = "cancelling: " + state_.doing;
   emit changed();

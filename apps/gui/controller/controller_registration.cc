@@ -82,15 +82,17 @@ void Controller::register_in_operation() {
   state_.path = {};
   begin(Phase::registration, "reading the models",
         [this, equipment = equipment_, starts = starts_by_hand()]() -> Change {
+          const int before = equipment->operation->registrations();
           const auto done = equipment->operation->register_models(starts, [equipment] {
             if (equipment->stopped) throw BadInput(Reason::interrupted, "cancelled");
           });
-          const auto& found = equipment->operation->registration();
-          const auto registered = found ? std::make_shared<const CaseRegistration>(*found) : nullptr;
+          if (equipment->operation->registrations() == before) throw BadInput(done.error());
+          const auto registered =
+              std::make_shared<const CaseRegistration>(equipment->operation->registration().value());
           const auto live = equipment->operation->live_tool();  // without the models' tunnels
-          const Change now = [this, registered, live, starts](ApplicationState& state) {
+          return [this, registered, live, starts](ApplicationState& state) {
             state.registration = registered;
-            state.starts_by_hand = registered ? starts : decltype(starts)();
+            state.starts_by_hand = starts;
             state.registered_picks = state.picks;
             state.is_confirmed = false;
             state.nudged.reset();
@@ -98,11 +100,6 @@ void Controller::register_in_operation() {
               if (tunnel.of_model) state.outcomes.erase(tunnel.name);
             live_tool_ = live ? std::optional(*live) : std::nullopt;
           };
-          if (!done && !registered) {
-            meanwhile(now);
-            throw BadInput(done.error());
-          }
-          return now;
         });
 }
 

@@ -161,6 +161,14 @@ void BonesWindow::open_ct(const fs::path& file, CtPlan plan) {
       scene_.cursor = 0.5 * (scene_.ct->size.cast<double>().array() - 1).matrix();
       QStringList words;
       for (const Warning& warning : scene_.ct->warnings) words << sentence_of(warning);
+      if (!plan_.tunnels.empty()) {
+        words << tr("The planned tunnels are dashed, dotted before the bone, projected onto each slice.");
+        const CtTunnel& first = plan_.tunnels.front();
+        const Eigen::Vector3d middle =
+            scene_.ct->patient_from_voxel.inverse() * Eigen::Vector3d(0.5 * (first.start + first.end));
+        const Eigen::Array3d last = (scene_.ct->size.array() - 1).cast<double>();
+        scene_.cursor = middle.array().round().max(0).min(last).matrix();
+      }
       words << tr("Click in a bone in each slice, name it and add it as a seed; then find the bones.");
       says_->setText(words.join('\n'));
       show_scene();

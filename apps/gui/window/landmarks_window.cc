@@ -6,6 +6,7 @@
 #include <QHBoxLayout>
 #include <QHeaderView>
 #include <QPointer>
+#include <QShortcut>
 #include <QSignalBlocker>
 #include <QThreadPool>
 #include <algorithm>
@@ -174,6 +175,8 @@ void LandmarksWindow::build_buttons(QVBoxLayout* column) {
   connect(remove_, &QPushButton::clicked, this, &LandmarksWindow::remove);
   connect(propose_, &QPushButton::clicked, this, &LandmarksWindow::propose);
   connect(close, &QPushButton::clicked, this, &QDialog::close);
+  connect(new QShortcut(QKeySequence::Undo, this), &QShortcut::activated, &controller_, &Controller::undo);
+  connect(new QShortcut(QKeySequence::Redo, this), &QShortcut::activated, &controller_, &Controller::redo);
 }
 
 LandmarksWindow::Loaded LandmarksWindow::loaded(const pipeline::CaseModel& model) {
@@ -284,7 +287,7 @@ void LandmarksWindow::propose() {
           return (known.in_model - place).norm() < same_place_mm;
         }))
       continue;
-    const std::string name = free_landmark_name(controller_.state(), model_, "P", number);
+    const std::string name = free_landmark_name(controller_.state(), model_, "L", number);
     number = std::stoi(name.substr(1)) + 1;
     points.push_back({name, place});
   }

@@ -14,6 +14,7 @@
 #include <QVBoxLayout>
 #include <algorithm>
 
+#include "gui/controller/model_landmarks.h"
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/ask_files.h"
@@ -239,7 +240,7 @@ void MainWindow::show_state() {
   refresh_present();
   if (!state.busy && !moved_on_) show_phase(open_phase(cards_, state));
   if (state.busy)  // its page stays; so does the plan's, where a registration's landmarks are picked
-    moved_on_ = state.busy == Phase::registration ||
+    moved_on_ = state.busy == Phase::registration || (state.has_models && state.busy == Phase::navigate) ||
                 (state.has_models && state.busy == Phase::calibrate && phase_ == Phase::plan);
   state.result = present_;
   for (std::size_t i = 0; i < all_pages_.size(); ++i) {
@@ -418,7 +419,8 @@ void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
   pick.name = wanted->point;
   pick.view = shown_->views[view].name;
   pick.uv_raw = {raw.x(), raw.y()};
-  if (plan_->snaps()) pick.snap = pipeline::Snap::ball;
+  if (plan_->snaps() && !is_landmark_of_model(controller_.state(), pick.name))
+    pick.snap = pipeline::Snap::ball;
   if (controller_.state().source != Source::files) pick.moves_with = wanted->bone;
   controller_.pick(std::move(pick));
   plan_->placed(wanted->point);

@@ -237,9 +237,9 @@ void MainWindow::ask_of_unsaved_picks() {
   if (findChild<QMessageBox*>("unsavedQuestion") != nullptr) return;
   const QString folder = QString::fromStdString(controller_.state().case_folder->string());
   auto* question = new QMessageBox(
-      QMessageBox::Question, tr("Picks that are not in case.json"),
-      tr("The changed picks of %1 are not in its case.json. Not saved, they are kept beside it in "
-         "unsaved_picks.json and restored when the case is opened again.")
+      QMessageBox::Question, tr("Changes that are not in case.json"),
+      tr("The changed picks or landmarks of %1 are not in its case.json. Not saved, they are kept beside it "
+         "(unsaved_picks.json, unsaved_landmarks.json) and restored when the case is opened again.")
           .arg(folder),
       QMessageBox::Save | QMessageBox::Close | QMessageBox::Cancel, this);
   question->setObjectName("unsavedQuestion");

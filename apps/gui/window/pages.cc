@@ -85,7 +85,7 @@ void Page::show_card(const StepCard& card, const ApplicationState& state) {
 }
 
 AcquirePage::AcquirePage(Controller& controller, QWidget* parent)
-    : Page(tr("Acquire an AP and a lateral X-ray image of the knee with the calibrator."), controller,
+    : Page(tr("Acquire an AP and a lateral X-ray image of the bones with the calibrator."), controller,
            parent) {
   refused_ = new QLabel;
   refused_->setObjectName("notOpened");

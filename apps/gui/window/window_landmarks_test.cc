@@ -109,8 +109,8 @@ TEST_F(WindowLandmarks, ProposedOnesAreTipsAndTheWindowSaysWhatComesNext) {
   press("proposeLandmarks");
   const auto& placed = state().model_landmarks[0];
   ASSERT_GE(placed.size(), 3U);
-  EXPECT_EQ(placed[0].name, "P1");
-  EXPECT_THAT(says(), HasSubstr("Click P1 in two X-ray images on page Plan"));
+  EXPECT_EQ(placed[0].name, "L1");
+  EXPECT_THAT(says(), HasSubstr("Click L1 in two X-ray images on page Plan"));
   EXPECT_THAT(find<QLabel>("registerSays")->text().toStdString(), HasSubstr("3 more must be"));
   screenshot("landmarks", dialog());
   EXPECT_EQ(illegible_parts(*dialog()).join('\n').toStdString(), "");

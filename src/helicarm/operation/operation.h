@@ -107,14 +107,17 @@ class Operation {
   Expected<case_registration::Measurement> measurement() const;
   /// Number of calibrations.
   int calibrations() const { return calibrations_; }
+  /// Of `register_models` that came to an end, refused ones too.
+  int registrations() const { return registrations_; }
   /// Poses at each view's acquisition, in the plan's order.
   std::vector<guidance::Poses> exposures() const;
 
   /// Registers the plan's models to the measured images; the report and an overlay of each view are then in
   /// the session's folder. `starts`: of models that a person moved, instead of the plan's. Takes seconds to
   /// minutes; `interrupt` ends it, and so does what `check` throws, which is called often, from other
-  /// threads. Fails with the refusal of a model. Until `confirm_registration` it guides nothing
-  /// (registration_not_confirmed), nor after further images or another measurement (registration_stale).
+  /// threads. Fails with the refusal of a model; where it ends before that, the earlier registration stays.
+  /// Until `confirm_registration` it guides nothing (registration_not_confirmed), nor after further images or
+  /// another measurement (registration_stale).
   Expected<void> register_models(
       const std::vector<ModelStart>& starts = {}, const std::function<void()>& check = [] {});
   /// The last registration of the present images, also a refused one.
@@ -256,7 +259,7 @@ class Operation {
   int case_folders_ = 0;                                    ///< written so far
   PlanFiles files_;
   std::optional<pipeline::Result> by_images_;  ///< of the present images
-  int calibrations_ = 0;
+  int calibrations_ = 0, registrations_ = 0;
   std::optional<pipeline::Case> measured_case_;  ///< of the last measurement, not of a verification
   std::optional<case_registration::CaseRegistration> registration_;  ///< of `measured_`
   std::string registered_digest_;

@@ -43,7 +43,6 @@ Expected<void> Operation::register_models(const std::vector<ModelStart>& starts,
   return guarded([&] {
     if (plan_.models.empty()) throw BadInput(Reason::usage, "the plan has no \"models\"");
     if (!result_ || !measured_case_) throw BadInput(Reason::usage, "no measurement yet");
-    forget_registration();
     notify_(Step::measure, "registration of the plan's models");
     case_registration::Progress progress;
     progress.step = [&](const std::string& model, std::string_view step) {
@@ -57,9 +56,12 @@ Expected<void> Operation::register_models(const std::vector<ModelStart>& starts,
         value_or_throw(operation::register_models(plan_, *measured_case_, *by_images_, progress, starts));
     const std::string folder = measured_case_->folder.filename().string() + "/" + registration_folder;
     const Digests files = write_with_digests(found, folder_ / folder);
-    registered_digest_ = xray::digest(to_text(operation::recorded(found)));
-    record(record::Registered{folder, registered_digest_, files, starts});
+    const std::string digest = xray::digest(to_text(operation::recorded(found)));
+    record(record::Registered{folder, digest, files, starts});
+    forget_registration();
+    registered_digest_ = digest;
     registration_ = std::move(found);
+    ++registrations_;
     const auto refusal = refusal_of(*registration_);
     gate_.registered(refusal);
     if (refusal) throw BadInput(*refusal);

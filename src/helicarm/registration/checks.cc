@@ -304,7 +304,7 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
     if (view.score < least)
       refuse(Reason::wrong_model,
              fmt::format(
-                 "{}: the model explains {:.2f} of its edges in {}, at least {:.2f} are required: another "
+                 "{}: the model explains {:.3g} of its edges in {}, at least {:.2g} are required: another "
                  "bone, patient or unit, exchanged cameras or images, a start too far away, or the model is "
                  "hidden{}{}",
                  model.name, view.score, view.name, least, mirrored, wider),
