@@ -338,6 +338,7 @@ void LandmarksWindow::fill_table() {
   const QTableWidgetItem* current =
       table_->selectionModel()->hasSelection() ? table_->item(table_->currentRow(), 0) : nullptr;
   const QString selected = current ? current->text() : QString();
+  const bool has_as_many = table_->rowCount() == int(landmarks().size());
   table_->setRowCount(int(landmarks().size()));
   for (int row = 0; row < table_->rowCount(); ++row) {
     const PointInModel& point = landmarks()[std::size_t(row)];
@@ -349,12 +350,10 @@ void LandmarksWindow::fill_table() {
   }
   if (!current) return;
   const auto same = std::ranges::find(landmarks(), selected.toStdString(), &PointInModel::name);
-  if (same == landmarks().end()) {  // the row holds another one now
-    table_->clearSelection();
-    name_->clear();
-  } else {
-    table_->selectRow(int(same - landmarks().begin()));
-  }
+  if (same != landmarks().end()) return table_->selectRow(int(same - landmarks().begin()));
+  if (has_as_many) return;  // it has another name
+  table_->clearSelection();
+  name_->clear();
 }
 
 /// What the files said, and what comes next.
