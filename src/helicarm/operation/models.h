@@ -13,8 +13,8 @@ namespace helicarm::operation {
 /// missing_file, and what a registration would not read (as `load_model`, `read_plans`).
 Expected<Digests> keep_models(OperationPlan& plan, const std::filesystem::path& session);
 
-/// Registers the models to a measured case by its calibration, some of them from other starts than the plan's.
-/// Refusals are in the result. Refuses (bad_value) a start of no model.
+/// Registers the models to a measured case by its calibration, some of them from other starts than the
+/// plan's. Refusals are in the result. Refuses (bad_value) a start of no model.
 Expected<case_registration::CaseRegistration> register_models(const OperationPlan& plan,
                                                               const pipeline::Case& the_case,
                                                               const pipeline::Result& measured,

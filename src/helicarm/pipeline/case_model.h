@@ -45,8 +45,8 @@ struct CaseModel {
   std::optional<guidance::Bone> moves_with;
   std::optional<geometry::RigidTransform> world_from_model;  ///< start
   std::optional<std::filesystem::path> landmarks;            ///< start: CSV of points that are also picked
-  std::vector<PointInModel> placed_landmarks = {};  ///< start, instead of `landmarks`: placed by a person
-  std::optional<std::filesystem::path> plan;      ///< Slicer markups
+  std::vector<PointInModel> placed_landmarks = {};     ///< start, instead of `landmarks`: placed by a person
+  std::optional<std::filesystem::path> plan;           ///< Slicer markups
   CaseMask tunnel_mask = {};                           ///< of the bone that holds the tunnels, if not of all
   std::optional<std::filesystem::path> measures = {};  ///< table of landmarks for measures in the bone
   std::optional<std::filesystem::path> zones = {};     ///< published positions; nothing: those built in
