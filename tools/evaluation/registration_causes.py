@@ -20,7 +20,7 @@ Notes stand in a refusal alone. What is not refused on its own, of `right`, the 
 pose of a fracture that is not refused is compared with that of the joint end.
 
 --rows keeps what is done; the same command goes on after an interruption. Needs NumPy. Exit code 1 if a whole bone without metal
-is named as broken or as under metal."""
+is named, in whole images, as broken or as under metal."""
 import argparse
 import json
 import math

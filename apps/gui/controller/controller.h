@@ -200,8 +200,8 @@ class Controller : public QObject {
   void outline_nudged();
   void register_in_operation();
   std::vector<operation::ModelStart> starts_by_hand() const;
-  /// Null for a tunnel that is not known or, told then, `may_guide` does not hold for.
-  const operation::OperationTunnel* tunnel_that_may_guide(const std::string& name);
+  /// Null for a tunnel that is not known and, told then, for one of a model while a model is moved by hand.
+  const operation::OperationTunnel* tunnel_not_moved(const std::string& name);
   std::optional<operation::TunnelOutcome> verified(Equipment& equipment, const std::string& tunnel);
   /// `images`: of all views, or why the new one was refused.
   Change came(Equipment& equipment, const Expected<std::vector<pipeline::ViewResult>>& images);

@@ -261,6 +261,14 @@ TEST(ModelLandmarks, AFilesNameIsSafe) {
       picks.emplace_back().name = point.name;
       picks.back().view = view;
     }
+  {
+    const TemporaryFolder both;  // of one file name, saved together
+    ASSERT_TRUE(write_file(both.path() / "case.json", to_text(json)));
+    ASSERT_TRUE(save_landmarks(both.path(), the_case->models, {in_bone, in_bone}, {{}, {}}, picks));
+    const auto read = pipeline::read_case(both.path());
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_NE(read->models[0].landmarks, read->models[1].landmarks);
+  }
   const auto saved = save_landmarks(folder.path(), the_case->models, {in_bone, {}}, {{}, {}}, picks);
   ASSERT_TRUE(saved) << saved.error().message;
   EXPECT_EQ(saved->told.size(), 1);

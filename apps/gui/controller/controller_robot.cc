@@ -101,7 +101,7 @@ void Controller::register_robot() {
   });
 }
 
-const operation::OperationTunnel* Controller::tunnel_that_may_guide(const std::string& name) {
+const operation::OperationTunnel* Controller::tunnel_not_moved(const std::string& name) {
   const auto tunnel = std::ranges::find(state_.tunnels, name, &operation::OperationTunnel::name);
   if (tunnel == state_.tunnels.end()) return nullptr;
   // Of the registration the operation decides; it knows nothing of a model that is moved by hand.
@@ -115,7 +115,7 @@ const operation::OperationTunnel* Controller::tunnel_that_may_guide(const std::s
 }
 
 void Controller::plan_order(const std::string& tunnel) {
-  if (!equipment_ || !equipment_->operation || !tunnel_that_may_guide(tunnel)) return;
+  if (!equipment_ || !equipment_->operation || !tunnel_not_moved(tunnel)) return;
   follow(tunnel);
   begin(Phase::navigate, "planning the path to " + tunnel,
         [this, equipment = equipment_, tunnel]() -> Change {
@@ -133,7 +133,7 @@ void Controller::plan_order(const std::string& tunnel) {
 
 void Controller::guide_drill(const std::string& tunnel) {
   if (!equipment_ || !equipment_->operation || !state_.drill || state_.busy) return;
-  const operation::OperationTunnel* named = tunnel_that_may_guide(tunnel);
+  const operation::OperationTunnel* named = tunnel_not_moved(tunnel);
   if (!named) return;
   follow(tunnel);
   equipment_->verifies = false;
@@ -194,8 +194,7 @@ void Controller::drop_plan(const Failure& why) {
 }
 
 void Controller::go() {
-  if (!equipment_ || !equipment_->operation || !state_.order || !tunnel_that_may_guide(state_.order->name))
-    return;
+  if (!equipment_ || !equipment_->operation || !state_.order || !tunnel_not_moved(state_.order->name)) return;
   const robot::RobotOrder order = *state_.order;
   state_.bound_for = order.name;
   state_.has_arrived = false;

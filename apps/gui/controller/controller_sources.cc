@@ -274,16 +274,16 @@ void Controller::open_images(const std::vector<fs::path>& files) {
 }
 
 QString Controller::loss() const {
-  const bool operates = state_.source == Source::virtual_or || state_.source == Source::devices;
   const bool has_images = state_.result && std::ranges::any_of(state_.result->views, [](const auto& view) {
                             return view.xray_image != nullptr;
                           });
-  if (operates && (has_images || state_.busy)) return tr("End this operation? Its record is kept.");
+  if (is_operation(state_) && (has_images || state_.busy))
+    return tr("End this operation? Its record is kept.");
   const bool has_other_picks = std::ranges::any_of(earlier_, [&](const Edit& edit) {
     return !are_same(edit.picks, state_.picks) || !are_same(edit.model_landmarks, state_.model_landmarks);
   });
   if (has_other_picks && (state_.picks_not_kept || !state_.case_folder))
-    return tr("The changed picks are not kept in a file. Discard them?");
+    return tr("The changed picks or landmarks are not kept in a file. Discard them?");
   return {};
 }
 

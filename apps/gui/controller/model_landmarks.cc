@@ -3,6 +3,7 @@
 
 #include <QCoreApplication>
 #include <algorithm>
+#include <map>
 #include <set>
 
 #include <fmt/format.h>
@@ -77,7 +78,8 @@ ModelLandmarks with_unsaved(const Json& json, const std::vector<CaseModel>& mode
 }
 
 /// NAME-landmarks.csv with the characters of a portable file name, numbered where another file has it.
-std::string csv_name(const fs::path& case_folder, const CaseModel& of, const Json& model) {
+std::string csv_name(const fs::path& case_folder, const CaseModel& of, const Json& model,
+                     const std::map<std::string, std::string>& taken) {
   std::string name = of.name;
   // What it holds is not known where it cannot be read.
   const bool is_readable = guarded([&] { return case_registration::start_landmarks(of); }).has_value();
@@ -93,8 +95,10 @@ std::string csv_name(const fs::path& case_folder, const CaseModel& of, const Jso
            model["start"].value("landmarks", Json()) == Json(file);
   };
   std::string file = name + "-landmarks.csv";
-  for (int number = 2; fs::exists(case_folder / file) && !(is_readable && is_start(file)); ++number)
-    file = fmt::format("{}-landmarks-{}.csv", name, number);
+  const auto is_other = [&] {
+    return taken.contains(file) || (fs::exists(case_folder / file) && !(is_readable && is_start(file)));
+  };
+  for (int number = 2; is_other(); ++number) file = fmt::format("{}-landmarks-{}.csv", name, number);
   return file;
 }
 
@@ -219,7 +223,7 @@ Expected<SavedLandmarks> save_landmarks(const fs::path& case_folder, const std::
     done.saved.resize(models.size());
     const fs::path file = case_folder / "case.json";
     std::optional<Json> json;
-    std::vector<std::pair<std::string, std::string>> tables;  // file and text
+    std::map<std::string, std::string> tables;  // by file
     for (std::size_t i = 0; i < models.size(); ++i) {
       const Points& points = of_model(placed, i);
       if (are_same_points(points, of_model(saved, i))) continue;
@@ -230,12 +234,12 @@ Expected<SavedLandmarks> save_landmarks(const fs::path& case_folder, const std::
       }
       if (!json) json = value_or_throw(read_json(file));
       Json& model = model_in(*json, models[i].name);
-      const std::string name = csv_name(case_folder, models[i], model);
+      const std::string name = csv_name(case_folder, models[i], model, tables);
       done.told.push_back(name_as_start(model, models[i].name, name));
       done.saved[i] = points;
       done.models[i].landmarks = case_folder / name;
       done.models[i].world_from_model.reset();
-      tables.emplace_back(name, to_csv(points));
+      tables.emplace(name, to_csv(points));
     }
     if (json) {
       value_or_throw(pipeline::case_from_json(*json, "case.json", case_folder));

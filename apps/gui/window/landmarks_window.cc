@@ -19,7 +19,6 @@
 #include "helicarm/registration/flat_cut.h"
 #include "helicarm/registration/landmarks.h"
 #include "helicarm/registration/prominent_points.h"
-#include "helicarm/volume/read_volume.h"
 
 namespace helicarm::gui {
 

@@ -7,7 +7,7 @@
 #include <QPushButton>
 #include <QTableWidget>
 #include <QVBoxLayout>
-#include <functional>
+#include <array>
 #include <memory>
 #include <optional>
 

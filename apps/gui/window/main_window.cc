@@ -249,6 +249,7 @@ void MainWindow::show_state() {
   }
   setWindowTitle(state.folder.empty() ? tr("helicarm") : tr("helicarm: %1").arg(text(state.folder.string())));
   rehearsal_menu_->setEnabled(state.source == Source::virtual_or);
+  if (auto* cable = findChild<QAction*>("cut_cable")) cable->setVisible(!state.drill);
   busy_->setVisible(state.busy.has_value());
   const bool replays = state.source == Source::files && replay_dock_->isVisible();
   recording_->setText(replays ? tr("▶ replay") : tr("● recording"));

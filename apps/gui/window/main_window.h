@@ -214,7 +214,11 @@ class MainWindow : public QMainWindow {
   QPlainTextEdit* log_ = nullptr;
   QDockWidget* log_dock_ = nullptr;
   QMenu* rehearsal_menu_ = nullptr;
-  std::pair<QPointer<BonesWindow>, std::size_t> ct_of_model_;  ///< opened last, with its model
+  struct {
+    QPointer<BonesWindow> window;
+    std::filesystem::path folder;  ///< of the case or session
+    std::size_t model = 0;
+  } ct_of_model_;  ///< opened last
 
   QPointer<NewCaseDialog> new_case_;
   bool may_close_ = false;

@@ -200,11 +200,13 @@ void MainWindow::open_ct_of(std::size_t model) {
   const ApplicationState& state = controller_.state();
   if (!state.registration || model >= state.model_volumes.size() || !state.model_volumes[model]) return;
   open_ct(*state.model_volumes[model], plan_in_ct(state, model));
-  ct_of_model_ = {findChildren<BonesWindow*>("bones").back(), model};
+  ct_of_model_ = {findChildren<BonesWindow*>("bones").back(), state.folder, model};
 }
 
 void MainWindow::show_ct_plan() {
-  if (ct_of_model_.first) ct_of_model_.first->show_plan(plan_in_ct(controller_.state(), ct_of_model_.second));
+  const ApplicationState& state = controller_.state();
+  const auto& [window, folder, model] = ct_of_model_;
+  if (window) window->show_plan(folder == state.folder ? plan_in_ct(state, model) : CtPlan());
 }
 
 void MainWindow::open_images(const std::vector<fs::path>& files, bool offers_one) {

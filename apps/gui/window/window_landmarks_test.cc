@@ -142,7 +142,7 @@ phantom::TriangleMesh ball() {
                              1.2);
 }
 
-TEST(SurfaceViews, AClickFindsThePlaceOnTheSurfaceAndFastEnough) {
+TEST(SurfaceViews, AClickFindsThePlaceOnTheSurface) {
   const auto mesh = ball();
   SurfaceCamera camera;
   camera.turn = Eigen::AngleAxisd(0.5, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();

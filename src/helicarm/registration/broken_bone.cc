@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -15,7 +14,6 @@ namespace helicarm::registration {
 namespace {
 
 using Eigen::Vector3d;
-using geometry::RigidTransform;
 
 // Comparisons of a view on either side: those beside the plane do not count in a part, and at least 8 must.
 constexpr int least_part_comparisons = 16;
