@@ -11,12 +11,11 @@ namespace helicarm::operation {
 namespace {
 
 /// Refuses (off_target) a drill that cannot be at the end of its tunnel, however badly that was drilled, and
-/// (plan_stale) one whose bone or marker has moved.
+/// (plan_stale) one whose bone or marker has moved, and as guided where it is not seen.
 void check_in_tunnel(const Guidance& now) {
   constexpr double farthest_mm = 10, widest_deg = 20;
-  if (now.decision() == code(Reason::plan_stale)) throw BadInput(*now.why_not);
-  if (!now.aim) return;
-  const TunnelAim& aim = *now.aim;
+  if (now.why_not && (!now.aim || now.why_not->reason == Reason::plan_stale)) throw BadInput(*now.why_not);
+  const TunnelAim& aim = now.aim.value();
   const double before_end_mm = aim.length_mm - aim.depth_mm;
   if (aim.distance_mm <= farthest_mm && aim.angle_deg <= widest_deg && std::abs(before_end_mm) <= farthest_mm)
     return;
