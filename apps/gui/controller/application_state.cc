@@ -69,9 +69,7 @@ std::vector<std::string> ends_to_pick(const operation::OperationTunnel& tunnel) 
 }
 
 bool may_guide(const ApplicationState& state, const operation::OperationTunnel& tunnel) {
-  if (tunnel.of_model) return state.is_confirmed && !state.nudged;
-  return std::ranges::all_of(
-      ends_to_pick(tunnel), [&](const std::string& end) { return is_picked(state.picks, state.views, end); });
+  return !tunnel.of_model || (state.is_confirmed && !state.nudged);
 }
 
 WantedPick wanted_end(const operation::OperationTunnel& tunnel, const std::string& end) {

@@ -162,8 +162,7 @@ struct WantedPick {
   std::optional<guidance::Bone> bone;
   std::optional<Failure> failed = {};  ///< why an earlier click in this view is no pick
 };
-/// Whether nothing stands between the measurement and a path to the tunnel: its ends are picked, or its model
-/// is registered, confirmed and where it was registered.
+/// Whether the model of the tunnel, if it has one, is registered, confirmed and where it was registered.
 bool may_guide(const ApplicationState& state, const operation::OperationTunnel& tunnel);
 /// Both ends; none of a tunnel of a model's plan.
 std::vector<std::string> ends_to_pick(const operation::OperationTunnel& tunnel);

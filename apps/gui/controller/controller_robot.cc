@@ -264,7 +264,7 @@ LiveState Controller::live() const {
   now.tool = live_tool_->overlay(board, now.bone);
   if (tunnel == state_.tunnels.end()) return now;
   now.tunnel = QString::fromStdString(followed_);
-  if (tunnel->of_model && !may_guide(state_, *tunnel)) {
+  if (!may_guide(state_, *tunnel)) {
     now.aim =
         fail(Reason::registration_not_confirmed, followed_ + ": its model is not registered and confirmed");
     return now;

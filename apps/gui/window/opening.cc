@@ -160,7 +160,7 @@ void MainWindow::open_paths(const std::vector<fs::path>& paths) {
     if (first.filename() == "case.json" || first.filename() == "session.log")
       return open_paths({fs::absolute(first).parent_path()});
     if (first.extension() == ".json") return open_plan(first);
-    if (is_volume(first)) return open_ct(first, {});
+    if (is_volume(first)) return void(open_ct(first, {}));
   }
   if (paths.size() == 1 && is_sequence(first)) return open_sequence(first);
   if (paths.size() == 1 && is_run(first)) return open_run(first);
@@ -190,17 +190,17 @@ void MainWindow::open_run(const fs::path& folder) {
   run->open_case(folder);
 }
 
-void MainWindow::open_ct(const fs::path& file, CtPlan plan) {
+BonesWindow* MainWindow::open_ct(const fs::path& file, CtPlan plan) {
   auto* bones = new BonesWindow(this);
   show_beside(bones);
   bones->open_ct(file, std::move(plan));
+  return bones;
 }
 
 void MainWindow::open_ct_of(std::size_t model) {
   const ApplicationState& state = controller_.state();
   if (!state.registration || model >= state.model_volumes.size() || !state.model_volumes[model]) return;
-  open_ct(*state.model_volumes[model], plan_in_ct(state, model));
-  ct_of_model_ = {findChildren<BonesWindow*>("bones").back(), state.folder, model};
+  ct_of_model_ = {open_ct(*state.model_volumes[model], plan_in_ct(state, model)), state.folder, model};
 }
 
 void MainWindow::show_ct_plan() {

@@ -126,7 +126,7 @@ QString NavigatePage::next_by_hand() const {
 QString NavigatePage::what_lacks() const {
   const ApplicationState& state = controller_.state();
   if (next_pick(state)) return tr("Place the tunnels' ends first (Alt+4).");
-  if (const auto* tunnel = chosen(); tunnel && tunnel->of_model && !may_guide(state, *tunnel))
+  if (const auto* tunnel = chosen(); tunnel && !may_guide(state, *tunnel))
     return state.nudged ? tr("A model is moved by hand: register it there, or set its fields to 0 (Alt+7).")
                         : tr("Register the models and confirm their outlines first (Alt+7).");
   if (const auto refusal = state.refusals.find(Phase::plan); refusal != state.refusals.end())
@@ -173,9 +173,7 @@ void NavigatePage::allow() {
   const ApplicationState& state = controller_.state();
   const bool free = !state.busy && is_operation(state);
   const bool ready = free && phase_ == robot::LinkPhase::ready;
-  const operation::OperationTunnel* tunnel = chosen();
-  const bool placed = state.measured && !next_pick(state) && !state.refusals.contains(Phase::plan) &&
-                      tunnel && may_guide(state, *tunnel);
+  const bool placed = state.measured && chosen() && what_lacks().isEmpty();
   tell();
   unlock_->setEnabled(free && (phase_ == robot::LinkPhase::idle || phase_ == robot::LinkPhase::stopped));
   register_->setEnabled(ready && !state.tool_is_out);
