@@ -11,15 +11,13 @@ openings, so that it does not depend on what counts as an opening. A breach is m
 false where it is not outside. --rows keeps what is done; the same command goes on after an interruption. Needs NumPy and the Python
 package (PYTHONPATH=build/python). Exit code 1 if a breach is missed."""
 import argparse
-import json
-import pathlib
 import sys
 
 import numpy as np
 
 import bone_ct
+import evaluation_rows
 import helicarm
-from registration_protocol import renew, rows_in
 
 MARKS = "<!-- bridges -->", "<!-- end of the bridges -->"
 LOW_MM, HIGH_MM = -2, 6
@@ -149,23 +147,14 @@ def table(rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--knees", type=int, default=200)
-    parser.add_argument("--rows", type=pathlib.Path, help="JSON lines of all knees; those it holds are not run again")
-    parser.add_argument("--doc", type=pathlib.Path, help="renews the table between its marks in that document")
+    evaluation_rows.add_options(parser, "knees", keeps=False)
     arguments = parser.parse_args()
-    rows = rows_in(arguments.rows)
-    done = {row["knee"] for row in rows}
-    for number in range(arguments.knees):
-        if number in done:
-            continue
-        rows.append(row_of(number))
-        print(json.dumps(rows[-1]), flush=True)
-        if arguments.rows:
-            with arguments.rows.open("a") as out:
-                out.write(json.dumps(rows[-1]) + "\n")
-    text, missed = table([row for row in rows if not row.get("none")])
+    rows = evaluation_rows.Rows(arguments.rows, ("knee",))
+    rows.gather(row_of, [(number,) for number in range(arguments.knees)])
+    text, missed = table([row for row in rows.rows if not row.get("none")])
     print(text)
     if arguments.doc:
-        renew(arguments.doc, text, *MARKS)
+        evaluation_rows.renew(arguments.doc, text, *MARKS)
     return bool(missed)
 
 

@@ -15,6 +15,7 @@ An operation that a busy machine ends (late messages, an image or poses that do 
 ended one then, or at once, such as `uncertain`, two standard deviations over the tolerance.
 --rows keeps what is done; the same command goes on after an interruption. Exit code 1 if an end is off by more than 2.5 mm. Needs SciPy."""
 import argparse
+import functools
 import json
 import pathlib
 import shutil
@@ -25,7 +26,7 @@ import tempfile
 import numpy as np
 from scipy.stats import beta
 
-from registration_protocol import parallel, renew, rows_in
+import evaluation_rows
 
 KINDS = {("robot", "picks"): "robot, picked", ("robot", "ct"): "robot, planned in the CT",
          ("drill", "picks"): "drill by hand, picked", ("drill", "ct"): "drill by hand, planned in the CT"}
@@ -96,26 +97,17 @@ def main():
     parser.add_argument("--seed", type=int, default=1, help="of the first operation (default: 1)")
     parser.add_argument("--size", type=int, default=512, help="pixels per side: 512 or 1024 (default: 512)")
     parser.add_argument("--jobs", type=int, default=1, help="operations at once (default: 1)")
-    parser.add_argument("--rows", type=pathlib.Path, help="JSON lines of all ends; operations that it holds are not run again")
-    parser.add_argument("--doc", type=pathlib.Path, help="renews the table between the marks of that document")
+    evaluation_rows.add_options(parser, "ends", keeps=False)
     options = parser.parse_args()
-    rows = rows_in(options.rows)
-    done = {(row["tool"], row["plan"], row["seed"]) for row in rows}
-    jobs = [(*kind, seed) for seed in range(options.seed, options.seed + options.cases) for kind in KINDS if (*kind, seed) not in done]
+    rows = evaluation_rows.Rows(options.rows, ("tool", "plan", "seed"))
+    jobs = [(*kind, seed) for seed in range(options.seed, options.seed + options.cases) for kind in KINDS]
     with tempfile.TemporaryDirectory() as folder:
-        work = lambda *job: operation(options, pathlib.Path(folder), *job)  # noqa: E731
-        for ends in parallel(work, jobs, options.jobs):
-            rows += ends
-            text = "".join(json.dumps(row) + "\n" for row in ends)
-            print(text, end="", flush=True)
-            if options.rows:
-                with options.rows.open("a") as out:
-                    out.write(text)
-    table = table_of(rows)
+        rows.gather(functools.partial(operation, options, pathlib.Path(folder)), jobs, options.jobs)
+    table = table_of(rows.rows)
     print(table)
     if options.doc:
-        renew(options.doc, table, *MARKS)
-    return any(row.get("true_mm", 0) > MOST_MM for row in rows)
+        evaluation_rows.renew(options.doc, table, *MARKS)
+    return any(row.get("true_mm", 0) > MOST_MM for row in rows.rows)
 
 
 if __name__ == "__main__":

@@ -16,17 +16,20 @@ points 20 mm from the seed of its segmentation, of the head over points of the s
 2 mm or the kind wrong. Exit code 1 if there is one. --rows keeps what is done; the same command goes on after an interruption. Needs
 NumPy."""
 import argparse
+import functools
 import itertools
 import json
 import math
 import pathlib
 import shutil
 import sys
-import tempfile
 
 import numpy as np
 
 import bone_ct
+import evaluation_rows
+import head_ct
+import registration_bodies
 import registration_protocol as protocol
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "examples/bones"))
@@ -42,7 +45,7 @@ END_MM = {"femur": (0, 5, 20.0), "tibia": (0, 5, -20.0)}
 OTHERS = 12
 
 
-class Knees(protocol.Knees):
+class Knees(registration_bodies.Knees):
     of_anywhere, window_hu = RIGHT + WRONG, None
 
     def other(self, number):
@@ -55,11 +58,11 @@ class Knees(protocol.Knees):
             bone_ct.write_nrrd(folder / f"without_{name}.nrrd", bone_ct.rounded(np.where(mask, bone_ct.MUSCLE, knee.hu)))
 
     def targets_of(self, bone):
-        return np.array(END_MM[bone]) + protocol.TARGETS
+        return np.array(END_MM[bone]) + registration_bodies.TARGETS
 
 
-class Heads(protocol.Heads):
-    of_anywhere, window_hu = OF_HEAD, protocol.head_ct.WINDOW_HU
+class Heads(registration_bodies.Heads):
+    of_anywhere, window_hu = OF_HEAD, head_ct.WINDOW_HU
 
     def targets_of(self, _):
         return self.targets
@@ -178,9 +181,7 @@ def main():
                         help="the head instead of the knees; PATH of Cranium.inv3, default: where its package installs it")
     parser.add_argument("--kinds", help=f"some of {','.join(KINDS)}; default: all that the body has")
     parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("--rows", type=pathlib.Path, help="JSON lines of all cases; those it holds are not run again")
-    parser.add_argument("--doc", type=pathlib.Path, help="renews the table between the marks of that document")
-    parser.add_argument("--keep", type=pathlib.Path, help="folder for the simulated cases (default: a temporary one)")
+    evaluation_rows.add_options(parser)
     arguments = parser.parse_args()
     if arguments.head is not None:
         name, bodies = ", head", [Heads(arguments.head or None)]
@@ -192,28 +193,18 @@ def main():
     kinds = arguments.kinds.split(",") if arguments.kinds else own
     if unknown := [kind for kind in kinds if kind not in own]:
         parser.error(f"--kinds: {', '.join(unknown)}: there are {', '.join(own)}")
-    rows = protocol.rows_in(arguments.rows)
-    done = {(row["kind"], row["number"]) for row in rows}
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = arguments.keep or pathlib.Path(temporary)
-        folder.mkdir(parents=True, exist_ok=True)
+    rows = evaluation_rows.Rows(arguments.rows, ("kind", "number"))
+    with evaluation_rows.folder_of(arguments.keep) as folder:
         protocols = [protocol.Protocol(body, arguments, folder) for body in bodies]
         for number, of_body in itertools.product(range(arguments.cases), protocols):
-            for kind in of_body.body.of_anywhere:
-                if kind not in kinds or (kind, number) in done:
-                    continue
-                rows.append(row_of(of_body, kind, number))
-                print(json.dumps(rows[-1]), flush=True)
-                if arguments.rows:
-                    with arguments.rows.open("a") as out:
-                        out.write(json.dumps(rows[-1]) + "\n")
-            if not of_body.keep:
-                for case in folder.glob(f"{of_body.body.name}-*-{number}"):
-                    shutil.rmtree(case)
-    print(table(rows))
+            own = [(kind, number) for kind in of_body.body.of_anywhere if kind in kinds]
+            rows.gather(functools.partial(row_of, of_body), own)
+            of_body.discard(number)
+    print(table(rows.rows))
     if arguments.doc:
-        protocol.renew(arguments.doc, table(rows), f"<!-- registration anywhere{name} -->", f"<!-- end of the registration anywhere{name} -->")
-    return any(map(is_false, rows))
+        evaluation_rows.renew(arguments.doc, table(rows.rows), f"<!-- registration anywhere{name} -->",
+                              f"<!-- end of the registration anywhere{name} -->")
+    return any(map(is_false, rows.rows))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the notes of a refused registration name what is wrong with the images: a cropped field, metal, a broken bone.
+"""Whether the notes of a refused registration name what is wrong with the images: a cropped field, metal, a broken bone; and whether one
+that is not refused warns of a part that its pose does not explain.
 
   tools/evaluation/registration_causes.py --cases 6 --rows causes.jsonl --doc docs/registration.md
   tools/evaluation/registration_causes.py --kinds mirrored,patient --cases 12 --rows causes.jsonl
@@ -16,22 +17,23 @@ a start within 5 mm of the true pose.
   metal_steel     the same, 20,000 HU
   cropped         round fields of 25, 30 or 42 mm radius at the joint, black beyond; the cameras are given
 Notes stand in a refusal alone. What is not refused on its own, of `right`, the fractures and metal, is registered again with a limit of
-0.1 micrometres, which refuses it. Motion of a broken bone: rms over the shorter part, found and true. The
+0.1 micrometres, which refuses it; whether it warned of a part is that of the first registration. Motion of a broken bone: rms over the shorter part, found and true. The
 pose of a fracture that is not refused is compared with that of the joint end.
 
 --rows keeps what is done; the same command goes on after an interruption. Needs NumPy. Exit code 1 if a whole bone without metal
-is named, in whole images, as broken or as under metal."""
+is named, in whole images, as broken or as under metal, or warned of."""
 import argparse
+import functools
 import json
 import math
 import pathlib
 import shutil
 import sys
-import tempfile
 
 import numpy as np
 
 import bone_ct
+import evaluation_rows
 import registration_anywhere as anywhere
 import registration_protocol as protocol
 
@@ -167,6 +169,10 @@ def named(result):
     return causes
 
 
+def warns_of_part(result):
+    return any(warning["code"] == "wrong_model" and "agreement_elsewhere" in warning.get("figures", {}) for warning in result.get("warnings", []))
+
+
 def add_truth(row, fracture, result, pose):
     if result.get("world_from_model"):
         row["end_mm"] = fracture.end_error_mm(np.array(result["world_from_model"]), pose)
@@ -194,7 +200,7 @@ def row_of(bodies, kind, number):
     model = {"name": body.model, "start": {"world_from_model": start.tolist()}, **files}
     views = json.loads((case / "case.json").read_text())["views"]
     result = bodies.register(case, model, folder / "out", views)
-    row = bodies.row(kind, number, distance, pose, body.targets, result) | {"forced": False}
+    row = bodies.row(kind, number, distance, pose, body.targets, result) | {"forced": False, "warns_of_part": warns_of_part(result)}
     if row["decision"] != "refuse" and kind in FORCED:
         bodies.run("register", folder / "work", "--out", folder / "forced", "--max-error", OF_ALL_REFUSED)
         result = json.loads((folder / "forced/registration.json").read_text())["models"][0]
@@ -208,12 +214,12 @@ def row_of(bodies, kind, number):
 
 
 def is_false(row):
-    return row["kind"] in CONTROLS and bool({"metal", "broken"} & row["named"].keys())
+    return row["kind"] in CONTROLS and (row["warns_of_part"] or bool({"metal", "broken"} & row["named"].keys()))
 
 
 def table(rows):
-    lines = ["| images or model | cases | refused | by a limit for the purpose | named as cropped | as metal | as broken | "
-             "moved, mm: found, median | true | turned, degrees: found, median | true |", "| --- |" + " --- |" * 10]
+    lines = ["| images or model | cases | refused | not refused: warned of a part | refused by a limit for the purpose | named as cropped | as metal | as broken | "
+             "moved, mm: found, median | true | turned, degrees: found, median | true |", "| --- |" + " --- |" * 11]
     for kind in KINDS:
         own = [row for row in rows if row["kind"] == kind]
         if not own:
@@ -223,6 +229,7 @@ def table(rows):
         figures = lambda values, digits=1: protocol.figures(values, (50,), digits)  # noqa: E731
         found = lambda key: figures([row["named"]["broken"][key] for row in broken])  # noqa: E731
         cells = [kind, len(own), sum(row["decision"] == "refuse" for row in own),
+                 sum(row["warns_of_part"] for row in own) if kind in FORCED else "-",
                  sum(row["forced"] for row in own) if kind in FORCED else "-", count("cropped"), count("metal"), count("broken"),
                  *found("moved_mm"), *figures([row["moved_mm"] for row in broken]), *found("turned_deg"),
                  FRACTURE_DEG if broken else "-"]
@@ -240,35 +247,21 @@ def main():
     parser.add_argument("--cases", type=int, default=6, help="of each kind (default: 6)")
     parser.add_argument("--kinds", default=",".join(KINDS), help=f"some of {','.join(KINDS)}; default: all")
     parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("--rows", type=pathlib.Path, help="JSON lines of all cases; those it holds are not run again")
-    parser.add_argument("--doc", type=pathlib.Path, help="renews the table between the marks of that document")
-    parser.add_argument("--keep", type=pathlib.Path, help="folder for cases and results (default: a temporary one)")
+    evaluation_rows.add_options(parser)
     arguments = parser.parse_args()
     kinds = arguments.kinds.split(",")
     if unknown := [kind for kind in kinds if kind not in KINDS]:
         parser.error(f"--kinds: {', '.join(unknown)}: there are {', '.join(KINDS)}")
-    rows = protocol.rows_in(arguments.rows)
-    done = {(row["kind"], row["number"]) for row in rows}
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = arguments.keep or pathlib.Path(temporary)
-        folder.mkdir(parents=True, exist_ok=True)
+    rows = evaluation_rows.Rows(arguments.rows, ("kind", "number"))
+    with evaluation_rows.folder_of(arguments.keep) as folder:
         bodies = protocol.Protocol(anywhere.Knees(), arguments, folder)
         for number in range(arguments.cases):
-            for kind in kinds:
-                if (kind, number) in done:
-                    continue
-                rows.append(row_of(bodies, kind, number))
-                print(json.dumps(rows[-1]), flush=True)
-                if arguments.rows:
-                    with arguments.rows.open("a") as out:
-                        out.write(json.dumps(rows[-1]) + "\n")
-            if not bodies.keep:
-                for case in folder.glob(f"{bodies.body.name}-*-{number}*"):
-                    shutil.rmtree(case)
-    print(table(rows))
+            rows.gather(functools.partial(row_of, bodies), [(kind, number) for kind in kinds])
+            bodies.discard(number)
+    print(table(rows.rows))
     if arguments.doc:
-        protocol.renew(arguments.doc, table(rows), "<!-- registration causes -->", "<!-- end of the registration causes -->")
-    return any(map(is_false, rows))
+        evaluation_rows.renew(arguments.doc, table(rows.rows), "<!-- registration causes -->", "<!-- end of the registration causes -->")
+    return any(map(is_false, rows.rows))
 
 
 if __name__ == "__main__":

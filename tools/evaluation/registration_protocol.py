@@ -27,27 +27,20 @@ A wrong case that is accepted is a false accept; `hidden` cannot be seen, its er
 Long runs: --jobs registers several cases at once, each by a process with one thread; poses do not depend on it, seconds do. --rows
 keeps what is done; the same command goes on after an interruption. Needs NumPy. Exit code 1 if a visible wrong case is accepted."""
 import argparse
-import concurrent.futures
 import json
 import math
 import os
-import pathlib
 import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 
 import numpy as np
 
-import bone_ct
-import bone_surface
-import head_ct
+import evaluation_rows
+from registration_bodies import KINDS, Heads, Knees, Surfaces
 
-KINDS = ("right", "patient", "mirrored", "tibia", "moved", "hidden", "scaled", "camera", "one_view")
 VISIBLE = ("patient", "mirrored", "tibia", "moved", "scaled", "camera")
-TARGETS = np.array([[x, y, z] for x in (-20, 0, 20) for y in (-20, 0, 20) for z in (-20, 0, 20)
-                    if abs(x) + abs(y) + abs(z) in (20, 60)], float)
 CHI2_95 = 7.815
 BINS = 20  # of 1 mm
 
@@ -97,77 +90,6 @@ def made(folder, make):
         make(part)
         part.rename(folder)
     return folder
-
-
-class Knees:
-    name, model, kinds = "knee", "femur", KINDS
-    arm_mm = 30
-    scale_sigma = 0  # the volumes' sizes are exact, but where a kind is about them
-    targets = np.array([0, 5, 20.0]) + TARGETS
-
-    def subject(self, number, other=False):
-        return number % 4 + (4 if other else 0)
-
-    def write(self, folder, subject):
-        folder.mkdir()
-        knee = bone_ct.Knee(subject)
-        scan = bone_ct.rounded(knee.scanned())
-        bone_ct.write_nrrd(folder / "true.nrrd", bone_ct.rounded(knee.hu))
-        bone_ct.write_nrrd(folder / "scan.nrrd", scan)
-        bone_ct.write_nrrd(folder / "mirrored.nrrd", scan[:, :, ::-1])
-        bone_ct.write_nrrd(folder / "scaled.nrrd", scan, 1.03 * bone_ct.VOXEL_MM)
-        for name, mask in (("femur", knee.femur), ("tibia", knee.tibia)):
-            bone_ct.write_nrrd(folder / f"{name}.nrrd", mask.astype(np.uint8))
-            bone_ct.write_nrrd(folder / f"mirrored_{name}.nrrd", mask[:, :, ::-1].astype(np.uint8))
-            bone_ct.write_nrrd(folder / f"scaled_{name}.nrrd", mask.astype(np.uint8), 1.03 * bone_ct.VOXEL_MM)
-
-    def files(self, folder, kind):
-        """The model's keys of case.json, with the files' places."""
-        if kind in ("mirrored", "scaled"):
-            return {"volume": folder / f"{kind}.nrrd", "mask": folder / f"{kind}_femur.nrrd"}
-        return {"volume": folder / "scan.nrrd", "mask": folder / ("tibia.nrrd" if kind == "tibia" else "femur.nrrd")}
-
-
-class Surfaces(Knees):
-    """The knees' bones as surfaces of their masks. In the images the femur goes on beyond the surface's end."""
-    name, kinds = "surface", ("right", "patient", "mirrored", "tibia", "scaled")
-    scale_sigma = 0.005  # a mask's size is not exact
-    end_mm = 80  # of the surface along the shaft
-
-    def write(self, folder, subject):
-        super().write(folder, subject)
-        knee = bone_ct.Knee(subject)
-        femur, tibia = (mask & (np.abs(knee.s) < self.end_mm) for mask in (knee.femur_itself, knee.tibia_itself))
-        for name, mask, scale in (("femur", femur, 1), ("tibia", tibia, 1), ("mirrored", femur[:, :, ::-1], 1), ("scaled", femur, 1.03)):
-            triangles = bone_surface.triangles_of(mask, 0.5, scale * bone_ct.VOXEL_MM, scale * bone_ct.LOW)
-            bone_surface.write_stl(folder / f"{name}.stl", triangles)
-
-    def files(self, folder, kind):
-        return {"surface": folder / f"{kind if kind in ('tibia', 'mirrored', 'scaled') else 'femur'}.stl"}
-
-
-class Heads:
-    name, model, kinds = "head", "head", tuple(kind for kind in KINDS if kind not in ("patient", "tibia"))
-    scale_sigma = 0
-
-    def __init__(self, path):
-        self.head = head_ct.Head(path)
-        self.targets = self.head.targets()
-        self.arm_mm = np.linalg.norm(self.targets - self.targets.mean(axis=0), axis=1).mean()
-
-    def subject(self, number, other=False):
-        return 0
-
-    def write(self, folder, subject):
-        folder.mkdir()
-        scan, voxel_mm, centre = bone_ct.rounded(self.head.scanned()), self.head.voxel_mm, head_ct.GRID_SHIFT_MM
-        bone_ct.write_nrrd(folder / "true.nrrd", self.head.hu, voxel_mm)
-        bone_ct.write_nrrd(folder / "scan.nrrd", scan, voxel_mm, centre)
-        bone_ct.write_nrrd(folder / "mirrored.nrrd", scan[:, :, ::-1], voxel_mm, centre * [-1, 1, 1])
-        bone_ct.write_nrrd(folder / "scaled.nrrd", scan, 1.03 * voxel_mm, 1.03 * centre)
-
-    def files(self, folder, kind):
-        return {"volume": folder / f"{kind if kind in ('mirrored', 'scaled') else 'scan'}.nrrd", "window_hu": head_ct.WINDOW_HU}
 
 
 class Protocol:
@@ -226,6 +148,12 @@ class Protocol:
         self.run("register", work, "--out", out)
         result = json.loads((out / "registration.json").read_text())
         return result["models"][0] if result["models"] else {"decision": "refuse", "failure": result["failure"]}
+
+    def discard(self, number):
+        """Removes the simulated cases of a number, unless they are kept."""
+        if not self.keep:
+            for case in self.folder.glob(f"{self.body.name}-*-{number}_*"):
+                shutil.rmtree(case)
 
     def case(self, kind, number):
         """The row of one case, in a folder of its own."""
@@ -394,27 +322,6 @@ def marks_of(body, part):
     return f"<!-- registration protocol, {body}, {part} -->", f"<!-- end of the registration protocol, {body}, {part} -->"
 
 
-def renew(document, table, begin, end):
-    text = document.read_text()
-    if begin not in text or end not in text:
-        sys.exit(f"{document}: the marks {begin} and {end} are missing")
-    document.write_text(f"{text[:text.index(begin)]}{begin}\n{table.strip()}\n{text[text.index(end):]}")
-
-
-def rows_in(path):
-    return [json.loads(line) for line in path.read_text().splitlines()] if path and path.exists() else []
-
-
-def parallel(work, jobs, count):
-    """Results of `work(*job)` as they come."""
-    pool = concurrent.futures.ThreadPoolExecutor(count)
-    try:
-        for done in concurrent.futures.as_completed([pool.submit(work, *job) for job in jobs]):
-            yield done.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="build/bin/helicarm")
@@ -426,9 +333,7 @@ def main():
     parser.add_argument("--kinds", help=f"some of {','.join(KINDS)}; default: all that the body has")
     parser.add_argument("--jobs", type=int, default=1, help="cases at once (default: 1)")
     parser.add_argument("--threads", type=int, help="of each case; 0: all cores (default: 0 for one job, 1 for several)")
-    parser.add_argument("--rows", type=pathlib.Path, help="JSON lines of all cases; those it holds are not run again")
-    parser.add_argument("--keep", type=pathlib.Path, help="folder for cases and results (default: a temporary one)")
-    parser.add_argument("--doc", type=pathlib.Path, help="renews the body's tables of these kinds between their marks in that document")
+    evaluation_rows.add_options(parser)
     arguments = parser.parse_args()
     if arguments.threads is None:
         arguments.threads = 0 if arguments.jobs == 1 else 1
@@ -436,24 +341,15 @@ def main():
     kinds = arguments.kinds.split(",") if arguments.kinds else body.kinds
     if unknown := [kind for kind in kinds if kind not in body.kinds]:
         parser.error(f"--kinds: {', '.join(unknown)}: the {body.name} has {', '.join(body.kinds)}")
-    rows = [row for row in rows_in(arguments.rows) if row.get("body", "knee") == body.name]
-    done = {(row["kind"], row["number"]) for row in rows}
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = arguments.keep or pathlib.Path(temporary)
-        folder.mkdir(parents=True, exist_ok=True)
-        jobs = [(kind, number) for kind in kinds for number in range(arguments.starts if kind == "right" else arguments.cases)
-                if (kind, number) not in done]
-        for row in parallel(Protocol(body, arguments, folder).case, jobs, arguments.jobs):
-            rows.append(row)
-            print(json.dumps(row), flush=True)
-            if arguments.rows:
-                with arguments.rows.open("a") as out:
-                    out.write(json.dumps(row) + "\n")
-    for part, table in tables(rows).items():
+    rows = evaluation_rows.Rows(arguments.rows, ("kind", "number"), lambda row: row.get("body", "knee") == body.name)
+    jobs = [(kind, number) for kind in kinds for number in range(arguments.starts if kind == "right" else arguments.cases)]
+    with evaluation_rows.folder_of(arguments.keep) as folder:
+        rows.gather(Protocol(body, arguments, folder).case, jobs, arguments.jobs)
+    for part, table in tables(rows.rows).items():
         print(table, end="\n\n")
         if arguments.doc:
-            renew(arguments.doc, table, *marks_of(body.name, part))
-    return any(row["kind"] in VISIBLE and row["decision"] == "accept" for row in rows)
+            evaluation_rows.renew(arguments.doc, table, *marks_of(body.name, part))
+    return any(row["kind"] in VISIBLE and row["decision"] == "accept" for row in rows.rows)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,8 @@ import numpy as np
 
 import bone_ct
 from evaluate import renew
-from registration_protocol import TARGETS, moved, placed
+from registration_bodies import TARGETS
+from registration_protocol import moved, placed
 
 SIZE, PIXEL_MM, DETECTOR_MM, SOURCE_MM = 320, 0.7, 1100.0, 700.0
 STEP_MM = 0.8

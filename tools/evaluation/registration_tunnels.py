@@ -18,17 +18,16 @@ interruption. Needs NumPy. Exit code 1 if an end that is not refused is off by m
 import argparse
 import json
 import os
-import pathlib
 import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 
 import numpy as np
 
 import bone_ct
-from registration_protocol import CHI2_95, made, moved, parallel, placed, renew, rows_in
+import evaluation_rows
+from registration_protocol import CHI2_95, made, moved, placed
 
 BONES = {"femur": ("FS", "FE"), "tibia": ("TS", "TE")}
 CENTRES = {"femur": np.array([0, 5, 25.0]), "tibia": np.array([0, 5, -35.0])}
@@ -182,30 +181,18 @@ def main():
     parser.add_argument("--seed", type=int, default=300, help="of the first operation (default: 300)")
     parser.add_argument("--jobs", type=int, default=1, help="cases at once (default: 1)")
     parser.add_argument("--threads", type=int, help="of each case; 0: all cores (default: 0 for one job, 1 for several)")
-    parser.add_argument("--rows", type=pathlib.Path, help="JSON lines of all ends; cases that it holds are not run again")
-    parser.add_argument("--keep", type=pathlib.Path, help="folder for cases and results (default: a temporary one)")
-    parser.add_argument("--doc", type=pathlib.Path, help="renews the table between the marks of that document")
+    evaluation_rows.add_options(parser, "ends")
     arguments = parser.parse_args()
     if arguments.threads is None:
         arguments.threads = 0 if arguments.jobs == 1 else 1
-    rows = rows_in(arguments.rows)
-    done = {row["number"] for row in rows}
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = arguments.keep or pathlib.Path(temporary)
-        folder.mkdir(parents=True, exist_ok=True)
-        jobs = [(number,) for number in range(arguments.cases) if number not in done]
-        for found in parallel(Operations(arguments, folder).case, jobs, arguments.jobs):
-            rows += found
-            text = "".join(json.dumps(row) + "\n" for row in found)
-            print(text, end="", flush=True)
-            if arguments.rows:
-                with arguments.rows.open("a") as out:
-                    out.write(text)
-    table = table_of(sorted(rows, key=lambda row: row["number"]))
+    rows = evaluation_rows.Rows(arguments.rows, ("number",))
+    with evaluation_rows.folder_of(arguments.keep) as folder:
+        rows.gather(Operations(arguments, folder).case, [(number,) for number in range(arguments.cases)], arguments.jobs)
+    table = table_of(sorted(rows.rows, key=lambda row: row["number"]))
     print(table)
     if arguments.doc:
-        renew(arguments.doc, table, *MARKS)
-    return any(row["decision"] != "refuse" and row.get("error_calibrator_mm", 0) > MOST_ERROR_MM for row in rows)
+        evaluation_rows.renew(arguments.doc, table, *MARKS)
+    return any(row["decision"] != "refuse" and row.get("error_calibrator_mm", 0) > MOST_ERROR_MM for row in rows.rows)
 
 
 if __name__ == "__main__":

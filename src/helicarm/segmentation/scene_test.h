@@ -5,6 +5,8 @@
 #include <functional>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/segmentation/segment.h"
@@ -78,6 +80,20 @@ inline double dice(const TestCt& ct, int bone, const Segmentation& made, int lab
     common += a && b, both += a + b;
   }
   return 2 * common / both;
+}
+
+inline const Seed on_upper{"upper", {0, 0, 46}}, on_lower{"lower", {1, 0, -45}};
+
+inline const TestCt& plain_ct() {
+  static const TestCt ct = ct_of({upper, lower}, {1, 1, 1});
+  return ct;
+}
+
+inline Failure refusal_of(const TestCt& ct, const std::vector<Seed>& seeds,
+                          const SegmentOptions& options = {}) {
+  const auto made = segment(ct.volume, seeds, options);
+  EXPECT_FALSE(made);
+  return made ? Failure{Reason::usage, "not refused"} : made.error();
 }
 
 }  // namespace helicarm::segmentation
