@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <optional>
 
-#include "helicarm/registration/register_model.h"
+#include "helicarm/registration/cut_plane.h"
 
 namespace helicarm::registration {
-
-/// Registers a part of a model from a pose near it.
-using RegisterPart =
-    std::function<Registration(const Model& part, const geometry::RigidTransform& world_from_model)>;
 
 /// A body whose two parts lie in the images otherwise than in its CT.
 struct BrokenBone {

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/registration/metal_over_model.h"
+#include "helicarm/registration/unexplained_part.h"
 
 namespace helicarm::registration {
 namespace {
@@ -72,16 +73,19 @@ std::optional<Warning> metal(const Model& model, const RegistrationView& view,
        {"agreement_elsewhere", seen->agreement_elsewhere}}};
 }
 
+std::string place(const Vector3d& point) {
+  return fmt::format("({:.0f}, {:.0f}, {:.0f})", point.x(), point.y(), point.z());
+}
+
 Warning broken(const Model& model, const BrokenBone& bone) {
   return {
       Reason::wrong_model,
-      fmt::format("{}: its parts on both sides of ({:.0f}, {:.0f}, {:.0f}), {:.0f} mm from its end at "
-                  "({:.0f}, {:.0f}, {:.0f}), are each registered alone, {:.1f} mm and {:.0f} degrees "
-                  "apart: the bone is broken there or has been moved since the CT{}; register its parts as "
-                  "models of their own, each with a mask of that part",
-                  model.name, bone.cut.x(), bone.cut.y(), bone.cut.z(), bone.from_end_mm, bone.end.x(),
-                  bone.end.y(), bone.end.z(), bone.moved_mm, bone.turned_deg,
-                  model.outlined ? "" : ", or the model, which has no mask, is of two bones"),
+      fmt::format(
+          "{}: its parts on both sides of {}, {:.0f} mm from its end at {}, are each registered alone, "
+          "{:.1f} mm and {:.0f} degrees apart: the bone is broken there or has been moved since the CT{}; "
+          "register its parts as models of their own, each with a mask of that part",
+          model.name, place(bone.cut), bone.from_end_mm, place(bone.end), bone.moved_mm, bone.turned_deg,
+          model.outlined ? "" : ", or the model, which has no mask, is of two bones"),
       {},
       {{"x_mm", bone.cut.x()},
        {"y_mm", bone.cut.y()},
@@ -89,6 +93,28 @@ Warning broken(const Model& model, const BrokenBone& bone) {
        {"from_end_mm", bone.from_end_mm},
        {"moved_mm", bone.moved_mm},
        {"turned_deg", bone.turned_deg}}};
+}
+
+/// What the views show of an unexplained part, and for which points the pose holds.
+std::string unexplained(const Model& model, const std::vector<RegistrationView>& views,
+                        const UnexplainedPart& part) {
+  std::string agreements;
+  for (std::size_t i = 0; i < part.agreements.size(); ++i)
+    agreements += fmt::format("{}{} {:.2f}, elsewhere {:.2f}", i == 0 ? "" : "; ", views[i].name,
+                              part.agreements[i], part.agreements_elsewhere[i]);
+  return fmt::format(
+      "{}: the part about {}, beyond {}, is not explained by the pose found (agreement in {}): the bone is "
+      "broken there or has been moved since the CT{}, or that part is hidden. Pose and error hold for the "
+      "rest alone, about {}, not for points planned in that part; register the parts as models of their "
+      "own, each with a mask of that part",
+      model.name, place(part.centre), place(part.section), agreements,
+      model.outlined ? "" : ", or the model, which has no mask, is of two bones", place(part.centre_of_rest));
+}
+
+std::string alone(const PartAlone& part) {
+  return fmt::format("; alone it agrees by {:.2f} at a pose {:.1f} mm and {:.0f} degrees from there{}",
+                     part.agreement, part.moved_mm, part.turned_deg,
+                     part.refused ? fmt::format(", where it is refused ({})", code(*part.refused)) : "");
 }
 
 }  // namespace
@@ -106,6 +132,40 @@ std::vector<Warning> causes_of(const Model& model, const std::vector<Registratio
     if (const auto bone = broken_bone(model, views, refused, register_part))
       notes.push_back(broken(model, *bone));
   return notes;
+}
+
+void warn_of_part_not_explained(const Model& model, const std::vector<RegistrationView>& views,
+                                const RegisterPart& register_part, Registration& registered) {
+  if (registered.failure) return;
+  const auto part = unexplained_part(model, views, registered, register_part);
+  if (!part) return;
+  const Vector3d& cut = part->section;
+  Warning warning{Reason::wrong_model,
+                  unexplained(model, views, *part),
+                  {},
+                  {{"x_mm", cut.x()},
+                   {"y_mm", cut.y()},
+                   {"z_mm", cut.z()},
+                   {"agreement", part->agreement},
+                   {"agreement_elsewhere", part->agreement_elsewhere}}};
+  if (part->alone) {
+    warning.message += alone(*part->alone);
+    warning.figures["agreement_alone"] = part->alone->agreement;
+    warning.figures["moved_mm"] = part->alone->moved_mm;
+    warning.figures["turned_deg"] = part->alone->turned_deg;
+  }
+  for (std::size_t i = 0; i < views.size() && i < registered.views.size(); ++i)
+    if (const auto seen = metal_over_model(model, views[i], registered.views[i], registered))
+      warning.message +=
+          fmt::format("; {} shows metal over the model, {:.0f} mm long, which may hide the part",
+                      views[i].name, seen->length_mm);
+  registered.warnings.push_back(std::move(warning));
+  registered.decision = Decision::warn;
+  registered.not_explained = {part->cut.middle(), (part->is_upper ? 1 : -1) * part->cut.axis.direction};
+}
+
+bool is_of_part_not_explained(const Warning& warning) {
+  return warning.reason == Reason::wrong_model && warning.figures.contains("agreement_elsewhere");
 }
 
 }  // namespace helicarm::registration

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "helicarm/registration/broken_bone.h"
@@ -14,5 +15,14 @@ namespace helicarm::registration {
 /// `register_part` no broken bone is looked for.
 std::vector<Warning> causes_of(const Model& model, const std::vector<RegistrationView>& views,
                                const Registration& refused, const RegisterPart& register_part);
+
+/// Warns (wrong_model) of a part of the volume that agrees far less than the rest (`unexplained_part`), for
+/// which pose and covariance then do not hold; a refused registration is left as it is. `register_part` tells
+/// whether the part is registered alone; without one that is not tried.
+void warn_of_part_not_explained(const Model& model, const std::vector<RegistrationView>& views,
+                                const RegisterPart& register_part, Registration& registered);
+
+/// A warning of `warn_of_part_not_explained`.
+bool is_of_part_not_explained(const Warning& warning);
 
 }  // namespace helicarm::registration

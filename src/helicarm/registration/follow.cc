@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/registration/causes.h"
 #include "helicarm/registration/checks.h"
 
 namespace helicarm::registration {
@@ -78,6 +79,11 @@ Registration Follower::next(const std::vector<RegistrationView>& views, double t
       result = std::move(sought);
     }
   }
+  if (part_not_explained_ && !result.failure && !result.anywhere &&
+      std::ranges::none_of(result.warnings, is_of_part_not_explained)) {
+    result.warnings.push_back(*part_not_explained_);
+    result.decision = Decision::warn;
+  }
   take(result, time);
   return result;
 }
@@ -88,6 +94,11 @@ void Follower::take(const Registration& result, double time) {
     return;
   }
   refused_ = 0;
+  if (const auto warning = std::ranges::find_if(result.warnings, is_of_part_not_explained);
+      warning != result.warnings.end())
+    part_not_explained_ = *warning;
+  else
+    part_not_explained_.reset();
   before_ = result.anywhere ? std::nullopt : last_;
   last_ = Timed{time, result.world_from_model};
 }

@@ -57,6 +57,19 @@ TEST(Follower, GoesOnFromEarlierResultsAsIfItHadMadeThem) {
             later.next(images, 2).world_from_model.matrix());
 }
 
+TEST(Follower, KeepsTheWarningOfAPartThatThePoseDoesNotExplain) {
+  const Model model = bone();
+  Follower follower(model, {pose_at(0)}, follow_options()), later(model, {pose_at(0)}, follow_options());
+  Registration first = follower.next(two_views(lopsided_bone(), pose_at(0)), 0);
+  first.warnings.push_back({Reason::wrong_model, "a part", {}, {{"agreement_elsewhere", 0.8}}});
+  later.take(first, 0);
+  for (const int frame : {1, 2}) {
+    const auto result = later.next(two_views(lopsided_bone(), pose_at(frame)), frame);
+    EXPECT_EQ(result.decision, Decision::warn) << frame;
+    EXPECT_EQ(result.warnings.back(), first.warnings.back()) << frame;
+  }
+}
+
 TEST(Follower, RefusesImagesWithoutTheBodyAndFindsItAgain) {
   const Model model = bone();
   Follower follower(model, {pose_at(0)}, follow_options());

@@ -96,7 +96,7 @@ std::optional<double> mirrored_cost_ratio(const RegistrationProblem& scene, cons
   std::vector<SearchStage> fewer = stages;
   for (SearchStage& stage : fewer) stage.keep = std::min(stage.keep, 16);
   fewer.back().keep = 1;
-  const SearchOptions less{options.shift_mm / 3, options.turn_deg / 2, 600, options.interrupt};
+  const SearchOptions less{options.shift_mm / 3, options.turn_deg / 2, 600, options.interrupt, options.share};
   const Level last = fewer.back().level;
   const bool can_end_early = fewer.size() > 1 && !scene.model().surface;
   if (can_end_early) fewer.pop_back();

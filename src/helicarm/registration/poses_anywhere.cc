@@ -12,14 +12,12 @@
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/core/statistics.h"
-#include "helicarm/geometry/dense_matrix.h"
-#include "helicarm/geometry/ray.h"
+#include "helicarm/geometry/nearest_point.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::registration {
 namespace {
 
-using Eigen::Vector2d;
 using Eigen::Vector2i;
 using Eigen::Vector3d;
 using geometry::RigidTransform;
@@ -229,16 +227,10 @@ std::array<Candidate, count> best_places(const std::vector<ViewSearch>& views,
 }  // namespace
 
 Vector3d middle_of(const std::vector<RegistrationView>& views) {
-  Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
-  Vector3d sum = Vector3d::Zero();
-  for (const RegistrationView& view : views) {
-    const Vector2d centre(0.5 * (view.grey.width() - 1), 0.5 * (view.grey.height() - 1));
-    const geometry::Ray ray = geometry::ray_through(view.view, centre);
-    const Eigen::Matrix3d off = Eigen::Matrix3d::Identity() - ray.direction * ray.direction.transpose();
-    across += off;
-    sum += off * ray.origin;
-  }
-  return geometry::solve_spd(across, sum).solution;
+  std::vector<geometry::Ray> rays;
+  for (const RegistrationView& view : views)
+    rays.push_back(geometry::central_ray(view.view, view.grey.width(), view.grey.height()));
+  return geometry::middle_of(rays);
 }
 
 /// From the views' middle, along each axis: the places of a small model lie closer together, and their number
@@ -251,7 +243,8 @@ double farthest_mm(double spacing_mm) {
 Level level_anywhere(const Model& model) { return {false, std::clamp(model.radius_mm / 8, 1.0, 6.0)}; }
 
 std::vector<RigidTransform> poses_anywhere(const RegistrationProblem& scene, Orientations orientations,
-                                           std::size_t count, const std::function<void()>& interrupt) {
+                                           std::size_t count, const std::function<void()>& interrupt,
+                                           const TellShare& share) {
   const Model& model = scene.model();
   const Level level = level_anywhere(model);
   const Vector3d middle = middle_of(scene.views());
@@ -262,11 +255,13 @@ std::vector<RigidTransform> poses_anywhere(const RegistrationProblem& scene, Ori
                                    int(farthest_mm(level.spacing_mm) / (2 * level.spacing_mm)));
   constexpr std::size_t each = 2;
   std::vector<Candidate> found(std::size_t(orientation_count) * each);
+  UnitsDone done(share, orientation_count);
   parallel_for(orientation_count, scene.threads(), [&](std::size_t i) {
     if (interrupt) interrupt();
     std::ranges::copy(
         best_places<each>(views, places, orientation(orientations, int(i)), model.centre, level.spacing_mm),
         found.begin() + std::ptrdiff_t(each * i));
+    done.one();
   });
   std::ranges::stable_sort(found, [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
   std::vector<RigidTransform> poses;

@@ -4,11 +4,12 @@
 #include <functional>
 #include <vector>
 
+#include "helicarm/core/work_share.h"
 #include "helicarm/registration/estimate.h"
 
 namespace helicarm::registration {
 
-/// The point of the world nearest to the rays through the images' centres.
+/// `geometry::middle_of` the rays through the images' middles.
 Eigen::Vector3d middle_of(const std::vector<RegistrationView>& views);
 
 /// Level at which a model is looked for anywhere.
@@ -23,6 +24,7 @@ enum class Orientations { first, between };
 /// called often, from any thread.
 std::vector<geometry::RigidTransform> poses_anywhere(const RegistrationProblem& scene,
                                                      Orientations orientations, std::size_t count,
-                                                     const std::function<void()>& interrupt = {});
+                                                     const std::function<void()>& interrupt = {},
+                                                     const TellShare& share = {});
 
 }  // namespace helicarm::registration

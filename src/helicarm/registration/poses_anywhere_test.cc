@@ -83,6 +83,25 @@ TEST(PosesAnywhere, OfTheOtherOrientationsLieBetweenTheFirst) {
   EXPECT_LT(degrees_between(between[0], true_pose()), 15);
 }
 
+TEST(PosesAnywhere, SharesOfEachStepGrowToTheWhole) {
+  const auto volume = lopsided_bone();
+  const Model model = bone_of(volume);
+  RegistrationOptions options = two_threads();
+  std::vector<double> shares;
+  options.on_step = [&](std::string_view) {
+    if (!shares.empty()) EXPECT_EQ(shares.back(), 1);
+    shares.clear();
+  };
+  int told = 0;
+  options.search.share = [&](double share) {
+    EXPECT_TRUE(shares.empty() || share >= shares.back()) << share;
+    shares.push_back(share);
+    ++told;
+  };
+  ASSERT_FALSE(register_model(model, two_views(volume), {}, options).failure);
+  EXPECT_GT(told, 100);
+}
+
 TEST(PosesAnywhere, OfASymmetricBodyAreRefusedAndListed) {
   const auto volume = symmetric_bone();
   const Model model = bone_of(volume);

@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include "helicarm/geometry/dense_matrix.h"
-#include "helicarm/localization/error_bound.h"
 #include "helicarm/registration/causes.h"
 #include "helicarm/registration/checks.h"
 #include "helicarm/registration/covariance.h"
@@ -183,6 +182,8 @@ struct Search {
   SearchResult found;
 };
 
+constexpr double share_of_poses = 0.5;  // of a search anywhere: the poses from which it begins
+
 /// All positions in these orientations, and some poses besides.
 struct Everywhere {
   Orientations orientations;
@@ -201,12 +202,13 @@ Search searched_anywhere(RegistrationProblem& scene, const Everywhere& everywher
     made.stages[1] = {made.stages[1].level, 128};
   }
   scene.prepare(level_anywhere(scene.model()), middle);
-  std::vector<RigidTransform> poses =
-      poses_anywhere(scene, everywhere.orientations, starts, options.interrupt);
+  std::vector<RigidTransform> poses = poses_anywhere(
+      scene, everywhere.orientations, starts, options.interrupt, part_of(options.share, 0, share_of_poses));
   poses.insert(poses.end(), everywhere.besides.begin(), everywhere.besides.end());
   if (poses.empty()) poses.push_back({Eigen::Matrix3d::Identity(), middle - scene.model().centre});
   SearchOptions from_poses = options;
   from_poses.candidates = 0;
+  from_poses.share = part_of(options.share, share_of_poses, 1);
   made.found = search(scene, made.stages, poses, from_poses, same_mm);
   return made;
 }
@@ -236,25 +238,6 @@ Warning cameras_without_covariance(const std::string& name) {
               "covariance; views that helicarm calibrates have one",
           {},
           {}};
-}
-
-Eigen::Matrix3d point_covariance(const Registration& registration, const Vector3d& in_world) {
-  const auto at = [&](const RigidCovariance& covariance) {
-    return point_covariance(covariance, registration.centre, in_world);
-  };
-  const RigidStep& step = registration.by_scale;
-  const Vector3d arm = in_world - registration.centre;
-  // A body that is larger lies elsewhere, and its points farther out.
-  const Vector3d error = step.tail<3>() + step.head<3>().cross(arm) - registration.scale_sigma * arm;
-  return at(registration.covariance - step * step.transpose()) + error * error.transpose();
-}
-
-double worst_error_mm(const Model& model, const Registration& registration) {
-  double worst = 0;
-  for (const Vector3d& sample : model.samples)
-    worst = std::max(worst, localization::length_at_95(
-                                point_covariance(registration, registration.world_from_model * sample)));
-  return worst;
 }
 
 namespace {
@@ -375,6 +358,7 @@ Registration registered_part(const Model& part, const std::vector<RegistrationVi
   own.search.turn_deg = part_turn_deg;
   own.max_error_mm = std::nullopt;
   own.on_step = {};
+  own.search.share = {};
   return registered(part, views, {start}, own, Poses{start}, false);
 }
 
@@ -383,16 +367,19 @@ Registration registered_part(const Model& part, const std::vector<RegistrationVi
 Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
                             const std::vector<RigidTransform>& starts, const RegistrationOptions& options) {
   Registration result = registered_or_refused(model, views, starts, options);
-  if (!result.failure || !options.names_causes) return result;
   const auto begun = std::chrono::steady_clock::now();
-  if (options.on_step) options.on_step("causes");
   RegisterPart register_part;
-  if (options.search.candidates > 0)
+  if (options.names_causes && options.search.candidates > 0)
     register_part = [&](const Model& part, const RigidTransform& start) {
+      if (options.on_step) options.on_step("a part alone");
       return registered_part(part, views, start, options);
     };
-  for (Warning& cause : causes_of(model, views, result, register_part))
-    result.notes.push_back(std::move(cause));
+  warn_of_part_not_explained(model, views, register_part, result);
+  if (result.failure && options.names_causes) {
+    if (options.on_step) options.on_step("causes");
+    for (Warning& cause : causes_of(model, views, result, register_part))
+      result.notes.push_back(std::move(cause));
+  }
   result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return result;
 }

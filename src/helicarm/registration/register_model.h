@@ -31,7 +31,7 @@ struct RegistrationOptions {
   Eigen::MatrixXd camera_covariance = {};
   /// Motion of the model between the first view's acquisition and each later one, per axis, mm.
   double motion_sigma_mm = 0;
-  bool names_causes = true;  ///< of a refusal, as notes (`causes_of`), which take seconds
+  bool names_causes = true;  ///< of a refusal, and of a part alone (causes.h): takes seconds
   /// Called with the name of each step. An exception ends the registration.
   std::function<void(std::string_view step)> on_step = {};
 };
@@ -77,6 +77,14 @@ struct Disagreement {
   double ratio() const { return dof > 0 && chi2 > dof ? chi2 / dof : 1; }
 };
 
+/// A part of a model that its pose does not explain: pose and covariance do not hold for points there.
+struct NotExplained {
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< of the plane before it; model coordinates
+  Eigen::Vector3d towards = Eigen::Vector3d::UnitX();
+
+  bool has(const Eigen::Vector3d& in_model) const { return towards.dot(in_model - at) > 0; }
+};
+
 /// Pose of a model in the views' world with what is known of its error.
 struct Registration {
   std::string name;
@@ -100,6 +108,7 @@ struct Registration {
   /// Cost ratio of the mirrored model. None: a search without candidates, or a surface that is its own mirror
   /// image.
   std::optional<double> mirrored_ratio;
+  std::optional<NotExplained> not_explained = {};  ///< of one that is not refused; with a warning
   Deformation deformation;
   std::optional<Disagreement> disagreement;  ///< of two or more views
   std::vector<RegisteredView> views;

@@ -32,9 +32,10 @@ inline volume::Volume lopsided_bone(double size = 1, double bump = 9) {
   return volume;
 }
 
-inline geometry::View view_from(double degrees) {
+/// `size`: of the image, pixels.
+inline geometry::View view_from(double degrees, int size = 160) {
   geometry::View view;
-  view.intrinsics = {1300, 1300, 79.5, 79.5, 0};
+  view.intrinsics = {1300, 1300, 0.5 * (size - 1), 0.5 * (size - 1), 0};
   const double angle = degrees * EIGEN_PI / 180;
   const Eigen::Vector3d ray(std::sin(angle), std::cos(angle), 0);
   const Eigen::Vector3d right = ray.cross(Eigen::Vector3d::UnitZ()).normalized();
@@ -54,17 +55,17 @@ inline geometry::RigidTransform true_pose() {
 inline RegistrationView image_of(const volume::Volume& volume,
                                  const geometry::RigidTransform& world_from_patient,
                                  const geometry::View& view, const char* name, std::uint32_t stream,
-                                 double noise = 0.003) {
+                                 double noise = 0.003, int size = 160) {
   const volume::Absorber absorber(volume, {0.02, 0.000017, 0, 1, -800}, 1);
   const geometry::View from_patient{view.intrinsics, view.camera_from_world * world_from_patient};
-  const auto integrals = *volume::drr(absorber, from_patient, 160, 160, 1);
+  const auto integrals = *volume::drr(absorber, from_patient, size, size, 1);
   RandomStream random(5, stream);
   RegistrationView made;
   made.name = name;
   made.view = view;
-  made.grey = image::Image<float>(160, 160);
-  for (int v = 0; v < 160; ++v)
-    for (int u = 0; u < 160; ++u) {
+  made.grey = image::Image<float>(size, size);
+  for (int v = 0; v < size; ++v)
+    for (int u = 0; u < size; ++u) {
       const double tissue = 0.8 + 0.3 * std::cos(0.01 * u) + 0.002 * v;
       made.grey(u, v) = static_cast<float>(
           4000 * (std::exp(-tissue - double(integrals(u, v))) + noise * random.normal()) + 40);

@@ -68,16 +68,19 @@ struct Descent {
 
 /// The given starts, then the best poses about them.
 std::vector<Descent> first_poses(const RegistrationProblem& scene, const SearchStage& stage,
-                                 const std::vector<RigidTransform>& starts, const SearchOptions& options) {
+                                 const std::vector<RigidTransform>& starts, const SearchOptions& options,
+                                 TellShare share) {
   std::vector<Descent> first;
   const auto add = [&](const RigidTransform& pose) { first.push_back({pose, {first.size()}}); };
   if (starts.size() <= most_given || options.candidates == 0) std::ranges::for_each(starts, add);
   if (options.candidates == 0) return first;
   const auto candidates = candidates_about(scene.model(), starts, options);
   std::vector<double> scores(candidates.size());
+  UnitsDone done(std::move(share), candidates.size());
   parallel_for(candidates.size(), scene.threads(), [&](std::size_t i) {
     if (options.interrupt) options.interrupt();
     scores[i] = scene.observe(stage.level, candidates[i], false, 1).score();
+    done.one();
   });
   for (const std::size_t i : best_of(scene.model(), candidates, scores, stage.keep, stage.level.spacing_mm))
     add(candidates[i]);
@@ -86,13 +89,15 @@ std::vector<Descent> first_poses(const RegistrationProblem& scene, const SearchS
 
 std::vector<Estimate> refined(const RegistrationProblem& scene, const Level& level,
                               const std::vector<Descent>& from, double converged,
-                              const SearchOptions& options) {
+                              const SearchOptions& options, TellShare share) {
   std::vector<Estimate> estimates(from.size());
+  UnitsDone done(std::move(share), from.size());
   const bool few = from.size() < 2 * std::size_t{std::max(1U, scene.threads())};
   parallel_for(from.size(), few ? 1 : scene.threads(), [&](std::size_t i) {
     if (options.interrupt) options.interrupt();
     estimates[i] = refine(scene, level, from[i].pose,
                           {.iterations = 15, .converged = converged, .threads = few ? scene.threads() : 1});
+    done.one();
   });
   return estimates;
 }
@@ -119,7 +124,11 @@ SearchResult search(RegistrationProblem& scene, const std::vector<SearchStage>& 
                     const std::vector<RigidTransform>& starts, const SearchOptions& options, double same_mm) {
   const Model& model = scene.model();
   for (const SearchStage& stage : stages) scene.prepare(stage.level, starts.front() * model.centre);
-  std::vector<Descent> descents = first_poses(scene, stages.front(), starts, options);
+  const auto part = [&](std::size_t number) {
+    const double each = 1 / double(stages.size() + 1);
+    return part_of(options.share, double(number) * each, double(number + 1) * each);
+  };
+  std::vector<Descent> descents = first_poses(scene, stages.front(), starts, options, part(0));
   SearchResult result;
   result.starts = int(descents.size());
   for (const SearchStage& stage : stages) {
@@ -127,7 +136,8 @@ SearchResult search(RegistrationProblem& scene, const std::vector<SearchStage>& 
     // Coarse levels can lead away from a good start.
     if (&stage != &stages.front() && !last && starts.size() <= most_given && options.candidates > 0)
       for (std::size_t i = 0; i < starts.size(); ++i) descents.push_back({starts[i], {i}});
-    auto estimates = refined(scene, stage.level, descents, last ? 0.002 : 0.02, options);
+    auto estimates = refined(scene, stage.level, descents, last ? 0.002 : 0.02, options,
+                             part(1 + std::size_t(&stage - stages.data())));
     std::vector<RigidTransform> reached;
     std::vector<double> scores;
     for (const Estimate& estimate : estimates)
