@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "findings.h"
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
 #include "touch_points.h"
@@ -14,17 +15,23 @@ namespace helicarm::cli {
 namespace {
 
 constexpr double between_updates_s = 0.1;
-constexpr double line_interval_s = 1;
+constexpr double line_interval_s = 1, same_sentence_interval_s = 5;
 
 void print_verified(const operation::TunnelOutcome& outcome, Console& console) {
   const auto& in_images = outcome.verification;
+  const auto depth = outcome.depth();
+  if (depth)
+    if (const auto off = depth->why_off(outcome.tunnel)) print_warnings(std::vector<Warning>{*off}, console);
   if (console.json) {
     const auto end = [](const operation::EndMiss& miss) {
       return Json{{"distance_mm", miss.distance_mm()}, {"predicted_mm", miss.predicted_mm()}};
     };
-    console.out
-        << Json{{"tunnel", outcome.tunnel}, {"start", end(outcome.start)}, {"end", end(outcome.end)}}.dump()
-        << std::endl;
+    Json line = {{"tunnel", outcome.tunnel}, {"start", end(outcome.start)}, {"end", end(outcome.end)}};
+    if (depth)
+      line["depth"] = {{"beyond_end_mm", depth->beyond_end_mm},
+                       {"error_95_mm", depth->error_95_mm()},
+                       {"tolerance_mm", depth->tolerance_mm}};
+    console.out << line.dump() << std::endl;
     return;
   }
   console.out << fmt::format(
@@ -35,6 +42,9 @@ void print_verified(const operation::TunnelOutcome& outcome, Console& console) {
   if (in_images && in_images->start && in_images->end)
     console.out << fmt::format("{}: in the X-ray images (Eq. 17): start {:.2f} mm, end {:.2f} mm\n",
                                outcome.tunnel, in_images->start->combined_mm, in_images->end->combined_mm);
+  if (depth)
+    console.out << fmt::format("{}: the drill's tip is {}, tolerance {:g} mm\n", outcome.tunnel,
+                               guidance::words_of(*depth), depth->tolerance_mm);
   console.out << std::flush;
 }
 
@@ -62,19 +72,32 @@ std::string follow(const std::string& tunnel, operation::Operation& operation, L
 
 }  // namespace
 
-std::string words_of(const operation::Guidance& guidance) {
-  std::string words;
+std::string figures_of(const operation::Guidance& guidance) {
+  std::string figures;
   if (const auto& aim = guidance.aim)
-    words = fmt::format(
+    figures = fmt::format(
         "{:5.1f} +- {:.1f} mm off axis  {:5.1f} +- {:.1f} deg  depth {:6.1f} +- {:.1f} of {:.1f} mm  ",
         aim->distance_mm, aim->distance_sigma_mm, aim->angle_deg, aim->angle_sigma_deg, aim->depth_mm,
         aim->depth_sigma_mm, aim->length_mm);
-  words += guidance.decision();
-  // The figures of these two are in the line already.
-  if (guidance.why_not && guidance.why_not->reason != Reason::off_target &&
-      guidance.why_not->reason != Reason::uncertain)
-    words += ": " + without_control_characters(guidance.why_not->message);
-  return words;
+  return figures.append(guidance.decision());
+}
+
+std::string reason_of(const operation::Guidance& guidance) {
+  const bool is_in_figures = guidance.why_not && guidance.why_not->reason == Reason::off_target;
+  return guidance.why_not && !is_in_figures ? without_control_characters(guidance.why_not->message) : "";
+}
+
+bool SentencePace::is_due(std::string_view decision, bool has_sentence, double now_s) {
+  if (decision != decision_) {
+    decision_ = decision;
+    const auto before = printed_s_by_decision_.find(decision_);
+    waits_ = has_sentence &&
+             (before == printed_s_by_decision_.end() || now_s - before->second >= same_sentence_interval_s);
+  }
+  if (!waits_ || now_s - printed_s_ < line_interval_s) return false;
+  waits_ = false;
+  printed_s_ = printed_s_by_decision_[decision_] = now_s;
+  return true;
 }
 
 DrillDisplay::DrillDisplay(Console& console)
@@ -88,18 +111,24 @@ void DrillDisplay::show(const std::string& tunnel, const operation::Guidance& gu
     return;
   }
   if (console_.quiet) return;
-  const std::string name = without_control_characters(tunnel);
+  const std::string name = without_control_characters(tunnel), reason = reason_of(guidance);
+  const double now_s = tracker::monotonic_seconds();
   if (terminal_) {
-    // Erases the rest of a longer line.
-    console_.progress << fmt::format("\r{}: {}\033[K", name, words_of(guidance)) << std::flush;
+    // Erases the rest of a longer line. A sentence stands above the line, which must not wrap.
+    const std::string above = sentences_.is_due(guidance.decision(), !reason.empty(), now_s)
+                                  ? fmt::format("\r{}: {}\033[K\n", name, reason)
+                                  : "";
+    console_.progress << above << fmt::format("\r{}: {}\033[K", name, figures_of(guidance)) << std::flush;
     open_ = true;
     return;
   }
-  const double now_s = tracker::monotonic_seconds();
-  if (guidance.decision() == decision_ && now_s - shown_s_ < line_interval_s) return;
+  const bool is_new = guidance.decision() != decision_;
+  if (!is_new && now_s - shown_s_ < line_interval_s) return;
   decision_ = guidance.decision();
   shown_s_ = now_s;
-  console_.progress << fmt::format("{}: {}\n", name, words_of(guidance)) << std::flush;
+  console_.progress << fmt::format("{}: {}{}{}\n", name, figures_of(guidance), reason.empty() ? "" : ": ",
+                                   reason)
+                    << std::flush;
 }
 
 DrillDisplay::~DrillDisplay() {

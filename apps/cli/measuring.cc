@@ -15,6 +15,7 @@
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/earlier_results.h"
 #include "helicarm/report/report.h"
+#include "registration_progress.h"
 #include "result_text.h"
 
 namespace helicarm::cli {
@@ -102,12 +103,13 @@ Expected<case_registration::RegisterOptions> options_of(const RunArguments& argu
 Expected<Measurement> measured_case(const RunArguments& arguments, Console& console) {
   return options_of(arguments, console)
       .and_then([&](const case_registration::RegisterOptions& options) {
-        case_registration::Progress progress;
-        if (!console.quiet)
-          progress.step = [&](const std::string& model, std::string_view step) {
-            if (!model.empty()) console.progress << fmt::format("helicarm: {}: {}\n", model, step);
+        RegistrationProgress progress(console);
+        case_registration::Progress hooks = progress.hooks();
+        if (hooks.step)
+          hooks.step = [begin = hooks.step](const std::string& model, std::string_view step) {
+            if (!model.empty()) begin(model, step);
           };
-        return measurement_of(arguments.folder, options, progress);
+        return measurement_of(arguments.folder, options, hooks);
       })
       .map([&](Measurement measured) {
         print_warnings(measured.result.warnings, console);

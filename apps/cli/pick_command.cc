@@ -12,8 +12,8 @@
 #include "command_line.h"
 #include "helicarm/core/file_lock.h"
 #include "helicarm/core/files.h"
-#include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/case_picks.h"
+#include "helicarm/pipeline/case_purpose.h"
 
 namespace helicarm::cli {
 
@@ -54,16 +54,19 @@ void add_from(const fs::path& csv, const PickArguments& arguments, Console& cons
   const fs::path folder = pipeline::folder_of_case(arguments.folder);
   const pipeline::PickedCase picked =
       value_or_throw(pipeline::with_picks(value_or_throw(read_json(file)), table, origin, folder));
+  const pipeline::Purpose purpose = pipeline::purpose_of(picked.json);
   value_or_throw(pipeline::check_in_images(
-      table, origin, value_or_throw(pipeline::case_from_json(picked.json, "case.json", folder))));
+      table, origin, value_or_throw(pipeline::case_from_json(picked.json, "case.json", folder, purpose))));
   value_or_throw(write_file(file, to_text(picked.json) + "\n"));
   if (console.json)
     console.out << to_text(
                        Json{{"case", file.string()}, {"added", picked.added}, {"replaced", picked.replaced}})
                 << '\n';
   else
-    console.out << fmt::format("{}: {} picks added, {} replaced\n  Next:\n    helicarm run {}\n",
-                               file.string(), picked.added, picked.replaced, arguments.folder.string());
+    console.out << fmt::format("{}: {} picks added, {} replaced\n  Next:\n    helicarm {} {}\n",
+                               file.string(), picked.added, picked.replaced,
+                               purpose == pipeline::Purpose::registration ? "register" : "run",
+                               arguments.folder.string());
 }
 
 }  // namespace
@@ -73,7 +76,7 @@ void add_from(const fs::path& csv, const PickArguments& arguments, Console& cons
 CommandResult pick_command(const PickArguments& arguments, Console& console) {
   return guarded([&] {
     if (arguments.csv) return add_from(*arguments.csv, arguments, console);
-    value_or_throw(pipeline::read_case(arguments.folder));
+    value_or_throw(pipeline::read_any_case(arguments.folder));
     const auto program = desktop_program();
     if (!program)
       throw BadInput(

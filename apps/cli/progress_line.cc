@@ -26,9 +26,10 @@ std::string span_of(double s) {
 
 }  // namespace
 
-ProgressLine::ProgressLine(const Console& console)
+ProgressLine::ProgressLine(const Console& console, const std::string& of)
     : out_(console.quiet ? nullptr : &console.progress),
       terminal_(&console.progress == &std::cerr && ::isatty(STDERR_FILENO)),
+      begin_(fmt::format("helicarm: {}{}", of, of.empty() ? "" : ": ")),
       tags_(console.tags),
       start_(Clock::now()),
       reported_(start_) {}
@@ -54,7 +55,7 @@ void ProgressLine::notify(double share) {
     return;
   const double done = share - first_share_;
   const std::string left = done > 0 ? span_of(passed * (1 - share) / done) + " left" : "";
-  *out_ << fmt::format("{}helicarm: {:.0f} % done, {}{}", terminal_ ? "\r" : "", 100 * share, left,
+  *out_ << fmt::format("{}{}{:.0f} % done, {}{}", terminal_ ? "\r" : "", begin_, 100 * share, left,
                        terminal_ ? "   " : "\n")
         << std::flush;
   begun_ = true;

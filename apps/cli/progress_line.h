@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <ostream>
+#include <string>
 
 #include "command.h"
 
@@ -12,7 +13,8 @@ namespace helicarm::cli {
 /// %. Work of less than a second prints nothing.
 class ProgressLine {
  public:
-  explicit ProgressLine(const Console& console);
+  /// `of`: what it is the progress of, if not of the command.
+  explicit ProgressLine(const Console& console, const std::string& of = {});
   ~ProgressLine();
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
@@ -25,6 +27,7 @@ class ProgressLine {
 
   std::ostream* out_;  ///< null: silent
   bool terminal_;
+  std::string begin_;
   bool tags_;  ///< of Slicer's Execution Model: a line per 1 %
   bool begun_ = false;
   double first_share_ = -1;

@@ -22,6 +22,7 @@
 #include "measure_landmarks.h"
 #include "measuring.h"
 #include "progress_line.h"
+#include "registration_progress.h"
 #include "resumed_sequence.h"
 #include "several_cases.h"
 
@@ -169,14 +170,10 @@ CaseRow registered(const RegisterArguments& arguments, Console& console) {
   value_or_throw(check_can_write(run.out));
   if (!arguments.resume) report::forget_registration(run.out);
   const case_registration::RegisterOptions options = value_or_throw(options_of(run, console));
-  case_registration::Progress progress;
-  if (!console.quiet)
-    progress.step = [&](const std::string& model, std::string_view step) {
-      console.progress << fmt::format("helicarm: {}{}{}\n", model, model.empty() ? "" : ": ", step);
-    };
-  if (!arguments.frames.empty()) return follow(arguments, options, progress, console);
+  RegistrationProgress progress(console);
+  if (!arguments.frames.empty()) return follow(arguments, options, {.step = progress.hooks().step}, console);
   const auto the_case = value_or_throw(pipeline::read_case(run.folder, pipeline::Purpose::registration));
-  const auto result = value_or_throw(case_registration::register_case(the_case, options, progress));
+  const auto result = value_or_throw(case_registration::register_case(the_case, options, progress.hooks()));
   value_or_throw(case_registration::write_registration(result, run.out));
   if (run.dicom && !result.failure)
     write_dicom_files(the_case, {case_registration::with_models({}, result), result}, run.out, run.out,

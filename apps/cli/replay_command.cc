@@ -5,6 +5,7 @@
 
 #include "command_line.h"
 #include "helicarm/core/json.h"
+#include "helicarm/core/text.h"
 #include "helicarm/operation/replay.h"
 
 namespace helicarm::cli {
@@ -20,6 +21,21 @@ std::string end_of(const operation::ReplayReport& report) {
   return report.ended_by.empty() ? "" : ", ended by " + report.ended_by;
 }
 
+/// "to femur from 12.5 s to 40.1 s, ended by verified"
+std::string words_of(const operation::GuidanceSpan& span) {
+  const std::string begun =
+      fmt::format("drill guided to {} from {:.1f} s", without_control_characters(span.tunnel), span.begun_s);
+  return span.ended_s ? fmt::format("{} to {:.1f} s, ended by: {}", begun, *span.ended_s, span.ended_by)
+                      : begun + ", its end is not recorded";
+}
+
+Json to_json(const operation::GuidanceSpan& span) {
+  return {{"tunnel", span.tunnel},
+          {"begun_s", span.begun_s},
+          {"ended_s", span.ended_s ? Json(*span.ended_s) : Json()},
+          {"ended_by", span.ended_s ? Json(span.ended_by) : Json()}};
+}
+
 }  // namespace
 
 /// Recomputes an operation from its record and reports differences.
@@ -27,6 +43,8 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
   return guarded([&] {
     const operation::ReplayReport report = value_or_throw(operation::replay(arguments.session));
     if (console.json) {
+      Json guidances = Json::array();
+      for (const operation::GuidanceSpan& span : report.guidances) guidances.push_back(to_json(span));
       console.out << to_text({{"records", report.records},
                               {"torn", report.torn},
                               {"finished", report.finished},
@@ -35,6 +53,7 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
                               {"results", report.results},
                               {"hand_eyes", report.hand_eyes},
                               {"decisions", report.decisions},
+                              {"guidances", guidances},
                               {"orders", report.orders},
                               {"confirmations", report.confirmations},
                               {"replans", report.replans},
@@ -51,6 +70,8 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
           report.records, report.torn ? " and an incomplete one" : "", end_of(report), report.exposures,
           report.images, report.results, report.hand_eyes, report.orders, report.confirmations,
           report.replans, report.outcomes, report.decisions, report.files);
+      for (const operation::GuidanceSpan& span : report.guidances)
+        console.out << "  " << words_of(span) << '\n';
       for (const std::string& difference : report.differences) console.out << "  " << difference << '\n';
     }
     if (!report.differences.empty())

@@ -25,6 +25,19 @@ py::tuple records_of(const std::filesystem::path& session) {
   return py::make_tuple(records, read.torn);
 }
 
+py::list guidances_of(const operation::ReplayReport& report) {
+  py::list spans;
+  for (const operation::GuidanceSpan& span : report.guidances) {
+    py::dict one;
+    one["tunnel"] = span.tunnel;
+    one["begun_s"] = span.begun_s;
+    one["ended_s"] = span.ended_s;
+    one["ended_by"] = span.ended_s ? py::object(py::str(span.ended_by)) : py::object(py::none());
+    spans.append(one);
+  }
+  return spans;
+}
+
 py::dict replay(const std::filesystem::path& session, const py::object& progress) {
   const RunHooks hooks = run_hooks(py::none());
   const operation::ReplayReport report = value_or_raise(without_gil([&] {
@@ -48,6 +61,7 @@ py::dict replay(const std::filesystem::path& session, const py::object& progress
   answer["registrations"] = report.registrations;
   answer["hand_eyes"] = report.hand_eyes;
   answer["decisions"] = report.decisions;
+  answer["guidances"] = guidances_of(report);
   answer["orders"] = report.orders;
   answer["confirmations"] = report.confirmations;
   answer["replans"] = report.replans;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <iterator>
 #include <memory>
 
 #include "arrays.h"
@@ -177,8 +178,9 @@ py::dict solved(const Doubles& xyz_mm, const Doubles& uv, const std::optional<Do
   }));
   exchange::ImportedMatrix camera;
   camera.view = made.view;
-  if (const auto flipped = exchange::mirrored_or_upwards(made.view.intrinsics))
-    camera.warnings.push_back(*flipped);
+  std::ranges::copy_if(made.warnings, std::back_inserter(camera.warnings), [](const Warning& warning) {
+    return warning.reason == Reason::ambiguous_handedness;  // the others are of the points
+  });
   py::dict answer;
   answer["camera"] = camera;
   answer["dlt"] = made.dlt ? py::object(rows_array<11>({*made.dlt}, true)) : py::object(py::none());

@@ -109,6 +109,12 @@ def test_solve_warns_alike_of_a_point_that_does_not_fit(pair, tmp_path, off_px, 
     assert word in found[0]["message"] and found[0]["code"] == "residual_too_large"
 
 
+def test_solve_names_a_mirrored_image_in_its_answer_and_in_its_camera(pair):
+    found = helicarm.solve(pair.xyz, pair.pixels("AP", pair.xyz) * [-1, 1] + [639, 0])
+    for warnings in (found["warnings"], found["camera"].warnings):
+        assert [warning["code"] for warning in warnings] == ["ambiguous_handedness"]
+
+
 @pytest.mark.parametrize("method", ["ml", "dlt", "homogeneous"])
 def test_solve_refuses_places_in_cm_alike(pair, tmp_path, method):
     uv, places = pair.pixels("AP", pair.xyz), pair.xyz / 10

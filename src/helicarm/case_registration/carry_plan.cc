@@ -32,6 +32,17 @@ bool tracked(const pipeline::Case& the_case, const guidance::Bone& bone) {
   });
 }
 
+std::vector<registration::RegistrationView> following(std::vector<registration::RegistrationView> views,
+                                                      const pipeline::Case& the_case,
+                                                      const guidance::Bone& bone) {
+  const RigidTransform first = *guidance::calibrator_from(bone, the_case.views.front().poses);
+  for (std::size_t i = 0; i < views.size(); ++i)
+    views[i].view.camera_from_world = views[i].view.camera_from_world *
+                                      *guidance::calibrator_from(bone, the_case.views[i].poses) *
+                                      first.inverse();
+  return views;
+}
+
 Eigen::MatrixXd shared_covariance(const registration::Registration& registration) {
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(shared_errors, shared_errors);
   covariance.topLeftCorner<6, 6>() =

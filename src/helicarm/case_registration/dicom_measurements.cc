@@ -154,6 +154,9 @@ void add_tool_lines(const pipeline::Result& result, std::vector<ReportGroup>& gr
       group.values.push_back(*error ? value_of(name, in_mm(), (*error)->distance_mm)
                                     : failed_value(name, in_mm(), "the planned point is not located"));
     }
+    if (line.depth)
+      group.values.push_back(value_of(own_code("beyond_end", "Tip of the drill beyond the planned end"),
+                                      in_mm(), line.depth->beyond_end_mm, line.depth->sigma_mm));
     if (i < result.tool_lines.size())
       group.values.front().path = {result.tool_lines[i].p1_in_calibrator,
                                    result.tool_lines[i].p2_in_calibrator};

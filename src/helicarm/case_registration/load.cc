@@ -12,6 +12,7 @@
 #include "helicarm/case_registration/register_in_memory.h"
 #include "helicarm/exchange/import_matrix.h"
 #include "helicarm/geometry/dense_matrix.h"
+#include "helicarm/pipeline/case_frames.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/volume/hounsfield.h"
@@ -140,30 +141,45 @@ void take_patient(std::string& known, const xray::XrayImage& image) {
                    fmt::format("{} is of another patient than the images before it", image.name));
 }
 
-void add_view(LoadedViews& loaded, xray::XrayImage image, const exchange::ImportedMatrix& camera,
-              std::optional<rectification::DistortionMap> map = {}) {
-  take_patient(loaded.patient_key, image);
-  if (camera.image_size) check_size(image.name, "the camera is for", *camera.image_size, image.pixels);
-  if (map) check_size(image.name, "\"map\" is for", {map->width, map->height}, image.pixels);
-  loaded.views.push_back(view_of(image, image.name, camera.view));
-  loaded.views.back().grey = map ? rectification::resample(image, *map) : std::move(image.pixels);
-  loaded.maps.push_back(std::move(map));
-  // The camera states what the pixels measure.
-  std::ranges::copy_if(image.warnings, std::back_inserter(loaded.warnings),
-                       [](const Warning& warning) { return warning.reason != Reason::spacing_missing; });
-  if (image.inverted) loaded.inverted.push_back(*image.inverted);
+void refuse_sequence(const pipeline::Case& the_case) {
+  if (pipeline::is_sequence(the_case))
+    throw BadInput(Reason::bad_value,
+                   "views: \"image\" holds {frame}: name the frames with --frames, such as --frames 1-100");
 }
 
-LoadedViews views_of_cameras(const pipeline::Case& the_case) {
+/// With an image whose camera another program brought: free of distortion, or with a map to its pixels.
+void add_view(pipeline::CaseCalibration& taken, xray::XrayImage image, const exchange::ImportedMatrix& camera,
+              std::optional<rectification::DistortionMap> map = {}) {
+  std::string patient;
+  for (const pipeline::LabelledView& before : taken.images) take_patient(patient, *before.xray_image);
+  take_patient(patient, image);
+  if (camera.image_size) check_size(image.name, "the camera is for", *camera.image_size, image.pixels);
+  if (map) check_size(image.name, "\"map\" is for", {map->width, map->height}, image.pixels);
+  // The camera states what the pixels measure.
+  std::ranges::copy_if(image.warnings, std::back_inserter(taken.warnings),
+                       [](const Warning& warning) { return warning.reason != Reason::spacing_missing; });
+  pipeline::LabelledView& view = taken.images.emplace_back();
+  view.name = image.name;
+  view.rectification.source = map ? rectification::MapSource::file : rectification::MapSource::none;
+  view.rectification.map = map ? *std::move(map) : rectification::flat_panel_map(image);
+  taken.views.push_back({view.name, camera.view, {}});
+  taken.fiducials.emplace_back();
+  view.xray_image = std::make_shared<const xray::XrayImage>(std::move(image));
+}
+
+LoadedViews views_of_cameras(const pipeline::CaseCalibration& taken) {
   LoadedViews loaded;
-  for (const pipeline::CaseView& view : the_case.views) {
-    std::optional<rectification::DistortionMap> map;
-    if (view.map)
-      map = value_or_throw(rectification::distortion_map_from_json(value_or_throw(read_json(*view.map)),
-                                                                   view.map->filename().string()));
-    add_view(loaded, value_or_throw(pipeline::image_of(view)),
-             value_or_throw(exchange::import_matrix(*view.camera)), std::move(map));
+  for (std::size_t i = 0; i < taken.views.size(); ++i) {
+    const xray::XrayImage& image = *taken.images[i].xray_image;
+    const rectification::Rectification& rectification = taken.images[i].rectification;
+    if (loaded.patient_key.empty()) loaded.patient_key = image.acquisition.patient_key;
+    loaded.views.push_back(view_of(image, taken.views[i].name, taken.views[i].view));
+    loaded.views.back().grey = rectification::resample(image, rectification.map);
+    const bool has_map = rectification.source == rectification::MapSource::file;
+    loaded.maps.push_back(has_map ? std::optional(rectification.map) : std::nullopt);
+    if (image.inverted) loaded.inverted.push_back(*image.inverted);
   }
+  loaded.warnings = taken.warnings;
   return loaded;
 }
 
@@ -194,8 +210,25 @@ Eigen::MatrixXd covariance_by_residuals(const pipeline::CaseCalibration& calibra
 
 }  // namespace
 
+Expected<pipeline::CaseCalibration> calibration_of_cameras(const pipeline::Case& the_case) {
+  return guarded([&] {
+    refuse_sequence(the_case);
+    pipeline::CaseCalibration taken;
+    for (const pipeline::CaseView& view : the_case.views) {
+      std::optional<rectification::DistortionMap> map;
+      if (view.map)
+        map = value_or_throw(rectification::distortion_map_from_json(value_or_throw(read_json(*view.map)),
+                                                                     view.map->filename().string()));
+      add_view(taken, value_or_throw(pipeline::image_of(view)),
+               value_or_throw(exchange::import_matrix(*view.camera)), std::move(map));
+    }
+    return taken;
+  });
+}
+
 LoadedViews views_of_calibration(const pipeline::Case& the_case,
                                  const pipeline::CaseCalibration& calibration) {
+  if (pipeline::brings_cameras(the_case)) return views_of_cameras(calibration);
   LoadedViews loaded;
   for (std::size_t i = 0; i < calibration.views.size(); ++i) {
     const pipeline::LabelledView& image = calibration.images[i];
@@ -215,9 +248,10 @@ LoadedViews views_of_calibration(const pipeline::Case& the_case,
 Expected<LoadedViews> load_views(const pipeline::Case& the_case, const pipeline::RunOptions& run,
                                  const pipeline::Progress& progress) {
   return guarded([&] {
+    refuse_sequence(the_case);
     if (pipeline::brings_cameras(the_case)) {
       progress.begin("read");
-      return views_of_cameras(the_case);
+      return views_of_cameras(value_or_throw(calibration_of_cameras(the_case)));
     }
     const auto calibration = pipeline::calibrate_case(the_case, run, progress);
     if (!calibration) throw BadInput(calibration.error().failure);
@@ -228,9 +262,9 @@ Expected<LoadedViews> load_views(const pipeline::Case& the_case, const pipeline:
 Expected<LoadedViews> views_of_images(std::vector<xray::XrayImage> images,
                                       const std::vector<exchange::ImportedMatrix>& cameras) {
   return guarded([&] {
-    LoadedViews loaded;
-    for (std::size_t i = 0; i < images.size(); ++i) add_view(loaded, std::move(images[i]), cameras[i]);
-    return loaded;
+    pipeline::CaseCalibration taken;
+    for (std::size_t i = 0; i < images.size(); ++i) add_view(taken, std::move(images[i]), cameras[i]);
+    return views_of_cameras(taken);
   });
 }
 
@@ -255,6 +289,20 @@ Expected<std::vector<RegistrationView>> with_images(const LoadedViews& loaded,
 
 Expected<volume::Volume> volume_of(const pipeline::CaseModel& case_model) {
   return guarded([&] { return volume_at(case_model.volume.value(), case_model, case_model.tiff_offset_hu); });
+}
+
+Expected<std::vector<std::uint8_t>> body_in(const volume::Volume& ct, const pipeline::CaseModel& case_model) {
+  return guarded([&] {
+    const auto mask = mask_on(ct, case_model, case_model.mask, "mask");
+    std::vector<std::uint8_t> body;
+    if (!mask && !case_model.window_hu) return body;
+    body.reserve(ct.voxels.size());
+    if (mask)
+      for (const float voxel : mask->voxels) body.push_back(voxel != 0);
+    else
+      for (const float voxel : ct.voxels) body.push_back(voxel >= case_model.window_hu->x());
+    return body;
+  });
 }
 
 Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,

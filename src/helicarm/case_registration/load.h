@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -34,8 +35,12 @@ struct LoadedViews {
 Expected<LoadedViews> load_views(const pipeline::Case& the_case, const pipeline::RunOptions& run,
                                  const pipeline::Progress& progress = {});
 
-/// The views of a case that is calibrated already. Of the paper's method, which has no covariance, each
-/// view's follows from its residuals.
+/// The images of a case and the cameras of other programs that its views name: calibrated views without
+/// covariance and fiducials. Fails as `load_views`.
+Expected<pipeline::CaseCalibration> calibration_of_cameras(const pipeline::Case& the_case);
+
+/// The views of a case that is calibrated already, or brings cameras. Of the paper's method, which has no
+/// covariance, each view's follows from its residuals.
 LoadedViews views_of_calibration(const pipeline::Case& the_case,
                                  const pipeline::CaseCalibration& calibration);
 
@@ -55,6 +60,10 @@ struct LoadedModel {
 /// The CT of a model that has one. Fails as `read_volume` and `tiff_stack`, and bad_value for a TIFF stack
 /// without voxel_mm.
 Expected<volume::Volume> volume_of(const pipeline::CaseModel& case_model);
+
+/// 1 for each voxel of the model's CT that is of the body: by its mask, else from its window's lower limit
+/// on; empty where neither is given. Fails as `load_model`.
+Expected<std::vector<std::uint8_t>> body_in(const volume::Volume& ct, const pipeline::CaseModel& case_model);
 
 /// The model's files; of a plan the tunnels against the bone.
 Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,

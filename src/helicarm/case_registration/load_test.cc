@@ -47,6 +47,20 @@ TEST_F(LoadLabelMap, TheChosenLabelIsTheBody) {
   EXPECT_NEAR(load_model(model_)->model->centre.x(), 15.5, 0.7);
 }
 
+TEST_F(LoadLabelMap, TheBodyInTheCtIsThatOfTheMaskOrTheWindow) {
+  const volume::Volume ct = volume_of(model_).value();
+  const auto voxels = [&] {
+    const auto body = body_in(ct, model_).value();
+    return std::ranges::count(body, 1);
+  };
+  model_.mask.label = 3;
+  EXPECT_EQ(voxels(), 2048);
+  model_.mask = {};
+  EXPECT_EQ(voxels(), 0);
+  model_.window_hu = {150, 3000};
+  EXPECT_EQ(voxels(), 4096);
+}
+
 TEST_F(LoadLabelMap, SeveralLabelsWithoutAChoiceAreRefused) {
   const auto refused = load_model(model_);
   ASSERT_FALSE(refused);

@@ -2,8 +2,10 @@
 #include "helicarm/case_registration/plan_errors.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "helicarm/localization/error_bound.h"
 
@@ -14,7 +16,8 @@ std::optional<PlannedError> largest_error(const std::vector<RegisteredPoint>& po
   const auto take = [&](const std::string& point, const std::string& frame,
                         const Eigen::Matrix3d& covariance) {
     const double error = localization::length_at_95(covariance);
-    if (!largest || error > largest->error_95_mm) largest = PlannedError{point, frame, error};
+    if (!largest || error > largest->error_95_mm || std::isnan(error))
+      largest = PlannedError{point, frame, error};
   };
   for (const RegisteredPoint& point : points) {
     const guidance::PointInFrames& place = point.place;
@@ -38,6 +41,29 @@ void limit_error(const std::optional<PlannedError>& largest, const std::optional
        {},
        {{"error_95_mm", largest->error_95_mm}, {"limit_mm", limit}}},
       max_error_mm.has_value());
+}
+
+void judge_explained(const MarkupPlan& plan, registration::Registration& result) {
+  if (!result.not_explained) return;
+  std::vector<std::string> points, tunnels;
+  for (const PlanPoint& point : plan.points)
+    if (result.not_explained->has(point.in_model)) points.push_back(point.name);
+  for (const MarkupLine& tunnel : plan.tunnels)
+    for (const std::size_t end : {tunnel.start, tunnel.end})
+      if (result.not_explained->has(plan.points[end].in_model)) {
+        tunnels.push_back(tunnel.name);
+        break;
+      }
+  if (points.empty()) return;
+  const bool refuses = !tunnels.empty();
+  add_finding(result,
+              {Reason::wrong_model,
+               fmt::format("{}: planned in the part that the pose does not explain: {}; their stated errors "
+                           "do not hold. Register that part as a model of its own, with a mask of it",
+                           result.name, fmt::join(refuses ? tunnels : points, ", ")),
+               {},
+               {{"points", double(points.size())}, {"tunnels", double(tunnels.size())}}},
+              refuses);
 }
 
 void add_finding(registration::Registration& result, Failure finding, bool refuses) {

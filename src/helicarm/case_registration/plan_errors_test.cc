@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/case_registration/plan_errors.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 
 namespace helicarm::case_registration {
@@ -49,6 +51,44 @@ TEST(PlanErrors, WithoutALimitTwoMillimetresAreWarnedOf) {
   const auto result = limited({point_with("end", 1, {})}, {});
   EXPECT_FALSE(result.failure);
   EXPECT_EQ(result.decision, registration::Decision::warn);
+}
+
+TEST(PlanErrors, AnErrorThatIsNotKnownExceedsEveryLimit) {
+  EXPECT_TRUE(limited({point_with("start", 0.1, {}), point_with("end", std::nan(""), {})}, 0.5).failure);
+}
+
+class NotExplained : public testing::Test {
+ protected:
+  /// With the part above z = 10 not explained, and a plan of a point and a tunnel at these heights.
+  registration::Registration judged(double point_z, double tunnel_z) {
+    registration::Registration result;
+    result.decision = registration::Decision::warn;
+    result.not_explained = {Vector3d(0, 0, 10), Vector3d::UnitZ()};
+    const MarkupPlan plan{{{"P", {0, 0, point_z}}, {"T_start", {0, 0, -30}}, {"T_end", {0, 0, tunnel_z}}},
+                          {{"T", 1, 2}}};
+    judge_explained(plan, result);
+    return result;
+  }
+};
+
+TEST_F(NotExplained, AnythingPlannedInTheRestIsAccepted) {
+  const auto result = judged(5, 5);
+  EXPECT_FALSE(result.failure);
+  EXPECT_TRUE(result.warnings.empty());
+}
+
+TEST_F(NotExplained, APointPlannedThereIsWarnedOf) {
+  const auto result = judged(15, 5);
+  EXPECT_FALSE(result.failure);
+  ASSERT_EQ(result.warnings.size(), 1u);
+  EXPECT_THAT(result.warnings[0].message, HasSubstr("does not explain: P; their"));
+}
+
+TEST_F(NotExplained, ATunnelThatReachesThereIsRefused) {
+  const auto result = judged(5, 15);
+  ASSERT_TRUE(result.failure);
+  EXPECT_EQ(result.failure->reason, Reason::wrong_model);
+  EXPECT_THAT(result.failure->message, HasSubstr("does not explain: T; their"));
 }
 
 }  // namespace

@@ -15,7 +15,6 @@
 #include "helicarm/case_registration/register_in_memory.h"
 #include "helicarm/case_registration/registration_figures.h"
 #include "helicarm/case_registration/start_poses.h"
-#include "helicarm/pipeline/case_frames.h"
 #include "helicarm/registration/outline.h"
 
 namespace helicarm::case_registration {
@@ -25,17 +24,6 @@ using geometry::RigidTransform;
 using registration::RegistrationView;
 
 constexpr double outline_step_px = 2;
-
-/// The views as if the bone were where it was at the first one's acquisition.
-std::vector<RegistrationView> following(std::vector<RegistrationView> views, const pipeline::Case& the_case,
-                                        const guidance::Bone& bone) {
-  const RigidTransform first = *guidance::calibrator_from(bone, the_case.views.front().poses);
-  for (std::size_t i = 0; i < views.size(); ++i)
-    views[i].view.camera_from_world = views[i].view.camera_from_world *
-                                      *guidance::calibrator_from(bone, the_case.views[i].poses) *
-                                      first.inverse();
-  return views;
-}
 
 /// What no image shows of a body whose poses at the acquisitions are not known.
 Warning motion_note(const pipeline::CaseModel& case_model, double motion_sigma_mm) {
@@ -120,6 +108,7 @@ class Registrar {
       made.bone_checks.resize(plan->tunnels.size());
       made.tunnel_slices = std::move(files.tunnel_slices);
       judge_tunnels(*plan, made.bone_checks, made.registration);
+      judge_explained(*plan, made.registration);
     }
     if (made.model) add_warnings_of_files(*made.model, made.registration);
     return made;
@@ -144,6 +133,7 @@ class Registrar {
     add_figures(loaded_model.model, loaded_.views, made);
     for (const Warning& warning : outside) add_finding(made.registration, warning, false);
     if (made.registration.is_determined()) carry_plan({loaded_model.points, {}}, given_, made);
+    judge_explained({loaded_model.points, {}}, made.registration);
     limit_error(largest_error(made.points), options_.run.max_error_mm, made.registration);
     if (loaded_.views.size() > 1) made.registration.notes.push_back(motion_note(case_model, motion_sigma_mm));
     made.model = std::make_shared<const registration::Model>(std::move(loaded_model.model));
@@ -194,12 +184,6 @@ std::vector<std::vector<Eigen::Vector2d>> outlines(const registration::Model& mo
   return made;
 }
 
-pipeline::Progress Progress::of_views() const {
-  pipeline::Progress progress{.view = interrupt};
-  if (step) progress.stage = [this](std::string_view stage) { step("", stage); };
-  return progress;
-}
-
 bool CaseRegistration::refused() const {
   return failure || std::ranges::any_of(models, [](const RegisteredModel& model) {
            return model.registration.failure.has_value();
@@ -212,9 +196,6 @@ Expected<CaseRegistration> register_case(const pipeline::Case& the_case, const R
     CaseRegistration result;
     result.bones = the_case.bones;
     result.warnings = the_case.warnings;
-    if (pipeline::is_sequence(the_case))
-      throw BadInput(Reason::bad_value,
-                     "views: \"image\" holds {frame}: name the frames with --frames, such as --frames 1-100");
     auto loaded = load_views(the_case, options.run, progress.of_views());
     if (!loaded) {
       if (exit_code(loaded.error().reason) == 2) throw BadInput(loaded.error());

@@ -11,6 +11,7 @@
 #include "helicarm/case_registration/load.h"
 #include "helicarm/case_registration/plan.h"
 #include "helicarm/core/json.h"
+#include "helicarm/core/work_share.h"
 #include "helicarm/guidance/guide.h"
 #include "helicarm/guidance/tunnel.h"
 #include "helicarm/pipeline/result.h"
@@ -40,10 +41,14 @@ struct Progress {
   std::function<void(const std::string& model, std::string_view step)> step = {};
   /// Often, from the threads that work.
   std::function<void()> interrupt = {};
+  TellShare share = {};  ///< of a search: of the step that was told last
 
   /// Of the views' calibration. Refers to this object.
   pipeline::Progress of_views() const;
 };
+
+/// Tells each step as "femur: search" and, once a second, with its share: "femur: search, 40 %".
+Progress progress_in_words(std::function<void(const std::string&)> tell, std::function<void()> interrupt);
 
 /// A point of a plan carried to the world, bones and tool.
 struct RegisteredPoint {

@@ -90,6 +90,7 @@ registration::RegistrationOptions search_options(const RegisterOptions& options,
   how.search.shift_mm = options.search.shift_mm;
   how.search.turn_deg = options.search.turn_deg;
   how.search.interrupt = progress.interrupt;
+  how.search.share = progress.share;
   return how;
 }
 

@@ -6,6 +6,8 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
+
 namespace helicarm::guidance {
 namespace {
 
@@ -20,6 +22,30 @@ double distance_in_space(const Eigen::Vector3d& point, const ToolLine& line) {
 }
 
 }  // namespace
+
+double TipDepth::error_95_mm() const { return normal_at_975 * sigma_mm; }
+
+std::string words_of(const TipDepth& depth) {
+  return fmt::format("{:.2f} mm {} the planned end (95 % error {:.2g} mm)", std::abs(depth.beyond_end_mm),
+                     depth.beyond_end_mm < 0 ? "before" : "beyond", depth.error_95_mm());
+}
+
+std::optional<Failure> TipDepth::why_off(const std::string& tunnel) const {
+  const double off_mm = std::abs(beyond_end_mm) - tolerance_mm;
+  if (off_mm <= 0 && error_95_mm() <= tolerance_mm) return std::nullopt;
+  const bool is_off = off_mm > 0;
+  const std::string verdict =
+      is_off ? fmt::format("the tunnel {} {}", off_mm > error_95_mm() ? "is" : "may be",
+                           beyond_end_mm > 0 ? "deeper than planned"
+                                             : "shorter than planned, or the drill is not at its bottom")
+             : "whether its depth is within the tolerance is not known";
+  return Failure{
+      is_off ? Reason::off_target : Reason::uncertain,
+      fmt::format("tunnel \"{}\": the drill's tip is {}, tolerance {:g} mm: {}", tunnel, words_of(*this),
+                  tolerance_mm, verdict),
+      {},
+      {{"beyond_end_mm", beyond_end_mm}, {"error_95_mm", error_95_mm()}, {"tolerance_mm", tolerance_mm}}};
+}
 
 Eigen::Vector2d foot_on_line(const Eigen::Vector2d& point, const Eigen::Vector2d& a,
                              const Eigen::Vector2d& b) {

@@ -37,11 +37,26 @@ struct LineError {
 /// Farthest that the axis of a drilled tunnel may pass a planned end, mm (Guo et al. 2019, section 4).
 inline constexpr double most_off_plan_mm = 2;
 
+/// How deep a drill went along its planned tunnel.
+struct TipDepth {
+  double beyond_end_mm;  ///< of the tip beyond the planned end, along the tunnel; negative: before it
+  double sigma_mm;       ///< standard deviation: X-ray images, tracker and the drill's calibration
+  double tolerance_mm;   ///< of the plan
+  double error_95_mm() const;
+  /// off_target beyond the tolerance, on either side of the end, as a possibility where the 95 % error
+  /// exceeds the excess; uncertain within it with a 95 % error over the tolerance.
+  std::optional<Failure> why_off(const std::string& tunnel) const;
+};
+
+/// "1.8 mm beyond the planned end", with the 95 % error.
+std::string words_of(const TipDepth& depth);
+
 /// A tool line compared with its tunnel; an end that is not located is absent.
 struct Verification {
   std::string name;
   std::optional<LineError> start;
   std::optional<LineError> end;
+  std::optional<TipDepth> depth = {};  ///< of a drill whose tip was measured
 };
 
 /// Foot of the perpendicular from `point` to the line through `a` and `b`.

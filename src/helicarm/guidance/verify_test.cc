@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/guidance/verify.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 namespace helicarm::guidance {
@@ -73,6 +75,42 @@ TEST(DistanceToLine, LineBehindTheSourceIsRefused) {
   const auto error = distance_to_line({front_view(), side_view()}, seen_in_both({3, 0, 4}), behind);
   ASSERT_FALSE(error.has_value());
   EXPECT_EQ(error.error().reason, Reason::behind_source);
+}
+
+TEST(TipDepth, BeyondTheToleranceOnEitherSideIsOffTarget) {
+  EXPECT_FALSE((TipDepth{0.9, 0.25, 1}.why_off("femur")));
+  EXPECT_FALSE((TipDepth{-0.9, 0.25, 1}.why_off("femur")));
+  const auto deep = TipDepth{1.8, 0.25, 1}.why_off("femur");
+  ASSERT_TRUE(deep);
+  EXPECT_EQ(deep->reason, Reason::off_target);
+  EXPECT_EQ(
+      deep->message,
+      "tunnel \"femur\": the drill's tip is 1.80 mm beyond the planned end (95 % error 0.49 mm), tolerance "
+      "1 mm: the tunnel is deeper than planned");
+  EXPECT_EQ(deep->figures.at("beyond_end_mm"), 1.8);
+  const auto short_of = TipDepth{-1.8, 0.25, 1}.why_off("femur");
+  ASSERT_TRUE(short_of);
+  EXPECT_NE(short_of->message.find("1.80 mm before the planned end"), std::string::npos);
+}
+
+TEST(TipDepth, VerdictThatItsErrorLeavesOpenIsAPossibility) {
+  EXPECT_NE((TipDepth{1.05, 1.5, 1}.why_off("femur")->message.find("the tunnel may be deeper than planned")),
+            std::string::npos);
+  EXPECT_NE((TipDepth{-1.2, 0.25, 1}.why_off("femur")->message.find("may be shorter than planned, or")),
+            std::string::npos);
+}
+
+TEST(TipDepth, WithinTheToleranceWithAnErrorOverItIsUncertain) {
+  const auto uncertain = TipDepth{0.5, 1.3, 1}.why_off("femur");
+  ASSERT_TRUE(uncertain);
+  EXPECT_EQ(uncertain->reason, Reason::uncertain);
+  EXPECT_EQ(
+      uncertain->message,
+      "tunnel \"femur\": the drill's tip is 0.50 mm beyond the planned end (95 % error 2.5 mm), tolerance "
+      "1 mm: whether its depth is within the tolerance is not known");
+  const double none = std::nan("");
+  EXPECT_EQ((TipDepth{0.5, none, 1}.why_off("femur")->reason), Reason::uncertain);
+  EXPECT_EQ((TipDepth{none, 0.25, 1}.why_off("femur")->reason), Reason::uncertain);
 }
 
 }  // namespace

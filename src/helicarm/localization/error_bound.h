@@ -27,7 +27,7 @@ struct Accuracy {
 };
 
 /// 95 % quantile of the length of an error with this covariance, within 2 % (Satterthwaite's chi-square of
-/// the same mean and variance, Wilson and Hilferty's quantile).
+/// the same mean and variance, Wilson and Hilferty's quantile). NaN: the covariance is not known.
 double length_at_95(const Eigen::Matrix3d& covariance);
 
 }  // namespace helicarm::localization

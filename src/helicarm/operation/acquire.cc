@@ -43,15 +43,21 @@ void Operation::weigh_delay(const std::string& view, const xray::Acquisition& he
         name,
         {{"held_s", held}, {"limit_s", longest_held_s}}};
   };
+  std::vector<Failure> delayed;
   std::erase_if(views_, [&](const View& earlier) {
     const double held = held_s(earlier.acquisition, earlier.arrival_s);
     if (held <= longest_held_s) return false;
-    const Failure why = held_back(earlier.name, held);
-    record(record::Refused{earlier.name, {}, std::string(code(why.reason)), why.figures});
-    notify_(Step::acquire, fmt::format("{}; acquire it again", why.message));
-    forget_measurement();
+    delayed.push_back(held_back(earlier.name, held));
     return true;
   });
+  if (!delayed.empty()) {
+    const auto ended = forget_measurement();
+    for (const Failure& why : delayed) {
+      record(record::Refused{why.view, {}, std::string(code(why.reason)), why.figures});
+      notify_(Step::acquire, fmt::format("{}; acquire it again", why.message));
+    }
+    record_ended(ended);
+  }
   if (const double held = held_s(header, arrival_s); held > longest_held_s)
     throw BadInput(held_back(view, held));
 }
@@ -134,7 +140,7 @@ Expected<void> Operation::take(const std::string& wanted, const receiver::Arriva
     std::erase_if(views_, [&](const View& other) { return other.name == view; });
     views_.push_back({view, arrival.path, arrival.digest, *acquisition, arrival_s, poses});
     std::ranges::sort(views_, {}, [&](const View& v) { return std::ranges::find(plan_.views, v.name); });
-    forget_measurement();
+    record_ended(forget_measurement());
   });
 }
 

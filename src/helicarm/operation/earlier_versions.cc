@@ -3,11 +3,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/pipeline/poses_json.h"
+#include "helicarm/registration/causes.h"
 
 namespace helicarm::operation {
+namespace {
+
+/// Also of what is planned in it.
+bool is_of_unexplained_part(const Failure& finding) {
+  return registration::is_of_part_not_explained(finding) ||
+         (finding.reason == Reason::wrong_model && finding.figures.contains("tunnels"));
+}
+
+}  // namespace
 
 bool is_of_earlier_version(const Json& recorded_case) {
   return recorded_case.value("format", "") == "helicarm-case/1";
@@ -59,6 +70,26 @@ Json in_keys_of(const Json& then, const Json& now) {
   Json kept = Json::array();
   for (std::size_t i = 0; i < then.size(); ++i) kept.push_back(in_keys_of(then[i], now[i]));
   return kept;
+}
+
+case_registration::CaseRegistration as_registered_earlier(case_registration::CaseRegistration registration) {
+  using registration::Decision;
+  for (case_registration::RegisteredModel& model : registration.models) {
+    registration::Registration& found = model.registration;
+    if (!std::exchange(found.not_explained, std::nullopt)) continue;
+    std::erase_if(found.warnings, is_of_unexplained_part);
+    if (found.failure && is_of_unexplained_part(*found.failure)) found.failure.reset();
+    found.decision = found.failure            ? Decision::refuse
+                     : found.warnings.empty() ? Decision::accept
+                                              : Decision::warn;
+  }
+  return registration;
+}
+
+bool states_depth(const Json& result) {
+  const auto verified = result.find("verification");
+  return verified != result.end() &&
+         std::ranges::any_of(*verified, [](const Json& tunnel) { return tunnel.contains("beyond_end_mm"); });
 }
 
 }  // namespace helicarm::operation

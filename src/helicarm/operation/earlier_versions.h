@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "helicarm/case_registration/register_case.h"
 #include "helicarm/operation/plan.h"
 
 /// Records of operations that earlier versions made, with helicarm-case/1.
@@ -17,5 +18,11 @@ pipeline::Case as_read_earlier(pipeline::Case the_case);
 /// What an earlier version wrote of a result too: the keys of `then`, and its numbers where only rounding,
 /// which the compiler decides, differs.
 Json in_keys_of(const Json& then, const Json& now);
+
+/// Earlier versions did not know which part of a model its pose leaves unexplained.
+case_registration::CaseRegistration as_registered_earlier(case_registration::CaseRegistration registration);
+
+/// Earlier versions did not state how deep a verified drill was.
+bool states_depth(const Json& result);
 
 }  // namespace helicarm::operation

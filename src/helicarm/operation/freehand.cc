@@ -65,6 +65,17 @@ geometry::RigidTransform mean_tip(std::span<const geometry::RigidTransform> tips
   return {geometry::rotation_between(newest.col(2), direction) * newest, position};
 }
 
+/// Two standard deviations of each cause.
+std::string causes_of(const AimErrors& errors, const OperationTunnel& tunnel) {
+  const auto part = [](std::string_view cause, const AimError& error) {
+    return fmt::format("{} {:.2g} mm and {:.2g} degrees", cause, 2 * error.distance_mm, 2 * error.angle_deg);
+  };
+  return fmt::format("; by {}, {}, {}, {}",
+                     part(tunnel.of_model ? "the registration" : "the X-ray images", errors.images),
+                     part("the tracker", errors.tracker), part("the drill's calibration", errors.tool),
+                     part("the scatter of its poses", errors.scatter));
+}
+
 /// Of the mean of `averaged` poses.
 void add_scatter(TunnelAim& aim, const std::vector<geometry::RigidTransform>& tips, std::size_t averaged) {
   // Of the three axes of a position two lie across the tunnel; a direction scatters across itself only.
@@ -75,6 +86,7 @@ void add_scatter(TunnelAim& aim, const std::vector<geometry::RigidTransform>& ti
   const double turn = share * scatter(tips, [](const geometry::RigidTransform& tip) -> Vector3d {
                         return tip.rotation.col(2);
                       });
+  aim.errors->scatter = {std::sqrt(2) * per_axis, turn * 180 / std::numbers::pi};
   aim.distance_sigma_mm = std::hypot(aim.distance_sigma_mm, std::sqrt(2) * per_axis);
   aim.depth_sigma_mm = std::hypot(aim.depth_sigma_mm, per_axis);
   aim.angle_sigma_deg = std::hypot(aim.angle_sigma_deg, turn * 180 / std::numbers::pi);
@@ -98,6 +110,32 @@ void read_decision(JsonReader& reader, std::optional<Failure>& why_not) {
   const auto reason = reason_of(decision);
   if (!reason) reader.refuse(Reason::bad_value, "decision", fmt::format("\"{}\" is none", decision));
   why_not = Failure{*reason, message.value_or("")};
+}
+
+TunnelAim mean_aim(const LiveTool& live, const std::string& tunnel, const Samples& tool,
+                   const Samples& bone) {
+  if (tool.empty() || bone.empty())
+    throw BadInput(Reason::no_pose, fmt::format("no recent pose of the {}", tool.empty() ? "tool" : "bone"));
+  const auto tips = tips_in_bone(tool, bone, live.marker_from_tip());
+  const auto averaged = static_cast<std::size_t>(std::ranges::count_if(
+      tool, [&](const tracker::PoseSample& sample) { return sample.time_s >= tool.back().time_s - mean_s; }));
+  const geometry::RigidTransform& tracker_from_bone = bone.back().tracker_from_tool;
+  const geometry::RigidTransform tracker_from_marker =
+      tracker_from_bone * mean_tip(std::span(tips).last(averaged)) * live.marker_from_tip().inverse();
+  TunnelAim aim = value_or_throw(live.aim(tracker_from_bone, tracker_from_marker, tunnel));
+  add_scatter(aim, tips, averaged);
+  return aim;
+}
+
+Expected<TunnelAim> mean_aim(const LiveTool& live, const TrackerPlan& tracker, const OperationTunnel& tunnel,
+                             const tracker::PoseBoard& board, double now_s) {
+  return guarded([&] {
+    const auto recent = [&](const std::string& marker) {
+      value_or_throw(board.latest(marker, now_s));
+      return board.between(marker, now_s - recent_poses_s, now_s);
+    };
+    return mean_aim(live, tunnel.name, recent(tracker.tool), recent(tracker.marker_of(tunnel.bone)));
+  });
 }
 
 Expected<FreehandGuide> FreehandGuide::begin(const OperationPlan& plan, LiveTool live,
@@ -124,7 +162,7 @@ PoseWindow FreehandGuide::recent(const tracker::PoseBoard& board, double now_s) 
   return window;
 }
 
-Guidance FreehandGuide::at(const PoseWindow& recent) const {
+Guidance FreehandGuide::at(const PoseWindow& recent, bool states_causes) const {
   Guidance guidance;
   const Samples &tool = samples_of(recent, tool_), &bone = samples_of(recent, bone_);
   for (const auto& [marker, samples] : {std::pair(tool_, &tool), {bone_, &bone}})
@@ -136,21 +174,14 @@ Guidance FreehandGuide::at(const PoseWindow& recent) const {
   const auto ends = *live_.ends_in_bone(tunnel_.name);
   guidance.bone_moved =
       motion_since(tracker_from_bone_, std::span(bone).last(std::min(median_samples, bone.size())), ends);
-  const auto tips = tips_in_bone(tool, bone, live_.marker_from_tip());
-  const auto averaged = static_cast<std::size_t>(std::ranges::count_if(
-      tool, [&](const tracker::PoseSample& sample) { return sample.time_s >= tool.back().time_s - mean_s; }));
-  const geometry::RigidTransform& tracker_from_bone = bone.back().tracker_from_tool;
-  const geometry::RigidTransform tracker_from_marker =
-      tracker_from_bone * mean_tip(std::span(tips).last(averaged)) * live_.marker_from_tip().inverse();
-  TunnelAim aim = *live_.aim(tracker_from_bone, tracker_from_marker, tunnel_.name);
-  add_scatter(aim, tips, averaged);
-  guidance.aim = aim;
+  guidance.aim = mean_aim(live_, tunnel_.name, tool, bone);
+  if (!states_causes) guidance.aim->errors.reset();
   guidance.why_not = why_not(guidance);
   return guidance;
 }
 
 std::optional<Failure> FreehandGuide::why_not(const Guidance& guidance) const {
-  if (*guidance.age_s > oldest_s_)
+  if (!(*guidance.age_s <= oldest_s_))
     return Failure{Reason::stale_pose, fmt::format("the newest poses are {:.3g} s old, limit {:g} s",
                                                    *guidance.age_s, oldest_s_)};
   if (const auto in_place = check_motion(bone_, *guidance.bone_moved, limits_, "guidance began",
@@ -158,16 +189,17 @@ std::optional<Failure> FreehandGuide::why_not(const Guidance& guidance) const {
       !in_place)
     return in_place.error();
   const TunnelAim& aim = *guidance.aim;
-  if (2 * aim.distance_sigma_mm > drill_.tolerance_mm || 2 * aim.angle_sigma_deg > drill_.tolerance_deg)
+  // What is not a number is not within a tolerance.
+  if (!(2 * aim.distance_sigma_mm <= drill_.tolerance_mm && 2 * aim.angle_sigma_deg <= drill_.tolerance_deg))
     return Failure{Reason::uncertain,
                    fmt::format("two standard deviations are {:.2g} mm and {:.2g} degrees, tolerances {:g} mm "
-                               "and {:g} degrees",
+                               "and {:g} degrees{}",
                                2 * aim.distance_sigma_mm, 2 * aim.angle_sigma_deg, drill_.tolerance_mm,
-                               drill_.tolerance_deg)};
-  if (aim.depth_mm > aim.length_mm + drill_.tolerance_mm)
+                               drill_.tolerance_deg, aim.errors ? causes_of(*aim.errors, tunnel_) : "")};
+  if (!(aim.depth_mm <= aim.length_mm + drill_.tolerance_mm))
     return Failure{Reason::off_target,
                    fmt::format("the tip is {:.1f} mm beyond the tunnel's end", aim.depth_mm - aim.length_mm)};
-  if (aim.distance_mm > drill_.tolerance_mm || aim.angle_deg > drill_.tolerance_deg)
+  if (!(aim.distance_mm <= drill_.tolerance_mm && aim.angle_deg <= drill_.tolerance_deg))
     return Failure{
         Reason::off_target,
         fmt::format("{:.1f} mm and {:.1f} degrees off the axis, tolerances {:g} mm and {:g} degrees",

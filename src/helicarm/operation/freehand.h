@@ -26,6 +26,16 @@ struct Guidance {
 
 Json to_json(const Guidance& guidance);
 
+/// The drill as `FreehandGuide::at` shows it: mean of the last 0.25 s, standard deviations with the scatter
+/// of the samples. Throws BadInput: no_pose without a sample of tool or bone, and as `LiveTool::aim`.
+TunnelAim mean_aim(const LiveTool& live, const std::string& tunnel,
+                   const std::vector<tracker::PoseSample>& tool,
+                   const std::vector<tracker::PoseSample>& bone);
+/// Likewise of a drill that is not guided. Refuses as `LiveTool::aim`, and no_pose where `now_s` is not yet
+/// that of the newest pose, or half a second later.
+Expected<TunnelAim> mean_aim(const LiveTool& live, const TrackerPlan& tracker, const OperationTunnel& tunnel,
+                             const tracker::PoseBoard& board, double now_s);
+
 /// Guides a hand-held drill to one tunnel. Guidance follows the bone: a motion within the plan's limits only
 /// moves the target.
 class FreehandGuide {
@@ -38,8 +48,8 @@ class FreehandGuide {
   const OperationTunnel& tunnel() const { return tunnel_; }
   /// Samples of tool and bone in the half second before `now_s`.
   PoseWindow recent(const tracker::PoseBoard& board, double now_s) const;
-  /// At the end of the window.
-  Guidance at(const PoseWindow& recent) const;
+  /// At the end of the window. Earlier versions did not state the causes of its errors (`AimErrors`).
+  Guidance at(const PoseWindow& recent, bool states_causes = true) const;
 
  private:
   FreehandGuide(const OperationPlan& plan, LiveTool live, OperationTunnel tunnel,

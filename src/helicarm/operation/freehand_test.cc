@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/operation/freehand.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
@@ -138,6 +138,30 @@ TEST(FreehandGuide, ScatteringSamplesAreUncertain) {
   EXPECT_GT(now.aim->depth_sigma_mm, 0.3);
 }
 
+TEST(FreehandGuide, UncertainDecisionSaysWhatItsErrorsComeFrom) {
+  RandomStream random(5, 1);
+  const PoseWindow shaken =
+      window([&](int) { return femur_from_tip(1.5 * random.normal(), 10 + 1.5 * random.normal()); });
+  const Guidance now = guide().at(shaken);
+  const AimErrors errors = now.aim->errors.value();
+  const auto sum = [](double a, double b, double c, double d) {
+    return std::hypot(std::hypot(a, b), std::hypot(c, d));
+  };
+  EXPECT_NEAR(sum(errors.images.distance_mm, errors.tracker.distance_mm, errors.tool.distance_mm,
+                  errors.scatter.distance_mm),
+              now.aim->distance_sigma_mm, 1e-9);
+  EXPECT_NEAR(
+      sum(errors.images.angle_deg, errors.tracker.angle_deg, errors.tool.angle_deg, errors.scatter.angle_deg),
+      now.aim->angle_sigma_deg, 1e-9);
+  EXPECT_GT(errors.scatter.distance_mm, errors.tool.distance_mm);
+  EXPECT_THAT(now.why_not->message,
+              testing::AllOf(testing::HasSubstr("tolerances 1 mm and 2 degrees; by the X-ray images"),
+                             testing::HasSubstr("the scatter of its poses")));
+  const Guidance earlier = guide().at(shaken, false);  // as earlier versions recorded it
+  EXPECT_FALSE(earlier.aim->errors);
+  EXPECT_TRUE(earlier.why_not->message.ends_with("tolerances 1 mm and 2 degrees"));
+}
+
 TEST(FreehandGuide, SteadyMotionIsNotScatter) {
   const Guidance still = guide().at(at_rest(femur_from_tip(0, 10.5)));
   const Guidance moving = guide().at(window([](int i) { return femur_from_tip(0, i); }));
@@ -150,6 +174,56 @@ TEST(FreehandGuide, RecordedSamplesGiveTheSameDecision) {
   const PoseWindow recent = at_rest(femur_from_tip(0.7, 12, 0.02));
   const PoseWindow read = pose_window_from(to_json(recent), "record").value();
   EXPECT_EQ(to_json(guide().at(read)), to_json(guide().at(recent)));
+}
+
+TEST(FreehandGuide, ErrorThatIsNotANumberIsUncertain) {
+  pipeline::Result unknown = measured();
+  unknown.points[1].place->in_bones["femur"].propagated.covariance(0, 0) = std::nan("");
+  guidance::Poses basis;
+  basis.tracker_from_bone["femur"] = tracker_from_femur;
+  basis.tracker_from_tool = tracker_from_tool(tracker_from_femur, femur_from_tip(0, -20));
+  const auto guide = FreehandGuide::begin(plan(), LiveTool(plan(), unknown, {}, tracked_tool(*plan().drill)),
+                                          "femur", basis, oldest_s)
+                         .value();
+  EXPECT_EQ(guide.at(at_rest(femur_from_tip(0, 10))).decision(), "uncertain");
+}
+
+/// A drill that is not guided.
+class MeanAim : public testing::Test {
+ protected:
+  static constexpr double limit_s = 10;  // of a pose's age
+
+  MeanAim() : board_({.max_age_s = limit_s}) {}
+  void see(const std::string& marker, const RigidTransform& tracker_from_marker, double time_s) {
+    tracker::IgtlTransform pose;
+    pose.matrix = tracker_from_marker.matrix();
+    board_.take({marker, tracker::stamp_from_seconds(1.7e9 + time_s), pose}, time_s);
+  }
+  void see_tool(double time_s) {
+    see("tool", tracker_from_tool(tracker_from_femur, femur_from_tip(0.3, 10)), time_s);
+  }
+  void see_femur(double time_s) { see("femur", tracker_from_femur, time_s); }
+  Expected<TunnelAim> aim() const {
+    return mean_aim(LiveTool(plan(), measured(), {}, tracked_tool(*plan().drill)), plan().tracker,
+                    plan().tunnels[0], board_, end_s);
+  }
+
+  tracker::PoseBoard board_;
+};
+
+TEST_F(MeanAim, IsThatOfTheRecentPoses) {
+  see_tool(end_s - 0.1), see_femur(end_s - 0.1);
+  EXPECT_NEAR(aim().value().distance_mm, 0.3, 1e-6);
+}
+
+TEST_F(MeanAim, MarkerSeenOnlyAfterItsTimeHasNoPose) {
+  see_tool(end_s - 0.1), see_femur(end_s + 0.1);
+  EXPECT_EQ(aim().error().reason, Reason::no_pose);
+}
+
+TEST_F(MeanAim, PoseWithinTheAgeLimitThatIsNotRecentIsNone) {
+  see_tool(end_s - 0.6), see_femur(end_s - 0.1);
+  EXPECT_EQ(aim().error().reason, Reason::no_pose);
 }
 
 TEST(FreehandGuide, PlanWithARobotIsRefused) {

@@ -12,6 +12,20 @@ namespace helicarm::operation {
 /// `Guidance::decision`, and its sentence. Throws BadInput for a word that is no decision.
 void read_decision(JsonReader& reader, std::optional<Failure>& why_not);
 
+template <class Codec, class Errors>
+void describe_errors(Codec& codec, Errors& errors) {
+  constexpr Range any{std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max()};
+  const auto describe = [&](auto& inner, auto& error) {
+    inner.number("distance_mm", error.distance_mm, any, "of the distance, root of the trace across the axis");
+    inner.number("angle_deg", error.angle_deg, any, "of the angle");
+  };
+  codec.required_object("images", errors.images,
+                        "standard deviations by X-ray images or the model's registration", describe);
+  codec.required_object("tracker", errors.tracker, "by the tracker, at acquisition and now", describe);
+  codec.required_object("tool", errors.tool, "by the tool's calibration", describe);
+  codec.required_object("scatter", errors.scatter, "by the scatter of single samples", describe);
+}
+
 template <class Codec, class Aim>
 void describe_aim(Codec& codec, Aim& aim) {
   constexpr Range any{std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max()};
@@ -24,6 +38,8 @@ void describe_aim(Codec& codec, Aim& aim) {
   codec.number("length_mm", aim.length_mm, any, "of the tunnel");
   codec.vector("to_axis_mm", aim.to_axis_mm, any, "from the tip to the nearest point of the axis");
   codec.vector("axis", aim.axis, any, "its direction in the tip's frame, z along the drill");
+  codec.object("errors", aim.errors, "the causes; records of earlier versions lack them",
+               [](auto& inner, auto& errors) { describe_errors(inner, errors); });
 }
 
 template <class Codec, class Value>

@@ -107,8 +107,12 @@ void GuidanceGate::end_guidance() {
 
 Guidance GuidanceGate::guidance(const PoseWindow& recent) const {
   Guidance now = guide_->at(recent);
-  if (shown_ && shown_->decision() == code(Reason::plan_stale)) now.why_not = shown_->why_not;
+  if (is_guidance_stale()) now.why_not = shown_->why_not;
   return now;
+}
+
+bool GuidanceGate::is_guidance_stale() const {
+  return shown_ && shown_->decision() == code(Reason::plan_stale);
 }
 
 bool GuidanceGate::is_new(const Guidance& guidance) const {

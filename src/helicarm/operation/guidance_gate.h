@@ -56,6 +56,8 @@ class GuidanceGate {
   /// At the window's end; once shown as plan_stale it stays so until guidance begins again. Needs a guide.
   Guidance guidance(const PoseWindow& recent) const;
   bool is_new(const Guidance& guidance) const;
+  /// The last decision shown is plan_stale.
+  bool is_guidance_stale() const;
   void shown(const Guidance& guidance) { shown_ = guidance; }
 
  private:

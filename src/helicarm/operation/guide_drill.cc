@@ -10,12 +10,9 @@
 namespace helicarm::operation {
 namespace {
 
-/// Refuses (off_target) a drill that cannot be at the end of its tunnel, however badly that was drilled, and
-/// (plan_stale) one whose bone or marker has moved, and as guided where it is not seen.
-void check_in_tunnel(const Guidance& now) {
+/// Refuses (off_target) a drill that cannot be at the end of its tunnel, however badly that was drilled.
+void check_in_tunnel(const TunnelAim& aim) {
   constexpr double farthest_mm = 10, widest_deg = 20;
-  if (now.why_not && (!now.aim || now.why_not->reason == Reason::plan_stale)) throw BadInput(*now.why_not);
-  const TunnelAim& aim = now.aim.value();
   const double before_end_mm = aim.length_mm - aim.depth_mm;
   if (aim.distance_mm <= farthest_mm && aim.angle_deg <= widest_deg && std::abs(before_end_mm) <= farthest_mm)
     return;
@@ -41,8 +38,9 @@ void check_in_tunnel(const Guidance& now) {
 
 Expected<void> Operation::guide(const std::string& name, std::optional<double> oldest) {
   return guarded([&] {
+    using enum record::GuidanceEndedBy;
     const double oldest_pose_s = oldest.value_or(plan_.tracker.oldest_pose_s());
-    gate_.end_guidance();
+    end_guidance(gate_.is_guidance_stale() ? plan_stale : new_guidance);
     const OperationTunnel& tunnel = tunnel_named(name);
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
       throw BadInput(Reason::usage, missing.front() + ": touch this check point first");
@@ -78,21 +76,55 @@ Expected<Guidance> Operation::guidance() {
   });
 }
 
+/// Refuses (usage) another tunnel than the guided one, (plan_stale) a guided drill whose bone or marker has
+/// moved, and as guided where it is not seen.
+TunnelAim Operation::aim_at(const OperationTunnel& tunnel) {
+  if (!gate_.guide()) {
+    value_or_throw(recorded());
+    return value_or_throw(
+        mean_aim(value_or_throw(live_tool()), plan_.tracker, tunnel, board_, tracker::monotonic_seconds()));
+  }
+  if (const std::string& guided = gate_.guide()->tunnel().name; guided != tunnel.name)
+    throw BadInput(Reason::usage,
+                   fmt::format("{}: the drill is guided to {}; verify that tunnel, or end its guidance",
+                               tunnel.name, guided));
+  const Guidance now = value_or_throw(guidance());
+  if (now.why_not && (!now.aim || now.why_not->reason == Reason::plan_stale)) throw BadInput(*now.why_not);
+  return now.aim.value();
+}
+
 Expected<TunnelOutcome> Operation::verify_drilled(const std::string& name) {
   return guarded([&] {
     const OperationTunnel& tunnel = tunnel_named(name);
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");
     if (!plan_.drill) throw BadInput(Reason::usage, "the plan has no hand-held drill");
     value_or_throw(gate_.check_registered(tunnel));
-    if (gate_.guide()) check_in_tunnel(value_or_throw(guidance()));
+    check_in_tunnel(aim_at(tunnel));
     notify_(Step::verify, name);
     TunnelOutcome outcome = check(tunnel);
-    gate_.end_guidance();
     in_place_.clear();
+    end_guidance(record::GuidanceEndedBy::verified);
     return outcome;
   });
 }
 
-void Operation::end_guidance() { gate_.end_guidance(); }
+Expected<void> Operation::end_guidance() {
+  return guarded([&] { end_guidance(record::GuidanceEndedBy::person); });
+}
+
+void Operation::end_guidance(record::GuidanceEndedBy by) {
+  const auto ended = guidance_ended(by);
+  gate_.end_guidance();
+  record_ended(ended);
+}
+
+std::optional<record::GuidanceEnded> Operation::guidance_ended(record::GuidanceEndedBy by) const {
+  if (!gate_.guide()) return std::nullopt;
+  return record::GuidanceEnded{gate_.guide()->tunnel().name, by};
+}
+
+void Operation::record_ended(const std::optional<record::GuidanceEnded>& ended) {
+  if (ended) record(*ended);
+}
 
 }  // namespace helicarm::operation

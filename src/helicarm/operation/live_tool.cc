@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include <Eigen/Geometry>
@@ -20,6 +21,43 @@ const guidance::PropagatedPoint* located_in(const pipeline::Result& result, cons
   const guidance::Place* in_bone = located ? located->in(tunnel.bone) : nullptr;
   return in_bone ? &in_bone->propagated : nullptr;
 }
+
+/// Of a tool's distance from an axis (mm^2) and its angle to it (rad^2), by their causes.
+struct AimVariances {
+  Eigen::Vector3d axis;  ///< in the tip's frame
+  const TrackedTool& tool;
+  const guidance::PropagatedPoint& foot;  ///< of the tip on the axis, in the marker's frame
+  std::function<Eigen::Matrix3d(const guidance::TrackerNoise&)> of_direction;  ///< in the marker's frame
+
+  double across(const Eigen::Matrix3d& covariance) const {
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis * axis.transpose();
+    return (across * covariance * across).trace();
+  }
+  PointAtTip foot_at_tip(const guidance::TrackerNoise& noise, const TrackedTool& with) const {
+    return at_tip(foot.point, foot.total_covariance(noise), with);
+  }
+  double of_angle(const guidance::TrackerNoise& noise) const {
+    const Eigen::Matrix3d& turn = tool.marker_from_tip.rotation;
+    return across(turn.transpose() * of_direction(noise) * turn);
+  }
+  double of_angle_by_tool() const { return tool.covariance.diagonal().segment<2>(3).sum(); }
+
+  AimErrors by_cause(const guidance::TrackerNoise& noise) const {
+    const TrackedTool exact{tool.marker_from_tip, tracker::PoseCovariance::Zero()};
+    const guidance::TrackerNoise none{};
+    const double by_images = across(foot_at_tip(none, exact).covariance);
+    const double with_tracker = across(foot_at_tip(noise, exact).covariance);
+    const double with_tool = across(foot_at_tip(noise, tool).covariance);
+    const auto error = [](double across_mm2, double turn_rad2) {  // differences of rounded sums
+      return AimError{std::sqrt(std::max(across_mm2, 0.0)),
+                      std::sqrt(std::max(turn_rad2, 0.0)) * degrees_per_rad};
+    };
+    return {error(by_images, of_angle(none)),
+            error(with_tracker - by_images, of_angle(noise) - of_angle(none)),
+            error(with_tool - with_tracker, of_angle_by_tool()),
+            {}};
+  }
+};
 
 /// Of all views' parameters, or of the pose of the tunnel's model.
 Eigen::MatrixXd shared_by_ends(const pipeline::Result& result, const OperationTunnel& tunnel) {
@@ -133,25 +171,22 @@ Expected<TunnelAim> LiveTool::aim(const geometry::RigidTransform& tracker_from_b
     const double depth = axis_in_marker.dot(tool_.marker_from_tip.translation - enter.point);
     const guidance::PropagatedPoint foot =
         guidance::point_between(enter, leave, depth / length, shared_covariance);
-    const PointAtTip off = at_tip(foot.point, foot.total_covariance(noise), tool_);
-
     const Eigen::Vector3d axis = tool_.marker_from_tip.rotation.transpose() * axis_in_marker;
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis * axis.transpose();
-    const Eigen::Matrix3d of_way =
-        guidance::covariance_between(enter, leave, shared_covariance, noise) / (length * length);
-    const Eigen::Matrix3d of_axis =
-        tool_.marker_from_tip.rotation.transpose() * of_way * tool_.marker_from_tip.rotation;
-    const double angle_variance =
-        (across * of_axis * across).trace() + tool_.covariance.diagonal().segment<2>(3).sum();
+    const AimVariances variances{
+        axis, tool_, foot, [&](const guidance::TrackerNoise& noise) -> Eigen::Matrix3d {
+          return guidance::covariance_between(enter, leave, shared_covariance, noise) / (length * length);
+        }};
+    const PointAtTip off = variances.foot_at_tip(noise, tool_);
     return TunnelAim{off.point.norm(),
                      std::atan2(axis.head<2>().norm(), axis.z()) * degrees_per_rad,
                      depth,
                      length,
-                     std::sqrt((across * off.covariance * across).trace()),
-                     std::sqrt(angle_variance) * degrees_per_rad,
+                     std::sqrt(variances.across(off.covariance)),
+                     std::sqrt(variances.of_angle(noise) + variances.of_angle_by_tool()) * degrees_per_rad,
                      std::sqrt(axis.dot(off.covariance * axis)),
                      off.point,
-                     axis};
+                     axis,
+                     variances.by_cause(noise)};
   });
 }
 

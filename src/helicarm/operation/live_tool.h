@@ -11,6 +11,20 @@
 
 namespace helicarm::operation {
 
+/// Standard deviations by one cause: the tip's distance from the axis (root of the trace across it) and the
+/// tool's angle.
+struct AimError {
+  double distance_mm = 0, angle_deg = 0;
+};
+
+/// Their squares add up.
+struct AimErrors {
+  AimError images;   ///< X-ray images, or the registration of the tunnel's model to them
+  AimError tracker;  ///< at acquisition and now
+  AimError tool;     ///< its calibration
+  AimError scatter;  ///< of single samples
+};
+
 /// Position of the tool relative to a tunnel at the bone's present pose.
 struct TunnelAim {
   double distance_mm;  ///< of the tip from the tunnel's axis
@@ -24,6 +38,7 @@ struct TunnelAim {
   double depth_sigma_mm;
   Eigen::Vector3d to_axis_mm;  ///< from the tip to the nearest point of the axis, in the tip's frame
   Eigen::Vector3d axis;        ///< unit, from entry to end, in the tip's frame; (0, 0, 1) if aligned
+  std::optional<AimErrors> errors = {};  ///< the causes; nothing: of an earlier version's record
 };
 
 /// The tool at the newest poses.

@@ -8,6 +8,7 @@
 
 #include "helicarm/case_registration/carry_plan.h"
 #include "helicarm/case_registration/case_plans.h"
+#include "helicarm/case_registration/models_at_starts.h"
 #include "helicarm/case_registration/plan_errors.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/private_files.h"
@@ -107,6 +108,34 @@ guidance::LineError error_of(const guidance::PointInFrames& located, const guida
   return value_or_throw(guidance::distance_to_line(views, planned, line));
 }
 
+/// Of a tunnel's end in the tool's frame.
+double error_95_mm(const guidance::PropagatedPoint& end, const guidance::TrackerNoise& noise,
+                   const TrackedTool& tool) {
+  return localization::length_at_95(at_tip(end.point, end.total_covariance(noise), tool).covariance);
+}
+
+/// With the error that each cause alone would give.
+Failure too_uncertain(const OperationPlan& plan, const OperationTunnel& tunnel, const std::string& name,
+                      guidance::PropagatedPoint end, const TrackedTool& tool) {
+  const guidance::TrackerNoise noise = plan.tracker.noise();
+  const TrackedTool exact{tool.marker_from_tip, tracker::PoseCovariance::Zero()};
+  const double all = error_95_mm(end, noise, tool), by_registration = error_95_mm(end, {}, exact);
+  end.covariance.setZero();
+  const double by_tracker = error_95_mm(end, noise, exact), by_tool = error_95_mm(end, {}, tool);
+  return {
+      Reason::uncertain,
+      fmt::format("{}: the 95 % error of \"{}\" at the tool's tip is {:.3g} mm, over the limit of {:g} mm; "
+                  "by the registration alone {:.3g} mm, the tracker {:.3g} mm, the {} calibration {:.3g} mm",
+                  tunnel.name, name, all, plan.max_error_mm, by_registration, by_tracker,
+                  plan.drill ? "drill's" : "hand-eye", by_tool),
+      {},
+      {{"error_95_mm", all},
+       {"limit_mm", plan.max_error_mm},
+       {"registration_95_mm", by_registration},
+       {"tracker_95_mm", by_tracker},
+       {"tool_95_mm", by_tool}}};
+}
+
 }  // namespace
 
 Expected<Digests> keep_models(OperationPlan& plan, const fs::path& session) {
@@ -145,6 +174,17 @@ Expected<CaseRegistration> register_models(const OperationPlan& plan, const pipe
     return value_or_throw(case_registration::register_loaded(
         with_models, case_registration::views_of_calibration(with_models, *measured.calibration),
         measuring_options(plan), progress, case_registration::located_points_of(measured)));
+  });
+}
+
+Expected<CaseRegistration> models_at_starts(const OperationPlan& plan, const pipeline::Case& the_case,
+                                            const pipeline::Result& measured,
+                                            const case_registration::Progress& progress) {
+  return guarded([&] {
+    if (!measured.calibration) throw BadInput(Reason::usage, "no measurement yet");
+    const pipeline::Case with_models = with_models_of(plan, the_case);
+    return value_or_throw(case_registration::models_at_starts(
+        with_models, case_registration::views_of_calibration(with_models, *measured.calibration), progress));
   });
 }
 
@@ -195,24 +235,19 @@ Expected<void> check_error_at_tip(const OperationPlan& plan, const OperationTunn
     const auto tracker_from_bone = now.tracker_from(tunnel.bone);
     if (!tracker_from_bone || !now.tracker_from_tool)
       throw BadInput(Reason::no_pose, "the marker of the tool or the bone is not visible");
-    for (const std::string& end : {tunnel.start, tunnel.end}) {
+    const auto at_tip_now = [&](const std::string& end) {
       const guidance::PointInFrames* located = place_of(result, tunnel, end);
       const guidance::Place* in_bone = located ? located->in(tunnel.bone) : nullptr;
       if (!in_bone)
         throw BadInput(Reason::not_seen, fmt::format("{}: is not located in its bone's frame", end));
-      const guidance::PropagatedPoint at =
-          guidance::to_tool(in_bone->propagated, tunnel.bone, *tracker_from_bone, *now.tracker_from_tool);
-      const double error_mm = localization::length_at_95(
-          at_tip(at.point, at.total_covariance(plan.tracker.noise()), tool).covariance);
-      if (error_mm > plan.max_error_mm)
-        throw BadInput(
-            {Reason::uncertain,
-             fmt::format("{}: the 95 % error of \"{}\" at the tool's tip is {:.3g} mm, with those of "
-                         "registration, tracker and tool, over the limit of {:g} mm",
-                         tunnel.name, end, error_mm, plan.max_error_mm),
-             {},
-             {{"error_95_mm", error_mm}, {"limit_mm", plan.max_error_mm}}});
-    }
+      return guidance::to_tool(in_bone->propagated, tunnel.bone, *tracker_from_bone, *now.tracker_from_tool);
+    };
+    const guidance::PropagatedPoint start = at_tip_now(tunnel.start), end = at_tip_now(tunnel.end);
+    const double of_start = error_95_mm(start, plan.tracker.noise(), tool);
+    const double of_end = error_95_mm(end, plan.tracker.noise(), tool);
+    if (of_start <= plan.max_error_mm && of_end <= plan.max_error_mm) return;
+    throw BadInput(of_start > of_end ? too_uncertain(plan, tunnel, tunnel.start, start, tool)
+                                     : too_uncertain(plan, tunnel, tunnel.end, end, tool));
   });
 }
 

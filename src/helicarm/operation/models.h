@@ -21,6 +21,12 @@ Expected<case_registration::CaseRegistration> register_models(const OperationPla
                                                               const case_registration::Progress& progress,
                                                               const std::vector<ModelStart>& starts = {});
 
+/// The plan's models where their search would begin, as `case_registration::models_at_starts`. Refuses
+/// (usage) without a calibration.
+Expected<case_registration::CaseRegistration> models_at_starts(
+    const OperationPlan& plan, const pipeline::Case& the_case, const pipeline::Result& measured,
+    const case_registration::Progress& progress = {});
+
 /// registration.json without its times, which differ from run to run.
 Json recorded(const case_registration::CaseRegistration& registration);
 

@@ -123,7 +123,12 @@ std::vector<robot::Miss> Operation::carry_out(const robot::RobotOrder& order, co
 Expected<void> Operation::finish(const std::optional<Failure>& why) {
   return guarded([&] {
     if (std::exchange(finished_, true)) return;
-    record(why ? record::End{std::string(code(why->reason)), why->message} : record::End{});
+    const auto guidance = guarded([&] { end_guidance(record::GuidanceEndedBy::operation); });
+    const auto end = guarded([&] {
+      record(why ? record::End{std::string(code(why->reason)), why->message} : record::End{});
+    });
+    value_or_throw(guidance);
+    value_or_throw(end);
   });
 }
 
@@ -147,6 +152,7 @@ pipeline::Result Operation::run(const guidance::Poses& now,
   pipeline::Result result = *by_images_;
   if (gate_.is_confirmed() && !result.failure)
     result = value_or_throw(with_registration(result, *registration_, plan_, the_case, of_models));
+  if (!tool_lines.empty()) add_depths(plan_, tool(), result);
   const Digests written = value_or_throw(write_result(result, the_case.folder));
   value_or_throw(check_digests(the_case.folder, files));
   record(record::Measured{name, digest_of(pipeline::to_json(result)), written});
@@ -157,20 +163,23 @@ pipeline::Result Operation::run(const guidance::Poses& now,
 }
 
 /// The images are others now.
-void Operation::forget_measurement() {
-  forget_result();
+std::optional<record::GuidanceEnded> Operation::forget_measurement() {
+  const auto ended = forget_result();
   measured_case_.reset();
   by_images_.reset();
+  return ended;
 }
 
 /// What was planned, guided, registered and verified by it ends too.
-void Operation::forget_result() {
-  forget_registration();
+std::optional<record::GuidanceEnded> Operation::forget_result() {
+  const auto ended = guidance_ended(record::GuidanceEndedBy::new_plan);
+  static_cast<void>(forget_registration());  // its end too
   gate_.forget_plans();
   result_.reset();
   without_models_.reset();
   newest_result_.reset();
   verifications_.clear();
+  return ended;
 }
 
 Expected<void> Operation::measure() {
@@ -178,7 +187,7 @@ Expected<void> Operation::measure() {
     if (const auto missing = views_to_come(); !missing.empty())
       throw BadInput(Reason::usage, fmt::format("{}: no image received; acquire this view", missing.front()));
     notify_(Step::measure, fmt::format("{} views", views_.size()));
-    forget_result();
+    record_ended(forget_result());
     result_ = without_models_ = run({}, {});
   });
 }
@@ -362,7 +371,7 @@ TunnelOutcome Operation::check(const OperationTunnel& tunnel) {
       value_or_throw(tool_line(tunnel.name, tunnel.bone, views_.front().poses, now, tracked.marker_from_tip));
   const pipeline::Result checked = run(now, {line});
   TunnelOutcome outcome = value_or_throw(outcome_of(tunnel, checked, tracked));
-  record(record::Outcome{outcome.tunnel, outcome.start, outcome.end});
+  record(record::Outcome{outcome.tunnel, outcome.start, outcome.end, outcome.depth()});
   if (outcome.verification) verifications_.insert_or_assign(tunnel.name, *outcome.verification);
   return outcome;
 }
@@ -370,8 +379,10 @@ TunnelOutcome Operation::check(const OperationTunnel& tunnel) {
 Expected<case_registration::Measurement> Operation::measurement() const {
   if (!result_) return fail(Reason::usage, "no measurement of the present images");
   case_registration::Measurement measured{*result_, registration_, exposures()};
-  for (const auto& [tunnel, verification] : verifications_)
+  for (const auto& [tunnel, verification] : verifications_) {
     measured.result.verifications.push_back(verification);
+    warn_of_depth(verification, measured.result);
+  }
   return measured;
 }
 

@@ -180,9 +180,11 @@ class Operation {
   Expected<Guidance> guidance();
   /// Compares the drill, held still in the drilled tunnel or along it, with the tunnel in the tracker's frame
   /// and in the X-ray images. Ends its guidance, which goes on as it was begun where this is refused:
-  /// off_target (the drill is not there), plan_stale (as guided), and as a reading of poses.
+  /// off_target (the drill is not there), plan_stale (as guided), usage (another tunnel is guided), and as a
+  /// reading of poses.
   Expected<TunnelOutcome> verify_drilled(const std::string& tunnel);
-  void end_guidance();
+  /// By the person. It has ended also where its record fails (record_lost).
+  Expected<void> end_guidance();
 
  private:
   static constexpr std::chrono::seconds robot_patience{5};
@@ -215,13 +217,20 @@ class Operation {
   void record_halt(const robot::RobotOrder& order, const Failure& why);
   PoseWindow look(record::Look why);
   pipeline::Result run(const guidance::Poses& now, const std::vector<guidance::ToolLine>& tool_lines);
-  void forget_measurement();
-  void forget_result();
+  // What is forgotten is not in force any more: its caller records last that the guidance has ended with it.
+  [[nodiscard]] std::optional<record::GuidanceEnded> forget_measurement();
+  [[nodiscard]] std::optional<record::GuidanceEnded> forget_result();
   tracker::HandEyePair pair_at(const geometry::RigidTransform& base_from_tcp, const Confirm& confirm);
   std::vector<robot::Miss> carry_out(const robot::RobotOrder& order, const std::string& token,
                                      const robot::Measure& measure, const robot::Watch& watch);
   TunnelOutcome check(const OperationTunnel& tunnel);
   void draw_preview(const robot::RobotOrder& order);
+
+  // guide_drill.cc
+  TunnelAim aim_at(const OperationTunnel& tunnel);
+  void end_guidance(record::GuidanceEndedBy by);
+  std::optional<record::GuidanceEnded> guidance_ended(record::GuidanceEndedBy by) const;
+  void record_ended(const std::optional<record::GuidanceEnded>& ended);
 
   // acquire.cc
   xray::Acquisition acquisition_of(std::string& view, const receiver::Arrival& arrival, double arrival_s);
@@ -232,7 +241,7 @@ class Operation {
   void notify_once(const std::string& warning);
 
   // register_plan_models.cc
-  void forget_registration();
+  [[nodiscard]] std::optional<record::GuidanceEnded> forget_registration();
 
   // fresh_plan.cc, plan_again.cc
   robot::Watch sees_tool() const;

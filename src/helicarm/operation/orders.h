@@ -19,6 +19,11 @@ struct TunnelOutcome {
   EndMiss end;
   std::optional<guidance::Verification> verification;  ///< Eq. 17 in the X-ray images
   int replans = 0;                                     ///< plans made again until the tool was there
+
+  /// Of a drill in a person's hand.
+  std::optional<guidance::TipDepth> depth() const {
+    return verification ? verification->depth : std::nullopt;
+  }
 };
 
 /// The order to a tunnel from these joints. Fails as `tunnel_in_bone` and `plan_approach`.
@@ -38,6 +43,13 @@ struct Withdrawal {
 };
 robot::RobotOrder withdraw_order(const robot::RobotOrder& order, const Withdrawal& from,
                                  const robot::Joints& joints, const robot::RobotLimits& limits);
+
+/// Adds to each verified tunnel of a hand-held drill how deep its tip is, from the tracked drill, and warns
+/// as `TipDepth::why_off`. A robot's tool stops at its gap from the entry and drills nothing: nothing is
+/// added.
+void add_depths(const OperationPlan& plan, const TrackedTool& tool, pipeline::Result& result);
+/// Adds the warning of a verified tunnel's depth, if any.
+void warn_of_depth(const guidance::Verification& verified, pipeline::Result& result);
 
 /// From a measurement with the tool's line; without the closed loop. Refuses (not_seen) an end that is not
 /// located in the tool's frame.

@@ -127,7 +127,7 @@ void describe_drill(Codec& codec, Drill& drill) {
   codec.vector("back_in_tool", drill.back_in_tool, millimetres, "another, at least 20 mm behind it");
   codec.number_or_default("sigma_mm", drill.sigma_mm, {0.001, 10}, "of each point per axis");
   codec.number_or_default("tolerance_mm", drill.tolerance_mm, {0.1, 10},
-                          "of the tip's distance from the tunnel's axis");
+                          "of the tip's distance from the tunnel's axis, and of its depth beyond the end");
   codec.number_or_default("tolerance_deg", drill.tolerance_deg, {0.1, 45},
                           "of the angle between drill and axis");
   codec.check([&](JsonReader& reader) { check_drill(reader, drill); });

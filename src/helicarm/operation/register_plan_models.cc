@@ -44,26 +44,25 @@ Expected<void> Operation::register_models(const std::vector<ModelStart>& starts,
     if (plan_.models.empty()) throw BadInput(Reason::usage, "the plan has no \"models\"");
     if (!result_ || !measured_case_) throw BadInput(Reason::usage, "no measurement yet");
     notify_(Step::measure, "registration of the plan's models");
-    case_registration::Progress progress;
-    progress.step = [&](const std::string& model, std::string_view step) {
-      notify_(Step::measure, fmt::format("{}: {}", model, step));
-    };
-    progress.interrupt = [&] {
-      if (end_.stop_requested()) throw BadInput(Reason::interrupted, "the registration was stopped");
-      check();
-    };
+    const auto progress = case_registration::progress_in_words(
+        [&](const std::string& step) { notify_(Step::measure, step); },
+        [&] {
+          if (end_.stop_requested()) throw BadInput(Reason::interrupted, "the registration was stopped");
+          check();
+        });
     auto found =
         value_or_throw(operation::register_models(plan_, *measured_case_, *by_images_, progress, starts));
     const std::string folder = measured_case_->folder.filename().string() + "/" + registration_folder;
     const Digests files = write_with_digests(found, folder_ / folder);
     const std::string digest = xray::digest(to_text(operation::recorded(found)));
     record(record::Registered{folder, digest, files, starts});
-    forget_registration();
+    const auto ended = forget_registration();
     registered_digest_ = digest;
     registration_ = std::move(found);
     ++registrations_;
     const auto refusal = refusal_of(*registration_);
     gate_.registered(refusal);
+    record_ended(ended);
     if (refusal) throw BadInput(*refusal);
   });
 }
@@ -82,13 +81,16 @@ Expected<void> Operation::confirm_registration() {
 }
 
 /// What was planned, guided and verified in the models' tunnels ends with their registration.
-void Operation::forget_registration() {
+std::optional<record::GuidanceEnded> Operation::forget_registration() {
+  auto ended = guidance_ended(record::GuidanceEndedBy::new_plan);
   registration_.reset();
   registered_digest_.clear();
   gate_.forget_registration(plan_.tunnels);
+  if (gate_.guide()) ended.reset();  // of no model: it goes on
   result_ = without_models_;
   for (const OperationTunnel& tunnel : plan_.tunnels)
     if (tunnel.of_model) verifications_.erase(tunnel.name);
+  return ended;
 }
 
 }  // namespace helicarm::operation

@@ -22,19 +22,21 @@ constexpr std::uintmax_t most_image_bytes = std::uintmax_t{256} << 20;
 constexpr std::uintmax_t most_listed_bytes = std::uintmax_t{1} << 31;  // of a model's volume
 class Replay {
  public:
-  explicit Replay(std::filesystem::path session)
+  Replay(std::filesystem::path session, double begun_s)
       : session_(std::move(session)),
+        begun_s_(begun_s),
         orders_([this](const std::string& origin, const std::string& difference) {
           differ(origin, difference);
         }) {}
 
   void take(const SessionRecord& written) {
     const std::string origin = fmt::format("record {}", written.number);
+    now_s_ = std::max(now_s_, written.time_s - begun_s_);  // the clock may be set back
     if (report.finished) differ(origin, "a record after the end of the operation");
     const auto record = record_from(written, session_);
     if (!record) return report.differences.push_back(record.error().message);
     std::visit([&](const auto& one) { take(one, origin); }, *record);
-    orders_.take(*record, {origin, plan_, result_, newest_});
+    orders_.follow(*record, {origin, plan_, result_, newest_});
     report.orders = orders_.orders;
     report.confirmations = orders_.confirmations;
     report.outcomes = orders_.outcomes;
@@ -86,7 +88,7 @@ class Replay {
   /// Of orders (`OrderReplay`), or of nothing that can be derived.
   template <record::OneOf<record::Session, record::Poses, record::Tour, record::Withdraw, record::Robot,
                           record::Order, record::Confirmed, record::CarriedOut, record::Halted,
-                          record::Replanned, record::Navigated, record::Outcome>
+                          record::Replanned, record::Navigated>
                 Other>
   void take(const Other&, const std::string&) {}
 
@@ -107,10 +109,7 @@ class Replay {
     compare(content_of(then), content_of(now), origin, "pose");
     if (then.inbox && !received(*then.inbox).contains(then.picture))
       differ(origin, fmt::format("{}: the image of {} is missing or was changed", *then.inbox, then.view));
-    const bool accepted = poses && std::ranges::all_of(plan_.tunnels, [&](const OperationTunnel& tunnel) {
-                            return poses->tracker_from(tunnel.bone).has_value();
-                          });
-    if (!accepted) return;
+    if (!is_accepted(now, plan_)) return;
     views_[then.view] = {then.view, {}, then.picture, *poses};
     forget_measurement();
   }
@@ -226,6 +225,8 @@ class Replay {
     if (!verifies_) result_ = without_models_ = newest_;
     const auto then = read_json(inside / "result.json");
     if (!then) return differ(origin, then.error().message);
+    if (const auto tool = orders_.tool(plan_); verifies_ && tool && states_depth(*then))
+      add_depths(plan_, *tool, *newest_);
     Json now = without_timing(pipeline::to_json(*newest_));
     if (earlier_) now = in_keys_of(*then, now);
     if (record.digest != digest_of(now))
@@ -250,9 +251,17 @@ class Replay {
     if (!measured_ || !measurement_) return differ(origin, "a registration without a measurement");
     auto now = register_models(plan_, *measured_, *measurement_, {}, record.starts);
     if (!now) return differ(origin, now.error().message);
-    registered_digest_ = xray::digest(to_text(recorded(*now)));
-    if (record.digest != registered_digest_)
-      differ(origin, "the registration differs from the recorded one on recomputation");
+    registered_digest_ = record.digest;
+    const auto is_recorded = [&](const case_registration::CaseRegistration& registration) {
+      return record.digest == xray::digest(to_text(recorded(registration)));
+    };
+    if (!is_recorded(*now)) {
+      auto earlier = as_registered_earlier(*now);
+      if (!is_recorded(earlier))
+        differ(origin, "the registration differs from the recorded one on recomputation");
+      else
+        now = std::move(earlier);
+    }
     registration_ = *std::move(now);
   }
 
@@ -273,18 +282,42 @@ class Replay {
           plan_, LiveTool(plan_, *result_, {}, tracked_tool(*plan_.drill)), record.tunnel,
           value_or_throw(poses_now(record.window, plan_.tracker)), record.oldest_pose_s));
     });
-    if (begun) guide_ = *begun;  // the operation refused it as well and recorded no decision
+    if (!begun) return;  // the operation refused it as well and recorded no decision
+    guide_ = *begun;
+    decision_.clear();
+    is_verified_ = false;
+    report.guidances.push_back({record.tunnel, now_s_});
   }
 
   void take(const record::Guided& then, const std::string& origin) {
     ++report.decisions;
     if (!guide_) return differ(origin, "a decision before guidance began");
-    compare(content_of(then), content_of(record::Guided{then.tunnel, then.window, guide_->at(then.window)}),
-            origin, "decision");
+    const bool states_causes = !then.guidance.aim || then.guidance.aim->errors;
+    const record::Guided now{then.tunnel, then.window, guide_->at(then.window, states_causes)};
+    compare(content_of(then), content_of(now), origin, "decision");
+    decision_ = then.guidance.decision();
+  }
+
+  void take(const record::Outcome& outcome, const std::string&) {
+    if (guide_ && guide_->tunnel().name == outcome.tunnel) is_verified_ = true;
+  }
+
+  void take(const record::GuidanceEnded& ended, const std::string& origin) {
+    using enum record::GuidanceEndedBy;
+    if (!guide_ || guide_->tunnel().name != ended.tunnel)
+      return differ(origin, fmt::format("the end of a guidance to {} that had not begun", ended.tunnel));
+    if (ended.by == verified && !is_verified_)
+      differ(origin, fmt::format("{}: ended as verified without an outcome", ended.tunnel));
+    if (ended.by == plan_stale && decision_ != code(Reason::plan_stale))
+      differ(origin, fmt::format("{}: ended as plan_stale without that decision", ended.tunnel));
+    guide_.reset();
+    report.guidances.back().ended_s = now_s_;
+    report.guidances.back().ended_by = record::word_of(ended.by);
   }
 
   std::map<std::string, ListedFile> files_;
   std::filesystem::path session_;
+  double begun_s_, now_s_ = 0;
   OperationPlan plan_;
   std::optional<pipeline::Result> result_;          ///< of the last measurement
   std::optional<pipeline::Result> without_models_;  ///< the same before the registration was confirmed
@@ -292,6 +325,8 @@ class Replay {
   bool earlier_ = false;                            ///< the last case is of an earlier version
   bool verifies_ = false;                           ///< the last case is that of a verification
   std::optional<FreehandGuide> guide_;
+  std::string decision_;                         ///< its last one
+  bool is_verified_ = false;                     ///< an outcome at its tunnel since it began
   std::optional<pipeline::Case> derived_;        ///< of the last case record
   std::optional<pipeline::Result> measurement_;  ///< of the accepted images
   std::optional<pipeline::Case> measured_;       ///< of the last measurement
@@ -306,12 +341,18 @@ class Replay {
 
 }  // namespace
 
+bool is_accepted(const record::Exposure& exposure, const OperationPlan& plan) {
+  return exposure.poses && std::ranges::all_of(plan.tunnels, [&](const OperationTunnel& tunnel) {
+           return exposure.poses->tracker_from(tunnel.bone).has_value();
+         });
+}
+
 Expected<ReplayReport> replay(const std::filesystem::path& session, const GoOn& go_on) {
   return guarded([&] {
     const SessionHistory history = value_or_throw(read_session(session / "session.log"));
     if (history.records.empty())
       throw BadInput(Reason::bad_value, fmt::format("{}: the record is empty", session.string()));
-    Replay replay(session);
+    Replay replay(session, history.records.front().time_s);
     replay.report.records = history.records.size();
     replay.report.torn = history.torn;
     for (const SessionRecord& record : history.records) {

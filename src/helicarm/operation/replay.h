@@ -3,12 +3,22 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "helicarm/core/failure.h"
+#include "helicarm/operation/session_records.h"
 
 namespace helicarm::operation {
+
+/// Guidance of a hand-held drill to a tunnel; s since the record began.
+struct GuidanceSpan {
+  std::string tunnel;
+  double begun_s;
+  std::optional<double> ended_s = {};  ///< nothing: not recorded, as by earlier versions
+  std::string ended_by = {};           ///< word of session.log
+};
 
 struct ReplayReport {
   std::size_t records = 0;
@@ -20,7 +30,8 @@ struct ReplayReport {
   std::size_t results = 0;
   std::size_t registrations = 0;  ///< of the plan's models
   std::size_t hand_eyes = 0;
-  std::size_t decisions = 0;  ///< on a hand-held drill
+  std::size_t decisions = 0;            ///< on a hand-held drill
+  std::vector<GuidanceSpan> guidances;  ///< of it
   std::size_t orders = 0;
   std::size_t confirmations = 0;
   std::size_t replans = 0;  ///< plans made again after a stop
@@ -31,6 +42,10 @@ struct ReplayReport {
   /// Whether the record has its end and nothing differs.
   bool complete() const { return finished && !torn && differences.empty(); }
 };
+
+/// Whether the operation took the recorded image, as its poses say: what was measured by earlier images
+/// ended. A refused one, without the pose of a tunnel's bone, changes nothing.
+bool is_accepted(const record::Exposure& exposure, const OperationPlan& plan);
 
 /// Called before each record with the number done; false stops the replay.
 using GoOn = std::function<bool(std::size_t done, std::size_t all)>;

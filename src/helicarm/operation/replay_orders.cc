@@ -37,7 +37,7 @@ void OrderReplay::compare(const Json& then, const Json& now, const Context& at, 
                                    differing_fields(then, now)));
 }
 
-void OrderReplay::take(const Record& record, const Context& at) {
+void OrderReplay::follow(const Record& record, const Context& at) {
   std::visit([&](const auto& one) { take(one, at); }, record);
 }
 
@@ -201,7 +201,8 @@ void OrderReplay::take(const record::Outcome& then, const Context& at) {
   if (!at.newest || !with) return differ_(at.origin, "an outcome without a measurement or a registration");
   const auto now = outcome_of(tunnel_of(at.plan, then.tunnel), *at.newest, *with);
   if (!now) return differ_(at.origin, now.error().message);
-  compare(content_of(then), content_of(record::Outcome{now->tunnel, now->start, now->end}), at, "outcome");
+  compare(content_of(then), content_of(record::Outcome{now->tunnel, now->start, now->end, now->depth()}), at,
+          "outcome");
 }
 
 void OrderReplay::take(const record::End& end, const Context& at) {

@@ -28,7 +28,7 @@ class OrderReplay {
   explicit OrderReplay(Differ differ) : differ_(std::move(differ)) {}
 
   /// The records that concern orders. Throws BadInput.
-  void take(const Record& record, const Context& at);
+  void follow(const Record& record, const Context& at);
 
   /// The tracker's samples for the verification that the next case holds, once.
   std::optional<PoseWindow> take_verify_look() { return std::exchange(verify_look_, std::nullopt); }
@@ -50,7 +50,8 @@ class OrderReplay {
   /// No order depends on them.
   template <record::OneOf<record::Session, record::Plan, record::Models, record::Exposure, record::Refused,
                           record::Touched, record::CaseBegun, record::Measured, record::Registered,
-                          record::RegistrationConfirmed, record::Preview, record::Guide, record::Guided>
+                          record::RegistrationConfirmed, record::Preview, record::Guide, record::Guided,
+                          record::GuidanceEnded>
                 Other>
   void take(const Other&, const Context&) {}
   void take(const record::Poses& poses, const Context& at);

@@ -28,6 +28,9 @@ inline constexpr std::size_t most_starts = 100;  // one for each model
 inline constexpr std::array<std::string_view, 6> look_words{"plan",   "hand-eye", "correct",
                                                             "verify", "withdraw", "guide"};
 
+inline constexpr std::array<std::string_view, 6> guidance_end_words{"verified",     "person",   "plan_stale",
+                                                                    "new_guidance", "new_plan", "operation"};
+
 template <class Codec, class Text>
 void describe_name(Codec& codec, const char* key, Text& name, const char* help) {
   codec.text(key, name, help, name_limits);
@@ -301,11 +304,28 @@ void describe(Codec& codec, Value& guided, Of<record::Guided>) {
 }
 
 template <class Codec, class Value>
+void describe(Codec& codec, Value& ended, Of<record::GuidanceEnded>) {
+  describe_name(codec, "tunnel", ended.tunnel, "its name");
+  codec.required_choice("by", ended.by, guidance_end_words,
+                        "`verified`; `person`; `plan_stale`: it began again after that decision; "
+                        "`new_guidance`: another began; `new_plan`: images, measurement or registration are "
+                        "others now; `operation`: the operation ended");
+}
+
+template <class Codec, class Value>
 void describe(Codec& codec, Value& outcome, Of<record::Outcome>) {
   const auto end = [](auto& inner, auto& miss) { describe_end(inner, miss); };
   describe_name(codec, "tunnel", outcome.tunnel, "its name");
   codec.required_object("start", outcome.start, "distance of the tunnel's start from the tool's axis", end);
   codec.required_object("end", outcome.end, "likewise", end);
+  codec.object("depth", outcome.depth, "of a hand-held drill's tip; sessions of earlier versions lack it",
+               [](auto& inner, auto& depth) {
+                 inner.number("beyond_end_mm", depth.beyond_end_mm, any,
+                              "beyond the planned end along the tunnel, negative before it");
+                 inner.number("sigma_mm", depth.sigma_mm, any, "standard deviation");
+                 inner.number("tolerance_mm", depth.tolerance_mm, any, "of the plan");
+                 describe_derived(inner, "error_95_mm", depth.error_95_mm(), "of `beyond_end_mm`");
+               });
 }
 
 template <class Codec, class Value>

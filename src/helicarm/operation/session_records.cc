@@ -77,6 +77,10 @@ Json schema_of_kinds(Of<std::variant<Kinds...>>) {
 
 }  // namespace
 
+std::string_view record::word_of(GuidanceEndedBy by) {
+  return description::guidance_end_words[std::size_t(by)];
+}
+
 std::string_view kind_of(const Record& record) {
   return std::visit([](const auto& one) { return std::string_view(one.kind); }, record);
 }

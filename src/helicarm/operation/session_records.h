@@ -203,11 +203,23 @@ struct Guided {
   Guidance guidance;
 };
 
+/// What ended the guidance of a drill. new_plan: images, measurement or registration are others now.
+enum class GuidanceEndedBy { verified, person, plan_stale, new_guidance, new_plan, operation };
+std::string_view word_of(GuidanceEndedBy by);
+
+struct GuidanceEnded {
+  static constexpr const char* kind = "guidance_ended";
+  static constexpr const char* help = "the guidance of a hand-held drill has ended";
+  std::string tunnel;
+  GuidanceEndedBy by = GuidanceEndedBy::verified;
+};
+
 struct Outcome {
   static constexpr const char* kind = "outcome";
   static constexpr const char* help = "the error at a tunnel";
   std::string tunnel;
   EndMiss start, end;
+  std::optional<guidance::TipDepth> depth = {};  ///< of a hand-held drill
 };
 
 struct End {
@@ -223,12 +235,13 @@ concept OneOf = (std::same_as<Kind, Kinds> || ...);
 
 }  // namespace record
 
-using Record = std::variant<record::Session, record::Plan, record::Models, record::Exposure, record::Refused,
-                            record::Touched, record::CaseBegun, record::Measured, record::Registered,
-                            record::RegistrationConfirmed, record::Poses, record::Tour, record::HandEye,
-                            record::Withdraw, record::Robot, record::Order, record::Preview,
-                            record::Confirmed, record::CarriedOut, record::Halted, record::Replanned,
-                            record::Navigated, record::Guide, record::Guided, record::Outcome, record::End>;
+using Record =
+    std::variant<record::Session, record::Plan, record::Models, record::Exposure, record::Refused,
+                 record::Touched, record::CaseBegun, record::Measured, record::Registered,
+                 record::RegistrationConfirmed, record::Poses, record::Tour, record::HandEye,
+                 record::Withdraw, record::Robot, record::Order, record::Preview, record::Confirmed,
+                 record::CarriedOut, record::Halted, record::Replanned, record::Navigated, record::Guide,
+                 record::Guided, record::GuidanceEnded, record::Outcome, record::End>;
 
 std::string_view kind_of(const Record& record);
 Json content_of(const Record& record);

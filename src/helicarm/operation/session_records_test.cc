@@ -44,6 +44,7 @@ OperationPlan plan() {
 Guidance off_target() {
   Guidance guidance;
   guidance.aim = TunnelAim{1, 2, 3, 4, 0.1, 0.2, 0.3, {1, 0, 0}, Eigen::Vector3d::UnitZ()};
+  guidance.aim->errors = AimErrors{{0.01, 0.02}, {0.03, 0.04}, {0.05, 0.06}, {0.07, 0.08}};
   guidance.bone_moved = Motion{0.1, 0.2};
   guidance.age_s = 0.05;
   guidance.why_not = Failure{Reason::off_target, "1 mm off"};
@@ -84,7 +85,8 @@ std::vector<Record> one_of_each_kind() {
           Navigated{"femur", {{1.5, 1, 0.1}}},
           Guide{"femur", 0.15, window()},
           Guided{"femur", window(), off_target()},
-          Outcome{"femur", miss, miss},
+          GuidanceEnded{"femur", GuidanceEndedBy::plan_stale},
+          Outcome{"femur", miss, miss, guidance::TipDepth{1.8, 0.23, 1}},
           End{"interrupted", "stopped"}};
 }
 
@@ -130,6 +132,11 @@ TEST(SessionRecords, EarlierVersionsAreRead) {
   ASSERT_TRUE(poses && poses->tracker_from("femur"));
   EXPECT_EQ(poses->tracker_from("femur")->matrix(), pose(6).matrix());
   EXPECT_FALSE(poses->tracker_from("tibia"));
+
+  const EndMiss miss{{0.3, 0.4}, Eigen::Matrix2d::Identity()};
+  const auto outcome = read("outcome", content_of(record::Outcome{"femur", miss, miss}));
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_FALSE(std::get<record::Outcome>(*outcome).depth);
 
   const Json lines = {{"tool_lines", {{{"name", "tool"}, {"tunnel", "tibia"}}}}};
   const auto begun = read("case", {{"folder", "case-2"}, {"case", lines}, {"files", Json::object()}});

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "helicarm/pipeline/case_purpose.h"
 #include "helicarm/pipeline/view_image.h"
 #include "helicarm/rectification/distortion_map.h"
 
@@ -45,7 +46,7 @@ void check_view(const Case& the_case, const std::string& view, const std::string
 Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::string& origin,
                                 const std::filesystem::path& folder) {
   return guarded([&] {
-    const Case the_case = value_or_throw(case_from_json(json, "case.json", folder));
+    const Case the_case = value_or_throw(case_from_json(json, "case.json", folder, purpose_of(json)));
     if (table.rows() == 0)
       throw BadInput(Reason::bad_value, fmt::format("{}: the table has no rows", origin));
     PickedCase picked{std::move(json)};
@@ -70,7 +71,7 @@ Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::str
       (*pick)["uv"] = {table.number(row, "u_px"), table.number(row, "v_px")};
       if (const auto sigma = table.optional_number(row, "sigma_px")) (*pick)["sigma_px"] = *sigma;
     }
-    value_or_throw(case_from_json(picked.json, "case.json", folder));
+    value_or_throw(case_from_json(picked.json, "case.json", folder, purpose_of(picked.json)));
     return picked;
   });
 }
@@ -98,7 +99,7 @@ Expected<void> check_in_images(const CsvTable& table, const std::string& origin,
 Expected<Json> with_all_picks(Json json, const std::vector<Pick>& picks,
                               const std::vector<CaseTunnel>& tunnels, const std::filesystem::path& folder) {
   return guarded([&] {
-    const Case before = value_or_throw(case_from_json(json, "case.json", folder));
+    const Case before = value_or_throw(case_from_json(json, "case.json", folder, purpose_of(json)));
     json["picks"] = Json::array();
     for (const Pick& pick : picks) json["picks"].push_back(to_json(pick));
     if (!json.contains("tunnels") || json["tunnels"].is_null()) json["tunnels"] = Json::array();
@@ -110,7 +111,7 @@ Expected<Json> with_all_picks(Json json, const std::vector<Pick>& picks,
           std::ranges::find(before.tunnels, tunnel.name, &CaseTunnel::name) == before.tunnels.end())
         json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
     if (json["tunnels"].empty()) json.erase("tunnels");
-    value_or_throw(case_from_json(json, "case.json", folder));
+    value_or_throw(case_from_json(json, "case.json", folder, purpose_of(json)));
     return json;
   });
 }

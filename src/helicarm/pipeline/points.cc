@@ -9,6 +9,7 @@
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/fiducials/paper_circles.h"
+#include "helicarm/pipeline/middle.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -179,7 +180,7 @@ Expected<std::vector<PointResult>> observe_points(const Case& the_case, const Ca
                                                   unsigned threads) {
   std::vector<PointResult> points;
   const std::vector<Task> tasks = tasks_of(the_case, points);
-  const Eigen::Vector3d centre = phantom::middle_of(the_case.calibrator);
+  const Eigen::Vector3d centre = middle_of(the_case.calibrator, calibration);
   std::vector<std::optional<Failure>> failures(tasks.size());
   const auto done = guarded([&] {
     for (const Task& task : tasks)

@@ -19,7 +19,7 @@
 namespace helicarm::pipeline {
 
 std::vector<detection::Dot> unlabelled_candidates(const ViewResult& view) {
-  if (view.found || !view.dots || !view.rectification) return {};
+  if (view.found || view.calibrated || !view.dots || !view.rectification) return {};
   return fiducials::ball_candidates(*view.dots, *view.rectification);
 }
 
@@ -143,6 +143,14 @@ void describe_verification(Output& output, const guidance::Verification& verific
   output.value("err_end_mm", if_set(end, &LineError::combined_mm), "likewise");
   output.value("distance_start_mm", if_set(start, &LineError::distance_mm), "in space");
   output.value("distance_end_mm", if_set(end, &LineError::distance_mm), "likewise");
+  const auto& depth = verification.depth;
+  output.value_where(depth.has_value(), "beyond_end_mm", if_set(depth, &guidance::TipDepth::beyond_end_mm),
+                     "of a drill held by hand in an operation: its tip beyond the planned end along the "
+                     "tunnel, negative before it");
+  output.value_where(depth.has_value(), "depth_error_95_mm", if_set(depth, &guidance::TipDepth::error_95_mm),
+                     "likewise, what 95 % of its errors do not exceed");
+  output.value_where(depth.has_value(), "depth_tolerance_mm",
+                     if_set(depth, &guidance::TipDepth::tolerance_mm), "likewise, of the plan");
 }
 
 template <class Output>

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Records of a finished operation that were changed afterwards, by someone who recomputes their chain.
-#include <fstream>
-
-#include <fmt/ranges.h>
 #include <gmock/gmock.h>
-#include <openssl/evp.h>
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/operation/replay.h"
 #include "helicarm/operation/session_log.h"
 #include "helicarm/rehearsal/rehearse.h"
+#include "helicarm/rehearsal/rewritten_record_test.h"
 
 namespace helicarm::rehearsal {
 namespace {
@@ -19,12 +16,6 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 
 constexpr int most_rehearsals = 10;
-
-std::string sha256(const std::string& text) {
-  std::array<unsigned char, 32> hash{};
-  EVP_Digest(text.data(), text.size(), hash.data(), nullptr, EVP_sha256(), nullptr);
-  return fmt::format("{:02x}", fmt::join(hash, ""));
-}
 
 /// One rehearsed operation for all tests; each changes a copy.
 class AttackedRecord : public testing::Test {
@@ -48,19 +39,7 @@ class AttackedRecord : public testing::Test {
     records_ = operation::read_session(session_ / "session.log")->records;
   }
 
-  /// Writes the records with a valid chain and consecutive numbers.
-  void write() const {
-    std::string chain, log;
-    std::uint64_t number = 0;
-    for (const operation::SessionRecord& record : records_) {
-      const std::string text =
-          Json{{"n", number++}, {"time_s", record.time_s}, {"kind", record.kind}, {"content", record.content}}
-              .dump();
-      chain = sha256(chain + text);
-      log += chain + ' ' + text + '\n';
-    }
-    std::ofstream(session_ / "session.log", std::ios::binary) << log;
-  }
+  void write() const { rewrite_record(session_, records_); }
   Json& content(const std::string& kind, std::size_t which = 0) {
     for (operation::SessionRecord& record : records_)
       if (record.kind == kind && which-- == 0) return record.content;

@@ -9,6 +9,7 @@
 #include "helicarm/operation/connections.h"
 #include "helicarm/operation/replay.h"
 #include "helicarm/rehearsal/rehearse.h"
+#include "helicarm/rehearsal/rewritten_record_test.h"
 
 namespace helicarm::rehearsal {
 namespace {
@@ -205,6 +206,21 @@ TEST_F(CtOperation, AModelThatWasReplacedAfterwardsIsFoundByTheReplay) {
   const auto replayed = operation::replay(folder_.path() / "session");
   ASSERT_TRUE(replayed);
   EXPECT_THAT(replayed->differences, testing::Contains(HasSubstr("models/1/femur.nrrd was changed")));
+}
+
+TEST_F(CtOperation, ARegistrationThatDiffersIsReportedOnce) {
+  begin();
+  ASSERT_TRUE(operation_->register_models());
+  ASSERT_TRUE(operation_->confirm_registration());
+  ASSERT_TRUE(operation_->finish());
+  operation_.reset();
+  auto records = operation::read_session(folder_.path() / "session" / "session.log").value().records;
+  for (operation::SessionRecord& record : records)
+    if (record.kind == "registered" || record.kind == "registration_confirmed")
+      record.content["digest"] = std::string(64, '0');
+  rewrite_record(folder_.path() / "session", records);
+  EXPECT_THAT(operation::replay(folder_.path() / "session").value().differences,
+              testing::ElementsAre(HasSubstr("the registration differs from the recorded one")));
 }
 
 }  // namespace

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <csignal>
 #include <thread>
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/operation/replay.h"
+#include "helicarm/rehearsal/full_disk_test.h"
 #include "helicarm/rehearsal/rehearse.h"
 #include "helicarm/virtual_devices/any_ports_test.h"
 
@@ -334,24 +333,6 @@ TEST_F(FaultyOperation, SessionFolderHoldsOneOperation) {
   operation_.reset();
   EXPECT_EQ(begin().error().reason, Reason::cannot_write);
 }
-
-/// A disk that is full after this many bytes of a file.
-class FullDisk {
- public:
-  explicit FullDisk(std::uintmax_t bytes) : signal_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit tight{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &tight);
-  }
-  ~FullDisk() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, signal_);
-  }
-
- private:
-  void (*signal_)(int);
-  rlimit before_{};
-};
 
 TEST_F(FaultyOperation, FullDiskAtAnyWriteIsReportedAndKeepsTheRecordIntact) {
   expose("AP");

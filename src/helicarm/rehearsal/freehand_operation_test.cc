@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <thread>
 
-#include <gtest/gtest.h>
+#include <fmt/ranges.h>
+#include <gmock/gmock.h>
 
+#include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
+#include "helicarm/operation/case_of.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/operation/replay.h"
+#include "helicarm/operation/session_log.h"
+#include "helicarm/rehearsal/full_disk_test.h"
 #include "helicarm/rehearsal/rehearse.h"
+#include "helicarm/rehearsal/rewritten_record_test.h"
+#include "helicarm/xray/digest.h"
 
 namespace helicarm::rehearsal {
 namespace {
@@ -84,6 +91,48 @@ class GuidedDrill : public testing::Test {
     return false;
   }
 
+  std::uintmax_t log_bytes() const {
+    return std::filesystem::file_size(folder_.path() / "session" / "session.log");
+  }
+  std::vector<operation::SessionRecord> records() const {
+    return operation::read_session(folder_.path() / "session" / "session.log").value().records;
+  }
+
+  /// A copy of the session as a version wrote it that stated neither depths nor ends of guidance.
+  std::filesystem::path as_recorded_earlier() {
+    const std::filesystem::path session = folder_.path() / "session", copy = folder_.path() / "earlier";
+    std::filesystem::copy(session, copy, std::filesystem::copy_options::recursive);
+    std::filesystem::remove(copy / "session.log");
+    const auto log = operation::SessionLog::open(copy / "session.log").value();
+    operation::SessionHistory history = operation::read_session(session / "session.log").value();
+    for (operation::SessionRecord& record : history.records) {
+      if (record.kind == "session" || record.kind == "guidance_ended") continue;
+      if (record.kind == "outcome") record.content.erase("depth");
+      if (record.kind == "guided") as_decided_earlier(record.content.at("guidance"));
+      if (record.kind == "result") measure_as_earlier(copy, record.content);
+      EXPECT_TRUE(log->append(record.kind, record.content));
+    }
+    return copy;
+  }
+  static void as_decided_earlier(Json& guidance) {
+    if (guidance.contains("aim")) guidance["aim"].erase("errors");
+    if (guidance.at("decision") != "uncertain") return;
+    const std::string message = guidance.at("message");
+    guidance["message"] = message.substr(0, message.find("; by "));
+  }
+  static void measure_as_earlier(const std::filesystem::path& session, Json& content) {
+    const std::filesystem::path file = session / content.at("folder").get<std::string>() / "result.json";
+    Json result = read_json(file).value();
+    for (Json& tunnel : result.at("verification"))
+      for (const char* key : {"beyond_end_mm", "depth_error_95_mm", "depth_tolerance_mm"}) tunnel.erase(key);
+    Json& warnings = result.at("warnings");
+    for (auto warning = warnings.begin(); warning != warnings.end();)
+      warning = warning->at("figures").contains("beyond_end_mm") ? warnings.erase(warning) : warning + 1;
+    EXPECT_TRUE(write_file(file, to_text(result)));
+    content["digest"] = operation::digest_of(result);
+    content["files"]["result.json"] = xray::digest(read_file(file, 1 << 26).value());
+  }
+
   TemporaryFolder folder_;
   std::unique_ptr<VirtualDevices> virtual_or_;
   std::unique_ptr<operation::Connections> devices_;
@@ -114,6 +163,110 @@ TEST_F(GuidedDrill, DecisionsFollowTheScene) {
   const auto replayed = operation::replay(folder_.path() / "session");
   ASSERT_TRUE(replayed) << replayed.error().message;
   EXPECT_TRUE(replayed->differences.empty()) << replayed->differences.front();
+  ASSERT_EQ(replayed->guidances.size(), 2u);
+  EXPECT_EQ(replayed->guidances.front().ended_by, "plan_stale");
+  EXPECT_FALSE(replayed->guidances.back().ended_s);  // the program ended without
+}
+
+TEST_F(GuidedDrill, TunnelDrilledTooDeepIsVerifiedWithItsDepth) {
+  EXPECT_TRUE(waits_for("off_target"));
+  const double length_mm = operation_->guidance()->aim.value().length_mm;
+  virtual_or_->drill().move("femur", virtual_or_->drill().on_tunnel("femur", length_mm + 1.8), 1);
+  Expected<operation::TunnelOutcome> outcome = fail(Reason::usage, "not tried");
+  repeat([&] { return (outcome = operation_->verify_drilled("femur")).has_value(); });
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  const guidance::TipDepth depth = outcome->depth().value();
+  const double true_mm =
+      -(virtual_or_->tracker_from_tip().inverse() * virtual_or_->simulated_scene().point_in_tracker("FS"))
+           .z();
+  EXPECT_NEAR(true_mm, 1.8, 1);
+  EXPECT_NEAR(depth.beyond_end_mm, true_mm, 4 * depth.sigma_mm + 0.3);  // the hand trembles
+  EXPECT_LT(depth.error_95_mm(), 1);
+  const pipeline::Result exported = operation_->measurement().value().result;
+  for (const pipeline::Result& stated : {*operation_->newest_result(), exported})
+    EXPECT_EQ(
+        depth.why_off("femur").has_value(),
+        std::ranges::find(stated.warnings, Reason::off_target, &Warning::reason) != stated.warnings.end());
+  EXPECT_TRUE(exported.verifications.front().depth);
+
+  EXPECT_TRUE(operation_->finish());
+  const auto replayed = operation::replay(folder_.path() / "session");
+  ASSERT_TRUE(replayed) << replayed.error().message;
+  EXPECT_TRUE(replayed->complete()) << fmt::format("{}", fmt::join(replayed->differences, "\n"));
+  EXPECT_EQ(replayed->guidances.front().ended_by, "verified");
+
+  const auto earlier = operation::replay(as_recorded_earlier());
+  ASSERT_TRUE(earlier) << earlier.error().message;
+  EXPECT_TRUE(earlier->complete()) << fmt::format("{}", fmt::join(earlier->differences, "\n"));
+  EXPECT_FALSE(earlier->guidances.front().ended_s);
+
+  auto of_another = records();
+  for (operation::SessionRecord& record : of_another)
+    if (record.kind == "outcome") record.content["tunnel"] = "tibia";
+  operation_.reset();
+  rewrite_record(folder_.path() / "session", of_another);
+  EXPECT_THAT(operation::replay(folder_.path() / "session")->differences,
+              testing::Contains(testing::HasSubstr("femur: ended as verified without an outcome")));
+}
+
+TEST_F(GuidedDrill, DrillIsVerifiedInTheGuidedTunnelOrWhereItIs) {
+  EXPECT_EQ(operation_->verify_drilled("tibia").error().reason, Reason::usage);
+  EXPECT_TRUE(operation_->guidance());  // goes on
+  EXPECT_TRUE(operation_->end_guidance());
+  repeat([&] {
+    const auto outcome = operation_->verify_drilled("femur");
+    return !outcome && outcome.error().reason == Reason::off_target;
+  });
+}
+
+TEST_F(GuidedDrill, WhatIsForgottenIsNotInForceWhereItCannotBeRecorded) {
+  ASSERT_TRUE(operation_->measurement());
+  {
+    const FullDisk full(log_bytes() + 10);
+    EXPECT_EQ(operation_->measure().error().reason, Reason::cannot_write);
+  }
+  EXPECT_EQ(operation_->measurement().error().reason, Reason::usage);
+  EXPECT_EQ(operation_->guidance().error().reason, Reason::usage);
+  EXPECT_TRUE(operation_->measure());
+}
+
+TEST_F(GuidedDrill, EndIsRecordedWhereThatOfTheGuidanceCannotBe) {
+  const std::uintmax_t before = log_bytes();
+  EXPECT_TRUE(operation_->end_guidance());
+  const std::uintmax_t line = log_bytes() - before - 10;  // longer than that of the operation's end
+  repeat([&] { return operation_->guide("femur", oldest_s).has_value(); });
+  {
+    const FullDisk full(log_bytes() + line);
+    EXPECT_EQ(operation_->finish().error().reason, Reason::cannot_write);
+  }
+  const auto replayed = operation::replay(folder_.path() / "session").value();
+  EXPECT_TRUE(replayed.complete()) << fmt::format("{}", fmt::join(replayed.differences, "\n"));
+  EXPECT_FALSE(replayed.guidances.back().ended_s);
+}
+
+TEST_F(GuidedDrill, RecordSaysByWhatGuidanceEnded) {
+  const auto guide = [&] { repeat([&] { return operation_->guide("femur", oldest_s).has_value(); }); };
+  guide();
+  EXPECT_TRUE(operation_->end_guidance());
+  guide();
+  repeat([&] { return take("AP"); });
+  EXPECT_TRUE(operation_->measure());
+  guide();
+  EXPECT_TRUE(operation_->finish());
+  const auto replayed = operation::replay(folder_.path() / "session");
+  ASSERT_TRUE(replayed) << replayed.error().message;
+  EXPECT_TRUE(replayed->complete()) << fmt::format("{}", fmt::join(replayed->differences, "\n"));
+  std::vector<std::string> ended_by;
+  for (const operation::GuidanceSpan& span : replayed->guidances) ended_by.push_back(span.ended_by);
+  EXPECT_EQ(ended_by, (std::vector<std::string>{"new_guidance", "person", "new_plan", "operation"}));
+
+  auto set_back = records();  // the clock, while the drill was guided
+  const auto end = std::ranges::find(set_back, "guidance_ended", &operation::SessionRecord::kind);
+  for (operation::SessionRecord& record : std::ranges::subrange(end, set_back.end())) record.time_s -= 3600;
+  operation_.reset();
+  rewrite_record(folder_.path() / "session", set_back);
+  const auto spans = operation::replay(folder_.path() / "session").value().guidances;
+  for (const operation::GuidanceSpan& span : spans) EXPECT_GE(span.ended_s.value(), span.begun_s);
 }
 
 TEST_F(GuidedDrill, GuidanceEndsWithItsRecord) {

@@ -198,11 +198,16 @@ void conduct(operation::Operation& operation, const Work& work) {
 }  // namespace
 
 void follow_guidance(const operation::Guidance& shown, virtual_devices::HeldDrill& drill, double seconds) {
-  constexpr double part = 0.5, advance_mm = 1.5;
+  constexpr double part = 0.5;
+  // Slower towards the end: what is shown lags behind the drill.
+  constexpr double advance_part = 0.15, least_advance_mm = 0.1, most_advance_mm = 1.5;
   if (!shown.aim) return;
   const operation::TunnelAim& aim = *shown.aim;
   const Eigen::AngleAxisd turn(geometry::rotation_between(Eigen::Vector3d::UnitZ(), aim.axis));
-  const double way_mm = shown.why_not || aim.depth_mm >= aim.length_mm ? 0 : advance_mm;
+  const double to_end_mm = aim.length_mm - aim.depth_mm;
+  const double way_mm = shown.why_not || to_end_mm <= 0
+                            ? 0
+                            : std::clamp(advance_part * to_end_mm, least_advance_mm, most_advance_mm);
   drill.correct({Eigen::AngleAxisd(part * turn.angle(), turn.axis()).toRotationMatrix(),
                  part * aim.to_axis_mm + way_mm * aim.axis},
                 seconds);

@@ -106,6 +106,16 @@ TEST(ReportHtml, RefusalBeforeTheFirstStageStillGivesAReport) {
   EXPECT_NE(html.find("blank_image"), std::string::npos);
 }
 
+TEST(ReportHtml, DepthOfADrillStandsBesideTheErrorsOfItsTunnel) {
+  pipeline::Result result = full_result();
+  EXPECT_EQ(report_html(result).find("Beyond end, mm"), std::string::npos);  // only of a drill
+  result.verifications = {{"femur", {}, {}, guidance::TipDepth{1.8, 0.25, 1}}};
+  const std::string html = report_html(result);
+  expect_balanced(html);
+  EXPECT_NE(html.find("Beyond end, mm"), std::string::npos);
+  EXPECT_NE(html.find("+1.80 ± 0.49"), std::string::npos);
+}
+
 TEST(OverlayName, UnsuitableNamesAreNumbered) {
   EXPECT_EQ(overlay_name("AP", 0), "AP_overlay.png");
   EXPECT_EQ(overlay_name("../x", 1), "view2_overlay.png");

@@ -40,7 +40,7 @@ ColumnOf<pipeline::PointResult> coordinate(const char* axis, Eigen::Index i) {
 ColumnOf<pipeline::PointResult> sigma(const char* axis, Eigen::Index i) {
   return {number(fmt::format("σ {}, mm", axis), "Standard deviation of the position along the axis, mm"),
           [i](const pipeline::PointResult& p) {
-            return Cell{p.place ? fixed(std::sqrt(std::max(0.0, p.place->covariance_in_calibrator(i, i))), 3)
+            return Cell{p.place ? fixed(std::sqrt(std::max(p.place->covariance_in_calibrator(i, i), 0.0)), 3)
                                 : "–"};
           }};
 }
@@ -126,7 +126,7 @@ Table positions_table(const std::vector<pipeline::PointResult>& points) {
   using Point = pipeline::PointResult;
   const double largest = largest_error_95(points);
   const auto error = [largest](const Point& p) {
-    return p.place ? Cell{fixed(error_95_of(p), 3), false, largest > 0 ? error_95_of(p) / largest : 0}
+    return p.place ? Cell{fixed(error_95_of(p), 3), false, error_95_of(p) > 0 ? error_95_of(p) / largest : 0}
                    : Cell{};
   };
   const auto gap = [](const Point& p) {
@@ -151,9 +151,11 @@ Table positions_table(const std::vector<pipeline::PointResult>& points) {
 
 std::vector<ToolAtEnd> tools_at_ends(const std::vector<guidance::Verification>& lines) {
   std::vector<ToolAtEnd> tools;
-  for (const guidance::Verification& line : lines)
+  for (const guidance::Verification& line : lines) {
     for (const auto& [end, error] : {std::pair{"start", &line.start}, {"end", &line.end}})
       if (*error) tools.push_back({line.name, end, {}, {}, *error});
+    if (line.depth) tools.push_back({line.name, "tip", {}, {}, {}, line.depth});
+  }
   return tools;
 }
 
@@ -299,7 +301,8 @@ Table verification_table(const std::vector<ToolAtEnd>& tools) {
   return table_of<ToolAtEnd>(
       "Verification",
       {{words("Tunnel", "Name of the tunnel"), [](const ToolAtEnd& t) { return Cell{t.tunnel}; }},
-       {words("End", "Start or end of the tunnel"), [](const ToolAtEnd& t) { return Cell{t.end}; }},
+       {words("End", "Start or end of the tunnel; tip: of a drill held by hand"),
+        [](const ToolAtEnd& t) { return Cell{t.end}; }},
        {number("Error, mm", "Distance of the end from the tool's axis by tracker and X-ray images, mm"),
         [](const ToolAtEnd& t) { return Cell{fixed(t.distance_mm, 2)}; }},
        {number("Predicted rms, mm", "Root mean square of that distance by the covariances, mm"),
@@ -309,7 +312,15 @@ Table verification_table(const std::vector<ToolAtEnd>& tools) {
        {number("Eq. 17, mm", "The same, converted to mm at the depth of the end"),
         in_images(&LineError::combined_mm)},
        {number("In space, mm", "Distance of the end from the tool's axis by the X-ray images alone, mm"),
-        in_images(&LineError::distance_mm)}},
+        in_images(&LineError::distance_mm)},
+       {number(
+            "Beyond end, mm",
+            "Of the drill's tip along the tunnel, negative before the planned end, with its 95 % error, mm"),
+        [](const ToolAtEnd& t) {
+          if (!t.depth) return Cell{};
+          return Cell{fmt::format("{:+.2f} ± {:.2f}", t.depth->beyond_end_mm, t.depth->error_95_mm()),
+                      t.depth->why_off(t.tunnel).has_value()};
+        }}},
       tools);
 }
 

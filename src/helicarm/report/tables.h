@@ -30,8 +30,9 @@ struct ToolAtEnd {
   std::string tunnel, end;
   std::optional<double> distance_mm, predicted_mm;  ///< with the tracker
   std::optional<guidance::LineError> in_images;
+  std::optional<guidance::TipDepth> depth = {};  ///< of a drill's tip
 };
-/// "start" and "end" of each tool line, where located.
+/// "start" and "end" of each tool line, where located, and "tip" of a drill whose depth was measured.
 std::vector<ToolAtEnd> tools_at_ends(const std::vector<guidance::Verification>& lines);
 
 /// A planned tunnel against the bone of its model.
