@@ -214,7 +214,7 @@ def row_of(bodies, kind, number):
 
 
 def is_false(row):
-    return row["kind"] in CONTROLS and (row["warns_of_part"] or bool({"metal", "broken"} & row["named"].keys()))
+    return row["kind"] in CONTROLS and (row.get("warns_of_part", False) or bool({"metal", "broken"} & row["named"].keys()))
 
 
 def table(rows):
@@ -229,7 +229,7 @@ def table(rows):
         figures = lambda values, digits=1: protocol.figures(values, (50,), digits)  # noqa: E731
         found = lambda key: figures([row["named"]["broken"][key] for row in broken])  # noqa: E731
         cells = [kind, len(own), sum(row["decision"] == "refuse" for row in own),
-                 sum(row["warns_of_part"] for row in own) if kind in FORCED else "-",
+                 sum(row.get("warns_of_part", False) for row in own) if kind in FORCED else "-",
                  sum(row["forced"] for row in own) if kind in FORCED else "-", count("cropped"), count("metal"), count("broken"),
                  *found("moved_mm"), *figures([row["moved_mm"] for row in broken]), *found("turned_deg"),
                  FRACTURE_DEG if broken else "-"]

@@ -19,6 +19,20 @@ bool can_register(const ApplicationState& state) {
   return state.has_models && state.measured && !state.result->failure;
 }
 
+std::shared_ptr<const case_registration::CaseRegistration> movable_models(const ApplicationState& state) {
+  return state.registration ? state.registration : state.at_starts;
+}
+
+bool is_placed(const ApplicationState& state, std::size_t model) {
+  return !state.registration && model < state.models.size() &&
+         std::ranges::find(state.starts_by_hand, state.models[model], &operation::ModelStart::model) !=
+             state.starts_by_hand.end();
+}
+
+bool has_poses_by_hand(const ApplicationState& state) {
+  return state.nudged || (!state.registration && !state.starts_by_hand.empty());
+}
+
 std::string missing_view(const ApplicationState& state) {
   for (const pipeline::ViewResult& view : state.result->views)
     if (!view.xray_image) return view.name;

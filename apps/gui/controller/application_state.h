@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "gui/controller/unsaved_landmarks.h"
 #include "helicarm/operation/operation.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/registration/motion.h"
@@ -36,10 +37,10 @@ enum class Phase { acquire, rectify, calibrate, plan, navigate, verify, registra
 inline constexpr std::array phases{Phase::acquire,  Phase::rectify, Phase::calibrate,   Phase::plan,
                                    Phase::navigate, Phase::verify,  Phase::registration};
 
-/// A registered model at a pose tried by hand.
+/// A model at a pose tried by hand.
 struct NudgedModel {
-  std::size_t model = 0;                                           ///< among those of the registration
-  registration::RigidStep step = registration::RigidStep::Zero();  ///< from its registered pose
+  std::size_t model = 0;                                           ///< among `movable_models`
+  registration::RigidStep step = registration::RigidStep::Zero();  ///< from its pose there
   geometry::RigidTransform world_from_model;
   std::vector<std::vector<Eigen::Vector2d>> outlines;  ///< per view, rectified px
 };
@@ -60,9 +61,6 @@ struct ExportRecord {
   std::vector<pipeline::Pick> picks;
 };
 
-/// Of each of the case's models, in its coordinates.
-using ModelLandmarks = std::vector<std::vector<pipeline::PointInModel>>;
-
 /// The state shown by the window, except live data. A value: the window receives complete states only.
 struct ApplicationState {
   Source source = Source::none;
@@ -71,7 +69,9 @@ struct ApplicationState {
   std::vector<std::string> views;        ///< required views, in order
   std::vector<ViewFile> files;           ///< of the views; empty in an operation
   std::string next_view;                 ///< view of the next image
-  phantom::Calibrator calibrator;
+  phantom::Calibrator calibrator;        ///< without balls where `cameras` are given
+  /// Of other programs, the file of each view: nothing is calibrated, and the world is theirs. Empty: none.
+  std::vector<std::filesystem::path> cameras = {};
   std::shared_ptr<const simulation::BoneMeshes> bones;  ///< at the acquisition; simulation only
 
   /// Images received and, after the measurement, their detections. Never null once a source is open.
@@ -98,18 +98,23 @@ struct ApplicationState {
 
   bool has_models = false;  ///< the case names models to be registered
   std::shared_ptr<const case_registration::CaseRegistration> registration = {};
+  /// The models where their search would begin, to be moved before the first registration.
+  std::shared_ptr<const case_registration::CaseRegistration> at_starts = {};
   std::optional<NudgedModel> nudged = {};
-  std::vector<operation::ModelStart> starts_by_hand = {};  ///< of the registration
-  std::vector<pipeline::Pick> registered_picks = {};       ///< at the registration
+  /// Of the registration; before the first one, of the models that stand in `at_starts` where they were
+  /// placed.
+  std::vector<operation::ModelStart> starts_by_hand = {};
+  std::vector<pipeline::Pick> registered_picks =
+      {};                     ///< at the registration; before the first, of `at_starts`
   bool is_confirmed = false;  ///< the registration, of an operation: a person compared the outlines
-  std::vector<std::string> models = {};                                  ///< names of the case's or plan's
-  std::vector<std::optional<std::filesystem::path>> model_volumes = {};  ///< their CTs
-  std::vector<pipeline::CaseModel> case_models = {};                     ///< of files only
-  ModelLandmarks model_landmarks = {};       ///< placed; at first those of the case
-  ModelLandmarks planned_points = {};        ///< of the models' plans
-  ModelLandmarks case_landmarks = {};        ///< of the case as it was read
-  ModelLandmarks saved_landmarks = {};       ///< of case.json
-  ModelLandmarks registered_landmarks = {};  ///< at the registration
+  std::vector<std::string> models = {};               ///< names of the case's or plan's
+  std::vector<pipeline::CaseModel> model_files = {};  ///< likewise
+  std::vector<pipeline::CaseModel> case_models = {};  ///< of files only
+  ModelLandmarks model_landmarks = {};                ///< placed; at first those of the case
+  ModelLandmarks planned_points = {};                 ///< of the models' plans
+  ModelLandmarks case_landmarks = {};                 ///< of the case as it was read
+  ModelLandmarks saved_landmarks = {};                ///< of case.json
+  ModelLandmarks registered_landmarks = {};           ///< as `registered_picks`
 
   std::optional<operation::HandDrill> drill = {};  ///< held by a person; the plan has no robot then
   double stand_off_mm = robot::ApproachOptions().stand_off_mm;  ///< before a tunnel
@@ -141,8 +146,17 @@ bool awaits_confirmation(const ApplicationState& state);
 /// Whether there are models and a measurement that was not refused, to which they can be registered.
 bool can_register(const ApplicationState& state);
 
+/// The registered models, else those at their starts: what can be moved by hand. Null if there are none.
+std::shared_ptr<const case_registration::CaseRegistration> movable_models(const ApplicationState& state);
+
 /// The first view without an image, else the first one.
 std::string missing_view(const ApplicationState& state);
+
+/// Whether this model was placed by hand before the first registration, and left there.
+bool is_placed(const ApplicationState& state, std::size_t model);
+
+/// Whether a model is moved or placed by hand, to be registered from there.
+bool has_poses_by_hand(const ApplicationState& state);
 
 /// Picks of this point in this view, or null.
 const pipeline::Pick* pick_of(const ApplicationState& state, const std::string& point,

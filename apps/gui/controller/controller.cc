@@ -38,20 +38,44 @@ void forget_measurement(ApplicationState& state) {
 void forget_registration(ApplicationState& state) {
   state.registration.reset();
   state.is_confirmed = false;
+  state.at_starts.reset();
   state.nudged.reset();
   state.starts_by_hand.clear();
 }
 
 /// Writes the DICOM report and registrations if images and volumes are of DICOM; returns what went wrong.
 QString dicom_written(const Equipment& equipment, const case_registration::Measurement& measured,
-                      const fs::path& folder) {
+                      const fs::path& folder, const fs::path& registrations) {
   fs::remove(folder / report::dicom_measurements_name);
   const std::optional<pipeline::Case>& the_case =
       equipment.operation ? equipment.operation->measured_case() : equipment.the_case;
   if (measured.result.failure || !the_case) return {};
-  const auto written =
-      case_registration::write_available_dicom(*the_case, measured, folder, folder / "registration");
+  const auto written = case_registration::write_available_dicom(*the_case, measured, folder, registrations);
   return written ? QString() : Controller::tr("the DICOM report: %1").arg(sentence_of(written.error()));
+}
+
+/// As `helicarm run` does; returns what could not be written.
+QString write_measured(const Equipment& equipment, const pipeline::Result& result,
+                       const std::optional<case_registration::CaseRegistration>& registration,
+                       const fs::path& folder) {
+  const pipeline::Result whole =
+      registration ? case_registration::with_models(result, *registration) : result;
+  report::forget_exports(folder);
+  value_or_throw(write_pdf_report(whole, folder / "report.pdf"));
+  if (!whole.failure) value_or_throw(report::write_exports(whole, folder));
+  value_or_throw(case_registration::write_models(registration, folder));
+  const QString lack = dicom_written(equipment, {whole, registration}, folder, folder / "registration");
+  value_or_throw(report::write_result(whole, folder));
+  return lack;
+}
+
+/// As `helicarm register` does, of views that bring cameras; returns what could not be written.
+QString write_registered(const Equipment& equipment, const case_registration::CaseRegistration& registration,
+                         const fs::path& folder) {
+  report::forget_registration(folder);
+  value_or_throw(case_registration::write_registration(registration, folder));
+  return dicom_written(equipment, {case_registration::with_models({}, registration), registration}, folder,
+                       folder);
 }
 
 }  // namespace
@@ -110,6 +134,7 @@ void Controller::finish(Phase phase, const Expected<Change>& done) {
   emit changed();
   if (!done) emit refused(phase, sentence_of(done.error()));
   if (std::exchange(measures_again_, false)) measure();
+  follow_record();
 }
 
 void Controller::meanwhile(Change change) {
@@ -122,10 +147,16 @@ void Controller::meanwhile(Change change) {
       Qt::QueuedConnection);
 }
 
+void Controller::show_step(const std::string& step) {
+  meanwhile([this, step](ApplicationState& state) {
+    if (!equipment_ || !equipment_->stopped) state.doing = step;
+  });
+}
+
 void Controller::set_options(const case_registration::RegisterOptions& options) {
   const bool differ = !case_registration::give_the_same(options_, options);
   options_ = options;
-  if (!differ || state_.source != Source::files || !state_.result) return;
+  if (!differ || state_.source != Source::files || !state_.result || state_.is_replayed) return;
   state_.has_other_options = true;
   emit changed();
   measure();
@@ -146,7 +177,9 @@ void Controller::shoot(const std::string& view) {
 void Controller::take_waiting_image() {
   const bool is_guiding = state_.drill && state_.busy == Phase::navigate;
   if (is_guiding && equipment_ && equipment_->devices->next_image(0))
-    return emit told(tr("An image that came while the drill is guided is kept in the session and not used."));
+    return emit told(
+        tr("An image that came while the drill is guided is kept in the session and not used: end the "
+           "guidance, then acquire it again."));
   if (state_.busy || !equipment_ || !equipment_->operation) return;
   const auto view_image = equipment_->devices->next_image(0);
   if (!view_image) return;
@@ -160,6 +193,7 @@ Controller::Change Controller::came(Equipment& equipment, const Expected<Images>
   const Change forget = [this](ApplicationState& state) {
     forget_measurement(state);
     forget_registration(state);
+    forget_registrations();
     live_tool_.reset();  // its lines belong to the previous images
   };
   if (!images) {  // an earlier image may have been found to be delayed
@@ -187,10 +221,11 @@ Controller::Change Controller::measured(Equipment& equipment, const std::vector<
   std::optional<operation::LiveTool> live;
   if (equipment.operation && !result->failure)
     if (auto follows = equipment.operation->live_tool()) live = *std::move(follows);
-  return [this, result, live, other_models, picks, options = equipment.options](ApplicationState& state) {
+  return [this, result, live, other_models, picks, options = equipment.options,
+          is_recorded = equipment.is_recorded](ApplicationState& state) {
     forget_measurement(state);
     state.measured_picks = picks;
-    state.has_other_options = !case_registration::give_the_same(options_, options);
+    state.has_other_options = !is_recorded && !case_registration::give_the_same(options_, options);
     if (other_models || result->failure) {
       forget_registration(state);
       forget_registrations();
@@ -212,6 +247,7 @@ Controller::Change Controller::measured(Equipment& equipment, const std::vector<
 
 void Controller::measure_again() {
   if (state_.changed_file.empty()) return measure();
+  if (state_.is_replayed) return open_recorded();
   open_case(state_.folder, state_.case_folder.has_value());
 }
 
@@ -220,7 +256,7 @@ void Controller::measure() {
   measures_again_ = state_.busy.has_value();
   begin(Phase::calibrate, "measuring",
         [this, equipment = equipment_, picks = state_.picks, options = options_] {
-          equipment->options = options;
+          if (!equipment->is_recorded) equipment->options = options;
           return measured(*equipment, picks);
         });
 }
@@ -234,6 +270,7 @@ bool Controller::has_all_images() const {
 void Controller::cancel() {
   if (!state_.busy || !equipment_) return;
   if (equipment_->devices && state_.busy == Phase::navigate) return stop();  // the robot too
+  if (state_.busy == Phase::registration) registers_recorded_ = false;
   if (equipment_->stopped.exchange(true)) return;
   state_.doing = "cancelling: " + state_.doing;
   emit changed();
@@ -244,6 +281,9 @@ void Controller::export_to(const fs::path& folder) {
     emit refused(Phase::verify, tr("Nothing to export: measure first."));
     return;
   }
+  const bool has_cameras = !state_.cameras.empty();
+  if (has_cameras && !state_.registration)
+    return emit refused(Phase::verify, tr("Nothing to export: register the models first (Alt+7)."));
   if (state_.busy)
     return emit refused(*state_.busy, tr("Nothing is exported during other work (%1): export again after it.")
                                           .arg(QString::fromStdString(state_.doing)));
@@ -263,16 +303,10 @@ void Controller::export_to(const fs::path& folder) {
   if (state_.registration) registration = present_registration(state_);
   begin(Phase::verify, "writing the report",
         [this, equipment = equipment_, result = std::move(result), registration = std::move(registration),
-         folder, record = std::move(record)]() mutable -> Change {
-          const pipeline::Result whole =
-              registration ? case_registration::with_models(result, *registration) : result;
-          report::forget_exports(folder);
-          value_or_throw(write_pdf_report(whole, folder / "report.pdf"));
-          if (!whole.failure) value_or_throw(report::write_exports(whole, folder));
-          value_or_throw(case_registration::write_models(registration, folder));
-          if (const QString lack = dicom_written(*equipment, {whole, registration}, folder); !lack.isEmpty())
-            record.lacks << lack;
-          value_or_throw(report::write_result(whole, folder));
+         folder, record = std::move(record), has_cameras]() mutable -> Change {
+          const QString lack = has_cameras ? write_registered(*equipment, *registration, folder)
+                                           : write_measured(*equipment, result, registration, folder);
+          if (!lack.isEmpty()) record.lacks << lack;
           return [this, record](ApplicationState& state) {
             state.exported = record;
             emit exported(QString::fromStdString(record.folder.string()));

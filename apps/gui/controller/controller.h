@@ -12,6 +12,7 @@
 #include "gui/controller/worker.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/operation/connections.h"
+#include "helicarm/operation/session_records.h"
 #include "helicarm/registration/motion.h"
 #include "helicarm/virtual_devices/virtual_devices.h"
 
@@ -31,6 +32,14 @@ struct LiveState {
   std::optional<Expected<operation::TunnelAim>> aim;     ///< empty without a tunnel
   std::optional<operation::Guidance> drill;              ///< in a person's hand, while it is guided
   std::optional<Failure> stale;  ///< why the displayed path can no longer be confirmed
+};
+
+/// A measurement of a recorded operation, and the registration of its models that stood at a moment.
+struct RecordedMoment {
+  std::filesystem::path case_folder;
+  operation::OperationPlan plan;
+  std::optional<operation::record::Registered> models = {};
+  bool is_confirmed = false;  ///< that registration
 };
 
 /// Operations available to the window. Work runs in a separate thread; its results arrive as `changed`. Lives
@@ -56,6 +65,12 @@ class Controller : public QObject {
   /// A case folder, without tracker and robot.
   /// `keeps_picks`: changed picks are kept beside case.json, and those kept are taken.
   void open_case(const std::filesystem::path& folder, bool keeps_picks = true);
+  /// Opens the measurement, unless it is open, by the operation's plan, and registers its models as recorded:
+  /// from the files of the session, and refused (replay_differs) where that gives another registration.
+  void show_recorded(RecordedMoment moment);
+  /// A moment before the first measurement: the recorded case, if one is open or being opened, is shown
+  /// without a registration.
+  void show_unregistered();
   /// Image files for looking, without a case.
   void open_images(const std::vector<std::filesystem::path>& files);
   /// Why opening another source or closing would lose something; empty if it would not.
@@ -105,14 +120,20 @@ class Controller : public QObject {
   /// Reads the case again if a file of it has changed.
   void measure_again();
 
-  /// Registers the models of a measured case or operation, the nudged one from its present pose.
+  /// Registers the models of a measured case or operation, those moved or placed by hand from there.
   void register_models();
   /// After a person has compared the outlines with the bones: the tunnels of an operation's models guide the
   /// tool from then on.
   void confirm_registration();
-  /// Moves a registered model from its registered pose, about its centre; its outlines follow as soon as they
-  /// are computed. `continues`: as a part of the move before, for undo.
+  /// Shows the models where their search would begin, for `nudge` before the first registration.
+  void place_models();
+  /// Moves a model from its registered pose or its start, about its centre; its outlines follow as soon as
+  /// they are computed. `continues`: as a part of the move before, for undo.
+  /// A model moved earlier stays there before the first registration; after it, it returns to its
+  /// registered pose.
   void nudge(std::size_t model, const registration::RigidStep& step, bool continues = false);
+  /// Models moved or placed by hand return to their registered poses or their starts.
+  void return_models();
 
   void unlock(const std::string& who);
   void register_robot();
@@ -159,11 +180,12 @@ class Controller : public QObject {
     std::vector<operation::OperationTunnel> tunnels;
     std::vector<std::string> landmarks;
     std::map<std::string, pipeline::BoneLabel> bones_of;
-    std::shared_ptr<const case_registration::CaseRegistration> registration;
+    std::shared_ptr<const case_registration::CaseRegistration> registration, at_starts;
     Picks registered_picks;
     std::optional<NudgedModel> nudged;
     ModelLandmarks model_landmarks, registered_landmarks;
     std::vector<operation::ModelStart> starts_by_hand;
+    bool of_models = false;
   };
 
   void begin(Phase phase, std::string doing, std::function<Change()> work);
@@ -174,11 +196,14 @@ class Controller : public QObject {
                        const std::filesystem::path& folder);
   /// From any thread: a state change during the work.
   void meanwhile(Change change);
+  /// From any thread: what the work in progress does now, unless it is being cancelled.
+  void show_step(const std::string& step);
   void take_waiting_image();
   void change_picks(Picks picks, bool measurable, const QString& what);
   Edit edit_named(const QString& what) const;
-  void remember_edit(const QString& what);
-  /// Registrations to other calibrated views are not returned to.
+  /// `of_models`: nothing but their poses changes.
+  void remember_edit(const QString& what, bool of_models = false);
+  /// Neither registrations to other calibrated views nor moves from them are returned to.
   void forget_registrations();
   void step_edits(std::vector<Edit>& from, std::vector<Edit>& to);
   void picks_changed(bool measurable);
@@ -197,8 +222,18 @@ class Controller : public QObject {
   Expected<QStringList> save_landmarks();
   void watch_files_of(const std::filesystem::path& case_folder);
   void watch_no_files();
+  void leave_where_placed();
+  /// The starts of models that are not placed by hand follow picks and landmarks.
+  void forget_old_starts();
+  /// The moved model, and those left where they were placed before their outlines were there.
   void outline_nudged();
+  std::optional<NudgedModel> not_outlined() const;
+  void take_outlines(const NudgedModel& of, const std::vector<std::vector<Eigen::Vector2d>>& outlines);
   void register_in_operation();
+  void open_recorded();
+  /// Shows the registration that stood at the recorded moment.
+  void follow_record();
+  void register_as_recorded();
   std::vector<operation::ModelStart> starts_by_hand() const;
   /// Null for a tunnel that is not known and, told then, for one of a model while a model is moved by hand.
   const operation::OperationTunnel* tunnel_not_moved(const std::string& name);
@@ -212,7 +247,14 @@ class Controller : public QObject {
   std::optional<operation::PlanWatch> plan_watch_;  ///< of the displayed path
   std::string followed_;
   std::vector<Edit> earlier_, later_;  ///< for undo and redo, the last is the next
-  bool outlining_ = false;             ///< of the nudged model
+  bool outlining_ = false;             ///< of a model moved by hand
+  std::optional<RecordedMoment> recorded_;
+  bool opens_recorded_ = false;      ///< the source asked for, at `recorded_`
+  bool registers_recorded_ = false;  ///< until cancelled
+  struct {
+    std::string digest;  ///< of the record
+    Expected<std::shared_ptr<const case_registration::CaseRegistration>> done = nullptr;
+  } as_recorded_;                      ///< registered last
   bool measures_again_ = false;        ///< after the work in progress
   std::function<void()> next_source_;  ///< opened as soon as the work in progress has ended
   case_registration::RegisterOptions options_;

@@ -93,6 +93,7 @@ void Controller::remove_landmark(std::size_t model, const std::string& name) {
 
 void Controller::landmarks_changed() {
   keep_landmarks();
+  forget_old_starts();
   emit changed();
 }
 

@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <QElapsedTimer>
-#include <QGuiApplication>
-#include <QThread>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "gui/controller/case_with_model_test.h"
-#include "gui/controller/controller.h"
+#include "gui/controller/controller_fixtures_test.h"
 #include "gui/controller/model_landmarks.h"
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
@@ -22,20 +17,12 @@ namespace landmarks_test {
 
 using testing::HasSubstr;
 
-constexpr int patience_ms = 600000;
-
 const std::vector<pipeline::PointInModel> in_bone{
     {"tip", {-3.1, -2.2, 38}}, {"lateral, \"low\"", {29.3, 4, -26}}, {"medial", {-29, 14.5, 24.25}}};
 
-class ControllerLandmarks : public testing::Test {
+class ControllerLandmarks : public ControllerWithModel {
  protected:
-  static void SetUpTestSuite() {
-    written_ = std::make_unique<TemporaryFolder>();
-    truth_ = write_case_with_model(written_->path());
-  }
-  static void TearDownTestSuite() { written_.reset(); }
-
-  ControllerLandmarks() : app_(argc_, argv_) {
+  ControllerLandmarks() {
     fs::copy(written_->path(), folder_.path(), fs::copy_options::recursive);
     open();
   }
@@ -46,19 +33,8 @@ class ControllerLandmarks : public testing::Test {
     QObject::connect(controller_.get(), &Controller::refused,
                      [this](Phase, const QString& why) { refused_ << why; });
     controller_->open_case(folder_.path());
-    wait([&] { return !state().busy; });
+    ASSERT_TRUE(idle());
     ASSERT_TRUE(state().measured);
-  }
-  const ApplicationState& state() { return controller_->state(); }
-  template <class Done>
-  void wait(const Done& done) {
-    QElapsedTimer since;
-    since.start();
-    while (!done() && since.elapsed() < patience_ms) {
-      QCoreApplication::processEvents();
-      QThread::msleep(5);
-    }
-    ASSERT_TRUE(done()) << state().doing;
   }
   void place(std::size_t count = 3) {
     for (std::size_t i = 0; i < count; ++i) controller_->place_landmarks(0, {in_bone[i]});
@@ -74,12 +50,7 @@ class ControllerLandmarks : public testing::Test {
           view.rectification->map.raw_from_rectified(view.calibrated->view.project(truth_ * point.in_model));
       controller_->pick(pick);
     }
-    wait([&] { return !state().busy; });
-  }
-  void register_models() {
-    controller_->register_models();
-    wait([&] { return !state().busy; });
-    ASSERT_TRUE(state().registration) << refused_.join('\n').toStdString();
+    ASSERT_TRUE(idle());
   }
   const case_registration::RegisteredModel& found() { return state().registration->models.at(0); }
   Json case_file() { return read_json(folder_.path() / "case.json").value(); }
@@ -91,14 +62,6 @@ class ControllerLandmarks : public testing::Test {
     open();
   }
 
-  static inline std::unique_ptr<TemporaryFolder> written_;
-  static inline geometry::RigidTransform truth_;
-  int argc_ = 1;
-  char name_[5] = "ctrl";
-  char* argv_[2] = {name_, nullptr};
-  QGuiApplication app_;
-  TemporaryFolder folder_;
-  std::unique_ptr<Controller> controller_;
   QStringList told_, refused_;
 };
 
@@ -109,7 +72,7 @@ TEST_F(ControllerLandmarks, ThreePickedOnesStartTheRegistrationInsteadOfAWrongSt
   EXPECT_EQ(next_landmark(state())->point, "tip");
   for (const auto& point : in_bone) pick(point);
   EXPECT_THAT(landmark_start_words(state(), 0).toStdString(), HasSubstr("starts from its 3 landmarks"));
-  register_models();
+  ASSERT_TRUE(register_models());
   EXPECT_FALSE(found().registration.failure);
   EXPECT_EQ(found().used_landmarks.size(), 3U);
   EXPECT_LT((found().registration.world_from_model.translation - truth_.translation).norm(), 1);
@@ -121,7 +84,7 @@ TEST_F(ControllerLandmarks, WithFewerTheCasesStartIsUsedAndTheLackIsStated) {
   pick(in_bone[2]);
   EXPECT_THAT(landmark_start_words(state(), 0).toStdString(),
               HasSubstr("bone: 2 of its placed landmarks are picked in two X-ray images, 1 more must be"));
-  register_models();
+  ASSERT_TRUE(register_models());
   EXPECT_TRUE(found().used_landmarks.empty());
   EXPECT_LT((found().registration.world_from_model.translation - truth_.translation).norm(), 1);
 }
@@ -164,7 +127,7 @@ TEST_F(ControllerLandmarks, UndoAndRedoReturnThem) {
 TEST_F(ControllerLandmarks, ARegistrationIsOutOfDateOnceOneMovesInTheModel) {
   place();
   for (const auto& point : in_bone) pick(point);
-  register_models();
+  ASSERT_TRUE(register_models());
   EXPECT_EQ(stale_model(state(), 0), "");
   controller_->place_landmarks(0, {{"tip", in_bone[0].in_model + Eigen::Vector3d(1, 0, 0)}});
   EXPECT_THAT(stale_model(state(), 0).toStdString(), HasSubstr("tip has been moved in the model"));
@@ -173,6 +136,16 @@ TEST_F(ControllerLandmarks, ARegistrationIsOutOfDateOnceOneMovesInTheModel) {
   EXPECT_EQ(stale_model(state(), 0), "");
   controller_->remove_landmark(0, "medial");
   EXPECT_THAT(stale_model(state(), 0).toStdString(), HasSubstr("medial"));
+}
+
+TEST_F(ControllerLandmarks, StartsOfOtherLandmarksAreNoLongerDisplayed) {
+  place();
+  for (const auto& point : in_bone) pick(point);
+  controller_->place_models();
+  ASSERT_TRUE(idle());
+  ASSERT_TRUE(state().at_starts);
+  controller_->place_landmarks(0, {{"tip", in_bone[0].in_model + Eigen::Vector3d(1, 0, 0)}});
+  EXPECT_FALSE(state().at_starts);
 }
 
 TEST_F(ControllerLandmarks, SavedOnesAreTheStartOfTheCase) {
@@ -237,7 +210,7 @@ TEST_F(ControllerLandmarks, NamesAreCheckedAndChanged) {
   EXPECT_EQ(state().model_landmarks[0].size(), 3U);
   pick(in_bone[0]);
   controller_->rename_landmark(0, "tip", "apex");
-  wait([&] { return !state().busy; });
+  ASSERT_TRUE(idle());
   EXPECT_EQ(state().model_landmarks[0][0].name, "apex");
   EXPECT_EQ(views_with(state().picks, "apex"), 2);
   EXPECT_EQ(views_with(state().picks, "tip"), 0);

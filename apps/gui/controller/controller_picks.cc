@@ -17,6 +17,7 @@ Controller::Edit Controller::edit_named(const QString& what) const {
           state_.landmarks,
           state_.bones_of,
           state_.registration,
+          state_.at_starts,
           state_.registered_picks,
           state_.nudged,
           state_.model_landmarks,
@@ -24,17 +25,24 @@ Controller::Edit Controller::edit_named(const QString& what) const {
           state_.starts_by_hand};
 }
 
-void Controller::remember_edit(const QString& what) {
+void Controller::remember_edit(const QString& what, bool of_models) {
   earlier_.push_back(edit_named(what));
+  earlier_.back().of_models = of_models;
   later_.clear();
 }
 
 void Controller::forget_registrations() {
-  for (auto* edits : {&earlier_, &later_})
+  for (auto* edits : {&earlier_, &later_}) {
+    std::erase_if(*edits, [](const Edit& edit) { return edit.of_models; });
     for (Edit& edit : *edits) {
       edit.registration.reset();
+      edit.at_starts.reset();
+      edit.registered_picks.clear();
       edit.nudged.reset();
+      edit.registered_landmarks.clear();
+      edit.starts_by_hand.clear();
     }
+  }
 }
 
 void Controller::change_picks(Picks picks, bool measurable, const QString& what) {
@@ -49,6 +57,7 @@ void Controller::step_edits(std::vector<Edit>& from, std::vector<Edit>& to) {
   Edit edit = std::move(from.back());
   from.pop_back();
   to.push_back(edit_named(edit.what));
+  to.back().of_models = edit.of_models;
   const bool other_picks = !are_same(edit.picks, state_.picks);
   state_.picks = std::move(edit.picks);
   state_.tunnels = std::move(edit.tunnels);
@@ -58,13 +67,13 @@ void Controller::step_edits(std::vector<Edit>& from, std::vector<Edit>& to) {
     state_.model_landmarks = std::move(edit.model_landmarks);
     keep_landmarks();
   }
-  if (!is_operation(state_)) {
+  const bool returns = !is_operation(state_) && !state_.is_replayed;  // to another registration
+  if (returns || edit.registration == state_.registration) {
     state_.registration = std::move(edit.registration);
+    state_.at_starts = std::move(edit.at_starts);
     state_.registered_picks = std::move(edit.registered_picks);
     state_.registered_landmarks = std::move(edit.registered_landmarks);
     state_.starts_by_hand = std::move(edit.starts_by_hand);
-    state_.nudged = std::move(edit.nudged);
-  } else if (edit.registration == state_.registration) {  // an operation returns to no earlier one
     state_.nudged = std::move(edit.nudged);
     state_.order.reset();
     state_.path = {};
@@ -88,7 +97,10 @@ void Controller::keep_unsaved_picks() {
 }
 
 void Controller::save_picks() {
-  if (!state_.case_folder || !takes_picks()) return;
+  if (!state_.case_folder) return;
+  if (!takes_picks())
+    return emit told(tr("Nothing is saved during other work (%1): save again after it.")
+                         .arg(QString::fromStdString(state_.doing)));
   std::vector<pipeline::CaseTunnel> tunnels;
   for (const operation::OperationTunnel& tunnel : state_.tunnels)
     tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
@@ -135,6 +147,7 @@ void Controller::leave_out_tunnels() {
 void Controller::picks_changed(bool measurable) {
   state_.order.reset();
   state_.path = {};
+  forget_old_starts();
   emit changed();
   if (measurable) measure();
 }

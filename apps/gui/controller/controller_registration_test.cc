@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <QElapsedTimer>
-#include <QGuiApplication>
-#include <QThread>
+#include <limits>
 
 #include <gtest/gtest.h>
 
-#include "gui/controller/case_with_model_test.h"
-#include "gui/controller/controller.h"
+#include "gui/controller/controller_fixtures_test.h"
 #include "gui/controller/equipment.h"
 #include "gui/controller/steps.h"
 #include "helicarm/case_registration/register_case.h"
@@ -17,53 +14,21 @@ namespace helicarm::gui {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int patience_ms = 600000;
-
-class ControllerRegistration : public testing::Test {
+class ControllerRegistration : public ControllerWithModel {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
-    truth_ = write_case_with_model(folder_->path());
-  }
-  static void TearDownTestSuite() { folder_.reset(); }
-
-  ControllerRegistration() : app_(argc_, argv_), controller_(std::make_unique<Controller>()) {
-    controller_->open_case(folder_->path(), false);
-    wait([&] { return !state().busy; });
+  ControllerRegistration() {
+    controller_->open_case(written_->path(), false);
+    idle();
   }
 
-  const ApplicationState& state() { return controller_->state(); }
   StepCard card() { return steps_of(state())[std::size_t(Phase::registration)]; }
-  template <class Done>
-  void wait(const Done& done) {
-    QElapsedTimer since;
-    since.start();
-    while (!done() && since.elapsed() < patience_ms) {
-      QCoreApplication::processEvents();
-      QThread::msleep(5);
-    }
-    ASSERT_TRUE(done()) << state().doing;
-  }
-  void register_models() {
-    controller_->register_models();
-    wait([&] { return !state().busy; });
-  }
   const registration::Registration& found() { return state().registration->models.at(0).registration; }
-
-  static inline std::unique_ptr<TemporaryFolder> folder_;
-  static inline geometry::RigidTransform truth_;
-  int argc_ = 1;
-  char name_[5] = "ctrl";
-  char* argv_[2] = {name_, nullptr};
-  QGuiApplication app_;
-  std::unique_ptr<Controller> controller_;
 };
 
 TEST_F(ControllerRegistration, RegistersTheModelsAndStartsFromANudgedPose) {
   ASSERT_TRUE(state().measured);
   EXPECT_TRUE(card().is_offered);
-  register_models();
-  ASSERT_TRUE(state().registration) << card().why.toStdString();
+  ASSERT_TRUE(register_models());
   EXPECT_LT((found().world_from_model.translation - truth_.translation).norm(), 1);
   EXPECT_EQ(state().registration->models[0].points.size(), 2u);
   const auto first = state().registration;
@@ -74,20 +39,20 @@ TEST_F(ControllerRegistration, RegistersTheModelsAndStartsFromANudgedPose) {
   ASSERT_TRUE(state().nudged);
   EXPECT_NEAR((state().nudged->world_from_model.translation - found().world_from_model.translation).norm(), 3,
               1e-9);
-  wait([&] { return state().nudged->outlines != first->models[0].outlines; });
+  ASSERT_TRUE(
+      wait("the outlines follow", [&] { return state().nudged->outlines != first->models[0].outlines; }));
   EXPECT_EQ(state().nudged->outlines.size(), 2u);
-  register_models();
+  ASSERT_TRUE(register_models());
   EXPECT_FALSE(state().nudged);
   ASSERT_NE(state().registration, first);
   EXPECT_LT((found().world_from_model.translation - truth_.translation).norm(), 1);
 }
 
 TEST_F(ControllerRegistration, ExportsTheTunnelsOfTheModels) {
-  register_models();
-  ASSERT_TRUE(state().registration) << card().why.toStdString();
+  ASSERT_TRUE(register_models());
   const TemporaryFolder out;
   controller_->export_to(out.path());
-  wait([&] { return !state().busy; });
+  ASSERT_TRUE(idle());
   const Json result = read_json(out.path() / "result.json").value();
   ASSERT_EQ(result["tunnels"].size(), 1u);
   EXPECT_EQ(result["tunnels"][0]["name"], "tunnel");
@@ -106,17 +71,17 @@ TEST_F(ControllerRegistration, AsksForNoPicksWhereModelsBringTheTunnels) {
 }
 
 TEST_F(ControllerRegistration, ExportsAModelMovedByHandAsRefusedWithoutItsPlan) {
-  register_models();
-  ASSERT_TRUE(state().registration) << card().why.toStdString();
+  ASSERT_TRUE(register_models());
   registration::RigidStep step = registration::RigidStep::Zero();
   step.tail<3>() << 5, 0, 0;
   controller_->nudge(0, step);
   EXPECT_EQ(card().status, StepStatus::stale);
-  wait(
-      [&] { return state().nudged && state().nudged->outlines != state().registration->models[0].outlines; });
+  ASSERT_TRUE(wait("the outlines follow", [&] {
+    return state().nudged && state().nudged->outlines != state().registration->models[0].outlines;
+  }));
   const TemporaryFolder out;
   controller_->export_to(out.path());
-  wait([&] { return !state().busy; });
+  ASSERT_TRUE(idle());
   const Json models = read_json(out.path() / "registration.json").value();
   EXPECT_EQ(models["models"][0]["decision"], "refuse");
   EXPECT_EQ(models["models"][0]["failure"]["code"], "plan_stale");
@@ -127,15 +92,14 @@ TEST_F(ControllerRegistration, ExportsAModelMovedByHandAsRefusedWithoutItsPlan) 
 }
 
 TEST_F(ControllerRegistration, OtherSettingsMeasureTheCaseAgain) {
-  register_models();
-  ASSERT_TRUE(state().registration) << card().why.toStdString();
+  ASSERT_TRUE(register_models());
   case_registration::RegisterOptions options;
   options.run.motion_sigma_mm = 0.5;
   const int before = state().measurements;
   controller_->set_options(options);
   EXPECT_TRUE(state().has_other_options);
   EXPECT_EQ(card().status, StepStatus::stale);
-  wait([&] { return !state().busy; });
+  ASSERT_TRUE(idle());
   EXPECT_FALSE(state().has_other_options);
   EXPECT_EQ(state().measurements, before + 1);
   EXPECT_FALSE(state().registration);
@@ -145,19 +109,19 @@ TEST_F(ControllerRegistration, AChangedFileOfTheCasePutsEveryStepOutOfDateUntilI
   const TemporaryFolder own;
   write_case_with_model(own.path());
   controller_->open_case(own.path());
-  wait([&] { return !state().busy; });
+  ASSERT_TRUE(idle());
   ASSERT_TRUE(state().measured);
   Json json = read_json(own.path() / "case.json").value();
   json["notes"] = "changed";
   ASSERT_TRUE(write_file(own.path() / "case.json", to_text(json)));
-  wait([&] { return !state().changed_file.empty(); });
+  ASSERT_TRUE(wait("the change is noticed", [&] { return !state().changed_file.empty(); }));
   const auto status = [&](Phase phase) { return steps_of(state())[std::size_t(phase)].status; };
   for (const Phase phase : {Phase::acquire, Phase::rectify, Phase::calibrate})
     EXPECT_EQ(status(phase), StepStatus::stale);
   controller_->export_to(own.path() / "export");
   EXPECT_FALSE(state().busy);
   controller_->measure_again();
-  wait([&] { return state().measured && !state().busy; });
+  ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
   EXPECT_TRUE(state().changed_file.empty());
   EXPECT_EQ(status(Phase::calibrate), StepStatus::good);
 }
@@ -178,7 +142,7 @@ TEST_F(ControllerRegistration, AnOwnCalibratorIsNotAskedForTheKneesTunnels) {
   json.erase("tool_lines");
   ASSERT_TRUE(write_file(own.path() / "case.json", to_text(json)));
   controller_->open_case(own.path(), false);
-  wait([&] { return !state().busy; });
+  ASSERT_TRUE(idle());
   ASSERT_TRUE(state().result) << steps_of(state())[0].why.toStdString();
   EXPECT_TRUE(state().tunnels.empty());
 }
@@ -186,7 +150,7 @@ TEST_F(ControllerRegistration, AnOwnCalibratorIsNotAskedForTheKneesTunnels) {
 TEST_F(ControllerRegistration, CancelEndsIt) {
   controller_->register_models();
   controller_->cancel();
-  wait([&] { return !state().busy; });
+  ASSERT_TRUE(idle());
   EXPECT_FALSE(state().registration);
   EXPECT_EQ(state().refusals.at(Phase::registration).reason, Reason::interrupted);
   EXPECT_EQ(card().status, StepStatus::waiting);
@@ -194,7 +158,7 @@ TEST_F(ControllerRegistration, CancelEndsIt) {
 
 TEST_F(ControllerRegistration, CancelDuringTheSearchEndsIt) {
   Equipment equipment;
-  equipment.the_case = pipeline::read_case(folder_->path()).value();
+  equipment.the_case = pipeline::read_case(written_->path()).value();
   ASSERT_TRUE(measure(equipment, {}));
   std::vector<std::string> told;
   const auto done = gui::register_models(equipment, {}, {}, {}, [&](const std::string& step) {
@@ -207,7 +171,7 @@ TEST_F(ControllerRegistration, CancelDuringTheSearchEndsIt) {
 }
 
 TEST_F(ControllerRegistration, UndoTakesBackMovesLandmarksAndRegistrations) {
-  register_models();
+  ASSERT_TRUE(register_models());
   const auto first = state().registration;
   ASSERT_TRUE(first);
   registration::RigidStep step = registration::RigidStep::Zero();
@@ -228,7 +192,7 @@ TEST_F(ControllerRegistration, UndoTakesBackMovesLandmarksAndRegistrations) {
   controller_->redo();
   ASSERT_TRUE(state().nudged);
   EXPECT_EQ(state().nudged->step, step);
-  register_models();
+  ASSERT_TRUE(register_models());
   ASSERT_NE(state().registration, first);
   EXPECT_FALSE(state().nudged);
   controller_->undo();
@@ -237,15 +201,14 @@ TEST_F(ControllerRegistration, UndoTakesBackMovesLandmarksAndRegistrations) {
 }
 
 TEST_F(ControllerRegistration, UndoReturnsToNoRegistrationOfOtherViews) {
-  register_models();
-  ASSERT_TRUE(state().registration);
+  ASSERT_TRUE(register_models());
   registration::RigidStep step = registration::RigidStep::Zero();
   step[3] = 1;
   controller_->nudge(0, step);
   case_registration::RegisterOptions options;
   options.run.motion_sigma_mm = 0.5;
   controller_->set_options(options);
-  wait([&] { return !state().busy; });
+  ASSERT_TRUE(idle());
   ASSERT_FALSE(state().registration);
   while (controller_->can_undo()) {
     controller_->undo();
@@ -273,6 +236,19 @@ TEST(Steps, RegistrationShowsTheErrorOfItsWorstModel) {
   model.registration.covariance.diagonal().setConstant(0.04);
   EXPECT_EQ(card_of(model).figure, "within 0.56 mm (95 %)");  // 0.2 sqrt(7.815)
   EXPECT_EQ(card_of(model).status, StepStatus::good);
+}
+
+TEST(Steps, ErrorsThatAreNotKnownAreStatedBesideTheLargestKnown) {
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(largest_error_words({0.25, 0.5}), "within 0.50 mm (95 %)");
+  EXPECT_EQ(largest_error_words({0.5, unknown}), "within 0.50 mm (95 %), others not known");
+  EXPECT_EQ(largest_error_words({unknown, 0.5}), "within 0.50 mm (95 %), others not known");
+  EXPECT_EQ(largest_error_words({unknown}), "errors not known");
+  case_registration::RegisteredModel model;
+  model.points.resize(2);
+  model.points[0].place.covariance_in_calibrator = 0.04 * Eigen::Matrix3d::Identity();
+  model.points[1].place.covariance_in_calibrator.setConstant(unknown);
+  EXPECT_EQ(card_of(model).figure, "within 0.56 mm (95 %), others not known");
 }
 
 TEST(Steps, RegistrationShowsWhyAModelIsRefused) {

@@ -62,6 +62,13 @@ QString order_words(const robot::RobotOrder& order, const operation::PathPreview
       .arg(speed_mm_s, 0, 'f', 0);
 }
 
+/// What the decision was made of.
+Expected<operation::TunnelAim> aim_of(const operation::Guidance& guidance) {
+  if (!guidance.aim || (guidance.why_not && guidance.why_not->reason == Reason::stale_pose))
+    return tl::unexpected<Failure>(*guidance.why_not);
+  return *guidance.aim;
+}
+
 }  // namespace
 
 void Controller::touch(const std::string& check_point) {
@@ -155,7 +162,7 @@ void Controller::guide_drill(const std::string& tunnel) {
                 };
             std::this_thread::sleep_for(std::chrono::duration<double>(look_s));
           }
-          equipment->operation->end_guidance();
+          value_or_throw(equipment->operation->end_guidance());
           return [](ApplicationState& state) { state.refusals.erase(Phase::navigate); };
         });
 }
@@ -271,7 +278,9 @@ LiveState Controller::live() const {
   }
   now.aim = is_stale(state_, tunnel->start) || is_stale(state_, tunnel->end)
                 ? fail(Reason::plan_stale, followed_ + ": its picks have changed since the measurement")
-                : live_tool_->aim(board, followed_);
+            : now.drill    ? aim_of(*now.drill)
+            : state_.drill ? operation::mean_aim(*live_tool_, equipment_->tracker, *tunnel, board, now.at_s)
+                           : live_tool_->aim(board, followed_);
   return now;
 }
 

@@ -9,7 +9,7 @@
 #include "gui/controller/unsaved_picks.h"
 #include "helicarm/core/private_files.h"
 #include "helicarm/operation/plan_fields.h"
-#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/case_purpose.h"
 #include "helicarm/rehearsal/ct_plan.h"
 #include "helicarm/rehearsal/rehearse.h"
 
@@ -108,6 +108,7 @@ void Controller::open(Source source, const fs::path& folder, std::string doing,
                   .arg(QString::fromStdString(state_.case_folder->string()),
                        unsaved_files(*state_.case_folder).join(tr(" and "))));
   auto old = std::exchange(equipment_, nullptr);
+  opens_recorded_ = false;
   live_tool_.reset();
   earlier_.clear();
   later_.clear();
@@ -135,7 +136,7 @@ void Controller::start_operation(Equipment& equipment, operation::OperationPlan 
                                  const fs::path& folder) {
   equipment.tracker = plan.tracker;
   const auto notify = [this](operation::Step step, const std::string& what) {
-    meanwhile([words = words_of(step) + what](ApplicationState& state) { state.doing = words; });
+    show_step(words_of(step) + what);
   };
   const tracker::PoseBoard& board = equipment.devices->board();
   equipment.operation =
@@ -206,10 +207,8 @@ Controller::Change Controller::with_plan(const operation::OperationPlan& plan,
     state.stand_off_mm = plan.robot.approach.stand_off_mm;
     state.offered_picks = offered;
     state.has_models = !models.empty();
-    for (const pipeline::CaseModel& model : models) {
-      state.models.push_back(model.name);
-      state.model_volumes.push_back(model.volume);
-    }
+    for (const pipeline::CaseModel& model : models) state.models.push_back(model.name);
+    state.model_files = models;
     Images none(plan.views.size());
     for (std::size_t i = 0; i < none.size(); ++i) none[i].name = plan.views[i];
     state.result = result_with(std::move(none));
@@ -220,7 +219,9 @@ Controller::Change Controller::with_plan(const operation::OperationPlan& plan,
 void Controller::open_case(const fs::path& folder, bool keeps_picks) {
   open(Source::files, folder, "reading " + folder.filename().string(),
        [=, this](Equipment& equipment) -> Change {
-         pipeline::Case the_case = value_or_throw(pipeline::read_case(folder));
+         pipeline::Case the_case = value_or_throw(pipeline::read_any_case(folder));
+         if (pipeline::brings_cameras(the_case))
+           the_case.calibrator = {};  // of another world, and not looked for
          if (!keeps_picks)
            return [this, landmarks = opened_landmarks(the_case, false),
                    change = with_case(std::move(the_case), equipment)](ApplicationState& state) {
@@ -293,16 +294,14 @@ Controller::Change Controller::with_case(pipeline::Case the_case, Equipment& equ
   const std::vector<ViewFile> files = files_of(the_case);
   const Change found = measured(equipment, unsaved.value_or(the_case.picks));
   std::vector<std::string> models;
-  std::vector<std::optional<fs::path>> volumes;
-  for (const pipeline::CaseModel& model : the_case.models) {
-    models.push_back(model.name);
-    volumes.push_back(model.volume ? std::optional(the_case.folder / *model.volume) : std::nullopt);
-  }
+  for (const pipeline::CaseModel& model : the_case.models) models.push_back(model.name);
   return [this, the_case = std::move(the_case), unsaved = std::move(unsaved), files, found,
-          models = std::move(models), volumes = std::move(volumes)](ApplicationState& state) {
+          models = std::move(models)](ApplicationState& state) {
     for (const pipeline::CaseView& view : the_case.views) state.views.push_back(view.name);
     state.files = files;
     state.calibrator = the_case.calibrator;
+    for (const pipeline::CaseView& view : the_case.views)
+      if (view.camera) state.cameras.push_back(*view.camera);
     state.tunnels = tunnels_of(the_case, unsaved.value_or(the_case.picks));
     state.picks = unsaved.value_or(the_case.picks);
     state.has_unsaved_picks = unsaved.has_value();
@@ -315,7 +314,7 @@ Controller::Change Controller::with_case(pipeline::Case the_case, Equipment& equ
     found(state);
     state.has_models = !models.empty();
     state.models = models;
-    state.model_volumes = volumes;
+    state.model_files = the_case.models;
     state.case_models = the_case.models;
   };
 }

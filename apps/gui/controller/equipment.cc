@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/case_registration/camera_case.h"
 #include "helicarm/pipeline/new_case.h"
 #include "helicarm/xray/read_xray_image.h"
 
@@ -106,7 +107,10 @@ pipeline::Case with_picks(pipeline::Case the_case, const std::vector<pipeline::P
 Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipeline::Pick>& picks) {
   if (equipment.the_case) {
     const pipeline::Case picked = with_picks(*equipment.the_case, picks);
-    auto measured = pipeline::measure_again(equipment.measurement, picked, equipment.options.run);
+    auto measured =
+        pipeline::brings_cameras(picked)
+            ? case_registration::measure_with_cameras(equipment.measurement, picked, equipment.options.run)
+            : pipeline::measure_again(equipment.measurement, picked, equipment.options.run);
     if (!measured) return tl::unexpected<Failure>(measured.error());
     equipment.measurement = *std::move(measured);
     return *equipment.measurement;

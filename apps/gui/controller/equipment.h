@@ -41,6 +41,7 @@ struct Equipment {
   std::optional<pipeline::Case> the_case;
   std::optional<pipeline::Result> measurement;  ///< of `given`
   case_registration::RegisterOptions options;
+  bool is_recorded = false;  ///< the case, of an operation, whose plan gives the options
   std::optional<case_registration::RegisterOptions> registered_by;  ///< of the registered models
   std::optional<robot::RobotOrder> last_order;
   robot::RobotState rest;  ///< the robot's state before the order
@@ -74,6 +75,12 @@ Expected<case_registration::CaseRegistration> register_models(
     Equipment& equipment, const std::vector<pipeline::Pick>& picks, const ModelLandmarks& landmarks,
     const std::vector<operation::ModelStart>& starts,
     const std::function<void(const std::string& step)>& tell);
+
+/// The models where their search would begin, by the calibration of `measured`, to be moved by hand.
+Expected<case_registration::CaseRegistration> models_at_starts(Equipment& equipment,
+                                                               const pipeline::Result& measured,
+                                                               const std::vector<pipeline::Pick>& picks,
+                                                               const ModelLandmarks& landmarks);
 
 /// Images of files, for looking; each with its file.
 struct LooseImages {

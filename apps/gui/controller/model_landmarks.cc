@@ -13,6 +13,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
+#include "helicarm/pipeline/case_purpose.h"
 #include "helicarm/registration/landmarks.h"
 
 namespace helicarm::gui {
@@ -28,54 +29,7 @@ QString landmark_tr(const char* words) { return QCoreApplication::translate("Lan
 
 QString in_words(const std::string& name) { return QString::fromStdString(name); }
 
-bool are_same_points(const Points& a, const Points& b) {
-  return std::ranges::equal(a, b, [](const PointInModel& one, const PointInModel& other) {
-    return one.name == other.name && one.in_model == other.in_model;
-  });
-}
-
-fs::path unsaved_landmarks_file(const fs::path& case_folder) {
-  return case_folder / "unsaved_landmarks.json";
-}
-
-const Points& of_model(const ModelLandmarks& landmarks, std::size_t model) {
-  static const Points none;
-  return model < landmarks.size() ? landmarks[model] : none;
-}
-
-constexpr Range place_range{-1e5, 1e5};  // mm, wider than every scanner's coordinates
-constexpr int least_views = 2;           // whose rays meet in a point
-
-/// The landmarks of one model of unsaved_landmarks.json.
-Points points_from(JsonReader& model) {
-  Points points;
-  for (JsonReader& point : model.objects("landmarks", true)) {
-    PointInModel read;
-    read.name = point.text("name");
-    const std::vector<double> at = point.numbers("in_model", 3, place_range);
-    read.in_model = {at[0], at[1], at[2]};
-    point.finish();
-    if (std::ranges::find(points, read.name, &PointInModel::name) != points.end())
-      point.refuse(Reason::name_clash, "name", fmt::format("\"{}\" is given twice", read.name));
-    points.push_back(std::move(read));
-  }
-  return points;
-}
-
-/// Models that the case does not name any more are left out.
-ModelLandmarks with_unsaved(const Json& json, const std::vector<CaseModel>& models,
-                            ModelLandmarks landmarks) {
-  JsonReader reader(json, "unsaved_landmarks.json");
-  for (JsonReader& model : reader.objects("models", true)) {
-    const std::string name = model.text("name");
-    Points points = points_from(model);
-    model.finish();
-    const auto same = std::ranges::find(models, name, &CaseModel::name);
-    if (same != models.end()) landmarks[std::size_t(same - models.begin())] = std::move(points);
-  }
-  reader.finish();
-  return landmarks;
-}
+constexpr int least_views = 2;  // whose rays meet in a point
 
 /// NAME-landmarks.csv with the characters of a portable file name, numbered where another file has it.
 std::string csv_name(const fs::path& case_folder, const CaseModel& of, const Json& model,
@@ -154,10 +108,6 @@ bool has_point(const Points& points, const std::string& name) {
 
 }  // namespace
 
-bool are_same(const ModelLandmarks& a, const ModelLandmarks& b) {
-  return std::ranges::equal(a, b, are_same_points);
-}
-
 ModelLandmarks landmarks_of_models(const std::vector<CaseModel>& models) {
   ModelLandmarks landmarks;
   for (const CaseModel& model : models)
@@ -173,34 +123,13 @@ OpenedLandmarks opened_landmarks(const pipeline::Case& the_case, bool keeps) {
         model.plan ? case_registration::read_plan(*model.plan) : Expected<case_registration::MarkupPlan>();
     opened.planned.push_back(plan ? plan->points : Points());
   }
-  const fs::path file = unsaved_landmarks_file(the_case.folder);
-  if (!keeps || the_case.models.empty() || !fs::exists(file)) return opened;
-  auto unsaved = read_json(file).and_then([&](const Json& json) {
-    return guarded([&] { return with_unsaved(json, the_case.models, opened.of_case); });
-  });
+  if (!keeps || the_case.models.empty()) return opened;
+  auto unsaved = unsaved_landmarks(the_case.folder, the_case.models, opened.of_case);
   if (!unsaved)
     opened.unreadable = std::move(unsaved.error());
-  else if (!are_same(*unsaved, opened.of_case))
+  else if (*unsaved && !are_same(**unsaved, opened.of_case))
     opened.unsaved = *std::move(unsaved);
   return opened;
-}
-
-Expected<void> keep_unsaved_landmarks(const fs::path& case_folder, const std::vector<CaseModel>& models,
-                                      const ModelLandmarks& placed, const ModelLandmarks& saved) {
-  const fs::path file = unsaved_landmarks_file(case_folder);
-  Json changed = Json::array();
-  for (std::size_t i = 0; i < models.size(); ++i) {
-    if (are_same_points(of_model(placed, i), of_model(saved, i))) continue;
-    Json points = Json::array();
-    for (const PointInModel& point : of_model(placed, i))
-      points.push_back(
-          {{"name", point.name}, {"in_model", {point.in_model.x(), point.in_model.y(), point.in_model.z()}}});
-    changed.push_back({{"name", models[i].name}, {"landmarks", std::move(points)}});
-  }
-  if (!changed.empty()) return write_file_in_folder(file, to_text({{"models", std::move(changed)}}) + "\n");
-  std::error_code gone;
-  fs::remove(file, gone);
-  return {};
 }
 
 int views_with(const std::vector<pipeline::Pick>& picks, const std::string& point) {
@@ -226,7 +155,7 @@ Expected<SavedLandmarks> save_landmarks(const fs::path& case_folder, const std::
     std::map<std::string, std::string> tables;  // by file
     for (std::size_t i = 0; i < models.size(); ++i) {
       const Points& points = of_model(placed, i);
-      if (are_same_points(points, of_model(saved, i))) continue;
+      if (are_same(points, of_model(saved, i))) continue;
       const std::size_t usable = count_usable(points, picks);
       if (usable < registration::least_landmarks) {
         done.told.push_back(not_saved_words(models[i].name, usable));
@@ -242,7 +171,7 @@ Expected<SavedLandmarks> save_landmarks(const fs::path& case_folder, const std::
       tables.emplace(name, to_csv(points));
     }
     if (json) {
-      value_or_throw(pipeline::case_from_json(*json, "case.json", case_folder));
+      value_or_throw(pipeline::case_from_json(*json, "case.json", case_folder, pipeline::purpose_of(*json)));
       for (const auto& [name, table] : tables)
         value_or_throw(write_file_in_folder(case_folder / name, table));
       value_or_throw(write_file_in_folder(file, to_text(*json) + "\n"));
@@ -259,7 +188,7 @@ void start_from_landmarks(pipeline::Case& the_case, const ModelLandmarks& placed
   for (std::size_t i = 0; i < placed.size(); ++i) {
     CaseModel& model = the_case.models[i];
     const bool is_moved = std::ranges::find(moved, model.name, &operation::ModelStart::model) != moved.end();
-    if (is_moved || are_same_points(placed[i], of_case[i]) ||
+    if (is_moved || are_same(placed[i], of_case[i]) ||
         count_usable(placed[i], the_case.picks) < registration::least_landmarks)
       continue;
     model.placed_landmarks = placed[i];
@@ -317,7 +246,7 @@ std::string free_landmark_name(const ApplicationState& state, std::size_t model,
 QString landmark_start_words(const ApplicationState& state, std::size_t model) {
   const Points& placed = of_model(state.model_landmarks, model);
   if (placed.empty() || model >= state.models.size() ||
-      are_same_points(placed, of_model(state.case_landmarks, model)))
+      are_same(placed, of_model(state.case_landmarks, model)))
     return {};
   const std::size_t usable = count_usable(placed, state.picks);
   const QString name = in_words(state.models[model]);

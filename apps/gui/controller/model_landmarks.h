@@ -8,12 +8,11 @@
 #include <vector>
 
 #include "gui/controller/application_state.h"
+#include "gui/controller/unsaved_landmarks.h"
 
 /// Landmarks that a person places in a case's models. Three of them that are picked in two views each start a
-/// model's registration. Until they are in case.json they are kept in unsaved_landmarks.json beside it.
+/// model's registration. Until they are in case.json `keep_unsaved_landmarks` keeps them.
 namespace helicarm::gui {
-
-bool are_same(const ModelLandmarks& a, const ModelLandmarks& b);
 
 /// Of each model, those of its start; none where their file cannot be read, which the registration refuses.
 ModelLandmarks landmarks_of_models(const std::vector<pipeline::CaseModel>& models);
@@ -27,11 +26,6 @@ struct OpenedLandmarks {
 };
 /// `keeps`: those that were kept are taken.
 OpenedLandmarks opened_landmarks(const pipeline::Case& the_case, bool keeps);
-
-/// Keeps those that differ from the saved ones; removes the file where none does. Fails as `write_file`.
-Expected<void> keep_unsaved_landmarks(const std::filesystem::path& case_folder,
-                                      const std::vector<pipeline::CaseModel>& models,
-                                      const ModelLandmarks& placed, const ModelLandmarks& saved);
 
 /// Whether this many views show picks of the point, by which its rays meet.
 int views_with(const std::vector<pipeline::Pick>& picks, const std::string& point);

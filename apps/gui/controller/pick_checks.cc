@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "helicarm/pipeline/middle.h"
 #include "helicarm/pipeline/points.h"
 
 namespace helicarm::gui {
@@ -14,8 +15,9 @@ std::optional<Failure> looked_for(const ApplicationState& state, const pipeline:
   if (!view.calibrated || !view.rectification || !view.xray_image || !view.dots) return std::nullopt;
   if (!view.rectification->map.shows(pick.uv_raw))
     return Failure{Reason::not_seen, "the pick lies outside the image", view.name, {}};
-  auto seen = pipeline::observe_pick(pick, *view.xray_image, view.rectification->map, view.dots->noise,
-                                     *view.calibrated, phantom::middle_of(state.calibrator));
+  auto seen =
+      pipeline::observe_pick(pick, *view.xray_image, view.rectification->map, view.dots->noise,
+                             *view.calibrated, pipeline::middle_of(state.calibrator, state.result->views));
   if (seen) return std::nullopt;
   seen.error().view = view.name;
   return seen.error();

@@ -67,6 +67,12 @@ bool is_moved(const ApplicationState& state, std::size_t model) {
   return state.nudged && state.nudged->model == model;
 }
 
+bool has_old_starts(const ApplicationState& state) {
+  return state.at_starts && !state.registration &&
+         !(are_same(state.picks, state.registered_picks) &&
+           are_same(state.model_landmarks, state.registered_landmarks));
+}
+
 QString stale(const ApplicationState& state, Phase phase) {
   if (!state.changed_file.empty())
     return stale_tr("%1 has changed since it was read: F5 measures again")
@@ -183,6 +189,9 @@ QStringList lacks_of_export(const ApplicationState& state) {
   points.insert(points.end(), state.landmarks.begin(), state.landmarks.end());
   for (const std::string& point : points)
     if (const QString lack = lack_of(state, point); !lack.isEmpty()) lacks << lack;
+  const auto is_located = [](const pipeline::PointResult& point) { return point.place.has_value(); };
+  if (!state.cameras.empty() && std::ranges::any_of(state.result->points, is_located))
+    lacks << stale_tr("the located points: helicarm locate writes those of given cameras");
   if (state.has_models && !state.registration) lacks << stale_tr("the models are not registered");
   if (awaits_confirmation(state)) lacks << stale_tr("the registration of the models is not confirmed");
   if (state.registration)

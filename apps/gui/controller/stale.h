@@ -16,6 +16,9 @@ bool is_stale(const ApplicationState& state, const std::string& point);
 /// Whether this model of the registration is at a pose tried by hand.
 bool is_moved(const ApplicationState& state, std::size_t model);
 
+/// Whether picks or landmarks have changed since the models' starts were found for `at_starts`.
+bool has_old_starts(const ApplicationState& state);
+
 /// Why a model of the registration is not at a pose registered from the present inputs; empty if it is.
 QString stale_model(const ApplicationState& state, std::size_t model);
 

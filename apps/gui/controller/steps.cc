@@ -3,6 +3,7 @@
 
 #include <QCoreApplication>
 #include <algorithm>
+#include <cmath>
 
 #include "gui/controller/controller.h"
 #include "gui/controller/stale.h"
@@ -61,11 +62,17 @@ void rectify(StepCard& card, const ApplicationState& state) {
     bent = bent || !done.map.is_identity();
     worst = std::max(worst, done.map.residual_rms_px);
   }
-  card.figure = bent ? tr("residual %1 px rms").arg(worst, 0, 'f', 3) : tr("flat panel");
+  card.figure = bent                    ? tr("residual %1 px rms").arg(worst, 0, 'f', 3)
+                : state.cameras.empty() ? tr("flat panel")
+                                        : tr("taken as undistorted");
   doubt(card, warnings_of(state, Phase::rectify));
 }
 
 void calibrate(StepCard& card, const ApplicationState& state) {
+  if (!state.cameras.empty() && state.measured) {
+    card.figure = tr("cameras given");
+    return doubt(card, warnings_of(state, Phase::calibrate));
+  }
   int used = 0;
   std::size_t balls = 0;
   for (const pipeline::ViewResult& view : state.result->views) {
@@ -92,15 +99,12 @@ void plan(StepCard& card, const ApplicationState& state) {
     card.why = tr("click %1 in %2").arg(text(wanted->point), text(wanted->view));
     return;
   }
-  double worst = 0;
-  int located = 0;
+  std::vector<double> errors_mm;
   if (state.registration)
     for (const case_registration::RegisteredModel& model : state.registration->models)
       if (!model.registration.failure)
-        for (const case_registration::RegisteredPoint& point : model.points) {
-          ++located;
-          worst = std::max(worst, localization::length_at_95(point.place.covariance_in_calibrator));
-        }
+        for (const case_registration::RegisteredPoint& point : model.points)
+          errors_mm.push_back(localization::length_at_95(point.place.covariance_in_calibrator));
   for (const pipeline::PointResult& point : state.result->points) {
     if (point.source != localization::PointSource::pick) continue;
     if (point.reason) {
@@ -108,17 +112,17 @@ void plan(StepCard& card, const ApplicationState& state) {
       card.why = text(point.name + ": ") + sentence_of(*point.reason);
       return;
     }
-    if (!point.place) continue;
-    ++located;
-    worst = std::max(worst, localization::length_at_95(point.place->covariance_in_calibrator));
+    if (point.place) errors_mm.push_back(localization::length_at_95(point.place->covariance_in_calibrator));
   }
-  if (located == 0) {
+  if (errors_mm.empty()) {
     card.why = !state.picks.empty()                      ? tr("not measured yet")
-               : state.has_models && !state.registration ? tr("register the models (Alt+7)")
+               : state.has_models && !state.registration ? state.is_replayed
+                                                               ? tr("no model is registered at this moment")
+                                                               : tr("register the models (Alt+7)")
                                                          : tr("add a landmark to locate a point");
     return;
   }
-  card.figure = tr("within %1 mm (95 %)").arg(worst, 0, 'f', 2);
+  card.figure = largest_error_words(errors_mm);
   doubt(card, warnings_of(state, Phase::plan));
   if (state.failed_picks.empty()) return;
   card.status = StepStatus::warning;
@@ -128,7 +132,8 @@ void plan(StepCard& card, const ApplicationState& state) {
 
 void navigate(StepCard& card, const ApplicationState& state) {
   if (state.source == Source::files && !state.hand_eye_rms_mm) {  // a replay has a registration
-    card.why = tr("images from files: no robot");
+    card.why =
+        state.is_replayed ? tr("no robot is registered at this moment") : tr("images from files: no robot");
     return;
   }
   if (state.drill) {
@@ -219,14 +224,22 @@ void verify(StepCard& card, const ApplicationState& state) {
   card.figure = tr("%1 mm (predicted %2)").arg(worst, 0, 'f', 2).arg(expected, 0, 'f', 2);
   if (state.outcomes.size() == state.tunnels.size()) settle(card, {});
   warn_off_plan(card, worst);
+  for (const auto& [name, outcome] : state.outcomes)
+    if (const auto depth = outcome.depth())
+      if (const auto off = depth->why_off(name)) {
+        card.status = StepStatus::warning;
+        card.why = sentence_of(*off);
+      }
 }
 
 void registered(StepCard& card, const ApplicationState& state) {
   if (!state.registration) {
-    card.why = tr("register the models");
+    card.why = state.is_replayed          ? tr("no model is registered at this moment")
+               : has_poses_by_hand(state) ? tr("register the moved model from here")
+                                          : tr("register the models");
     return;
   }
-  double worst = 0;
+  std::vector<double> errors_mm;
   std::vector<Warning> warnings;
   for (const case_registration::RegisteredModel& model : state.registration->models) {
     const registration::Registration& found = model.registration;
@@ -236,12 +249,12 @@ void registered(StepCard& card, const ApplicationState& state) {
       return;
     }
     if (model.points.empty())
-      worst = std::max(worst, localization::length_at_95(found.covariance.bottomRightCorner<3, 3>()));
+      errors_mm.push_back(localization::length_at_95(found.covariance.bottomRightCorner<3, 3>()));
     for (const case_registration::RegisteredPoint& point : model.points)
-      worst = std::max(worst, localization::length_at_95(point.place.covariance_in_calibrator));
+      errors_mm.push_back(localization::length_at_95(point.place.covariance_in_calibrator));
     warnings.insert(warnings.end(), found.warnings.begin(), found.warnings.end());
   }
-  card.figure = tr("within %1 mm (95 %)").arg(worst, 0, 'f', 2);
+  card.figure = largest_error_words(errors_mm);
   doubt(card, warnings);
   if (!awaits_confirmation(state)) return;
   card.status = StepStatus::waiting;
@@ -265,6 +278,18 @@ Phase phase_of(pipeline::Stage stage) {
       return Phase::registration;
   }
   return Phase::acquire;
+}
+
+QString largest_error_words(const std::vector<double>& errors_95_mm) {
+  double largest = 0;
+  bool all_known = true;
+  for (const double error : errors_95_mm) {
+    all_known = all_known && std::isfinite(error);
+    if (std::isfinite(error)) largest = std::max(largest, error);
+  }
+  if (largest <= 0) return tr("errors not known");
+  return (all_known ? tr("within %1 mm (95 %)") : tr("within %1 mm (95 %), others not known"))
+      .arg(largest, 0, 'f', 2);
 }
 
 QString sentence_of(const Failure& failure) {

@@ -36,6 +36,9 @@ Phase phase_of(pipeline::Stage stage);
 /// Whether a person ended the work, which is no refusal of the data; a stopped robot is one.
 bool is_cancelled(Phase phase, const Failure& refusal);
 
+/// "within the largest (95 %)", of 95 % errors in mm of which some (NaN), or all, may not be known.
+QString largest_error_words(const std::vector<double>& errors_95_mm);
+
 /// As text, with its code.
 QString sentence_of(const Failure& failure);
 

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/operation/replay.h"
 
 namespace helicarm::gui {
 namespace {
@@ -118,16 +119,44 @@ struct Summary {
         .arg(text(guided.tunnel), millimetres(now.aim->distance_mm),
              QString::number(now.aim->angle_deg, 'f', 1), decision);
   }
+  QString operator()(const record::GuidanceEnded& ended) const {
+    using enum record::GuidanceEndedBy;
+    const QString by = [&] {
+      switch (ended.by) {
+        case verified:
+          return TimelineWords::tr("verified");
+        case person:
+          return TimelineWords::tr("by the person");
+        case plan_stale:
+          return TimelineWords::tr("begun again after plan_stale");
+        case new_guidance:
+          return TimelineWords::tr("another guidance begins");
+        case new_plan:
+          return TimelineWords::tr("images, measurement or registration are others now");
+        case operation:
+          return TimelineWords::tr("end of the operation");
+      }
+      return QString();
+    }();
+    return TimelineWords::tr("Guidance to %1 ended: %2").arg(text(ended.tunnel), by);
+  }
   QString operator()(const record::Outcome& outcome) const {
-    return TimelineWords::tr("Check of %1: start %2 mm, end %3 mm from the tool's axis")
-        .arg(text(outcome.tunnel), millimetres(outcome.start.distance_mm()),
-             millimetres(outcome.end.distance_mm()));
+    const QString check = TimelineWords::tr("Check of %1: start %2 mm, end %3 mm from the tool's axis")
+                              .arg(text(outcome.tunnel), millimetres(outcome.start.distance_mm()),
+                                   millimetres(outcome.end.distance_mm()));
+    return outcome.depth ? TimelineWords::tr("%1; tip %2").arg(check, text(words_of(*outcome.depth))) : check;
   }
   QString operator()(const record::End& end) const {
     return end.why ? TimelineWords::tr("End of the operation: %1").arg(text(*end.why))
                    : TimelineWords::tr("End of the operation");
   }
 };
+
+const OperationPlan& recorded_plan(const Timeline& timeline) {
+  for (const Moment& moment : timeline.moments)
+    if (const auto* record = std::get_if<record::Plan>(&moment.record)) return record->plan;
+  throw BadInput(Reason::usage, "the record holds no plan");
+}
 
 /// The state after a record, which holds what the record says.
 struct Take {
@@ -140,13 +169,31 @@ struct Take {
       if (!samples.empty()) state.tracker_from[tool] = samples.back().tracker_from_tool;
   }
 
+  void forget_models() const {
+    state.models.reset();
+    state.is_confirmed = false;
+  }
+  void forget_outcome(const std::string& tunnel) const {
+    state.outcomes.erase(tunnel);
+    state.loops.erase(tunnel);
+  }
+  void forget_measurement() const {
+    state.measured = false;
+    state.guidance.reset();
+    state.outcomes.clear();
+    state.loops.clear();
+    forget_models();
+  }
+
   template <class Other>
   void operator()(const Other&) const {}
   void operator()(const record::Exposure& exposure) const {
+    see(exposure.window);
     std::erase(state.exposures, exposure.view);
     state.exposures.push_back(exposure.view);
+    if (!is_accepted(exposure, recorded_plan(timeline))) return;
     state.exposed_at[exposure.view] = number;
-    see(exposure.window);
+    forget_measurement();
   }
   void operator()(const record::HandEye& hand_eye) const {
     state.registered_at = number;
@@ -165,26 +212,38 @@ struct Take {
     state.guidance = guided.guidance;
     see(guided.window);
   }
-  void operator()(const record::CaseBegun& begun) const {
-    state.case_folder = value_or_throw(path_inside(timeline.session, begun.folder));
-    state.measured = false;
+  void operator()(const record::GuidanceEnded&) const { state.guidance.reset(); }
+  void operator()(const record::Refused& refused) const {
+    if (!refused.picture) forget_measurement();  // an earlier image was found to be delayed
   }
-  void operator()(const record::Measured&) const { state.measured = true; }
+  void operator()(const record::Registered& registered) const {
+    forget_models();
+    state.models = registered;
+    // That of the measurement, in which the folder lies: the newest may be of a verification.
+    state.case_folder = value_or_throw(path_inside(timeline.session, registered.folder)).parent_path();
+    for (const OperationTunnel& tunnel : recorded_plan(timeline).tunnels)
+      if (tunnel.of_model) forget_outcome(tunnel.name);
+  }
+  void operator()(const record::RegistrationConfirmed&) const { state.is_confirmed = true; }
+  void operator()(const record::CaseBegun& begun) const {
+    if (begun.verifies.empty()) forget_measurement();
+  }
+  void operator()(const record::Measured& measured) const {
+    if (state.models) return;  // of a verification, by the images and models of the measurement
+    state.case_folder = value_or_throw(path_inside(timeline.session, measured.folder));
+    state.measured = true;
+  }
   void operator()(const record::Navigated& navigated) const {
     state.loops[navigated.tunnel] = navigated.loop;
   }
   void operator()(const record::Outcome& outcome) const {
     state.outcomes.insert_or_assign(
-        outcome.tunnel,
-        TunnelOutcome{outcome.tunnel, state.loops[outcome.tunnel], outcome.start, outcome.end, {}});
+        outcome.tunnel, TunnelOutcome{outcome.tunnel, state.loops[outcome.tunnel], outcome.start, outcome.end,
+                                      outcome.depth ? std::optional(guidance::Verification{
+                                                          outcome.tunnel, {}, {}, outcome.depth})
+                                                    : std::nullopt});
   }
 };
-
-const OperationPlan& plan_of(const Timeline& timeline) {
-  for (const Moment& moment : timeline.moments)
-    if (const auto* record = std::get_if<record::Plan>(&moment.record)) return record->plan;
-  throw BadInput(Reason::usage, "the record holds no plan");
-}
 
 }  // namespace
 
@@ -215,6 +274,10 @@ Expected<Timeline> read_timeline(const std::filesystem::path& session) {
   });
 }
 
+Expected<OperationPlan> plan_of(const Timeline& timeline) {
+  return guarded([&] { return recorded_plan(timeline); });
+}
+
 Expected<SessionState> state_at(const Timeline& timeline, std::size_t index) {
   return guarded([&] {
     SessionState state;
@@ -227,7 +290,7 @@ Expected<SessionState> state_at(const Timeline& timeline, std::size_t index) {
 Expected<operation::LiveTool> tool_of(const Timeline& timeline, const SessionState& state,
                                       const pipeline::Result& result) {
   return guarded([&] {
-    const OperationPlan& plan = plan_of(timeline);
+    const OperationPlan& plan = recorded_plan(timeline);
     if (!state.measured || (!plan.drill && !state.registered_at))
       throw BadInput(Reason::usage, "no measurement or no registration before this moment");
     std::vector<guidance::Poses> exposures;
@@ -247,7 +310,7 @@ Expected<operation::LiveTool> tool_of(const Timeline& timeline, const SessionSta
 Expected<operation::ToolOverlay> overlay_of(const operation::LiveTool& tool, const Timeline& timeline,
                                             const SessionState& state) {
   return guarded([&] {
-    const OperationPlan& plan = plan_of(timeline);
+    const OperationPlan& plan = recorded_plan(timeline);
     const auto pose = [&](const std::string& marker) -> std::optional<geometry::RigidTransform> {
       const auto seen = state.tracker_from.find(marker);
       return seen == state.tracker_from.end() ? std::nullopt : std::optional(seen->second);

@@ -39,22 +39,28 @@ struct Timeline {
 
 /// State of the operation after a moment.
 struct SessionState {
-  std::vector<std::string> exposures;                            ///< views in order of acquisition
-  std::optional<std::filesystem::path> case_folder;              ///< the newest case: images and case.json
-  bool measured = false;                                         ///< the newest case has a result
+  std::vector<std::string> exposures;  ///< views in order of acquisition
+  /// The newest case with a result: images and case.json. A verification by registered models leaves theirs.
+  std::optional<std::filesystem::path> case_folder;
+  bool measured = false;                                         ///< by the newest images
   std::map<std::string, geometry::RigidTransform> tracker_from;  ///< the newest pose of each tool
   std::map<std::string, std::vector<robot::Miss>> loops;         ///< the closed loop, by tunnel
   std::map<std::string, operation::TunnelOutcome> outcomes;      ///< the check that follows it, by tunnel
-  std::map<std::string, std::size_t> exposed_at;                 ///< moment of each view's acquisition
+  std::map<std::string, std::size_t> exposed_at;                 ///< moment of each view's newest image taken
   std::optional<std::size_t> registered_at;                      ///< moment of the latest registration
   std::optional<double> hand_eye_rms_mm;                         ///< of it
   std::string tunnel;                                            ///< target of the newest order or guidance
-  std::optional<operation::Guidance> guidance;                   ///< the newest decision on a hand-held drill
+  std::optional<operation::Guidance> guidance;          ///< the newest decision on a drill guided now
+  std::optional<operation::record::Registered> models;  ///< the registration of the plan's models
+  bool is_confirmed = false;                            ///< by a person, that registration
 };
 
 /// Reads session.log in a session's folder. An incomplete end is left out and reported in `torn`; refuses as
 /// `read_session` and `operation::record_from`.
 Expected<Timeline> read_timeline(const std::filesystem::path& session);
+
+/// Refuses (usage) a record without a plan.
+Expected<operation::OperationPlan> plan_of(const Timeline& timeline);
 
 /// State after the moment with this index and all before it. Refuses as `read_timeline`.
 Expected<SessionState> state_at(const Timeline& timeline, std::size_t index);

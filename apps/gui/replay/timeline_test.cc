@@ -55,9 +55,11 @@ TEST_F(TimelineTest, StateAccumulatesOverTheMoments) {
   EXPECT_EQ(exposed.tracker_from.at("femur").translation.x(), 2);
   EXPECT_FALSE(exposed.tracker_from.contains("tibia"));
   const SessionState begun = state_at(timeline, 5).value();
-  EXPECT_EQ(begun.case_folder, folder_ / "case-1");
+  EXPECT_FALSE(begun.case_folder) << "without a result";
   EXPECT_FALSE(begun.measured);
-  EXPECT_TRUE(state_at(timeline, 6).value().measured);
+  const SessionState measured = state_at(timeline, 6).value();
+  EXPECT_EQ(measured.case_folder, folder_ / "case-1");
+  EXPECT_TRUE(measured.measured);
   const SessionState end = state_at(timeline, timeline.moments.size() - 1).value();
   EXPECT_EQ(end.hand_eye_rms_mm, 0.2);
   const operation::TunnelOutcome& femur = end.outcomes.at("femur");
@@ -66,6 +68,36 @@ TEST_F(TimelineTest, StateAccumulatesOverTheMoments) {
   EXPECT_DOUBLE_EQ(femur.start.distance_mm(), 0.5);
   EXPECT_DOUBLE_EQ(femur.end.predicted_mm(), 0.6);
   EXPECT_EQ(end.tracker_from.at("femur").translation.x(), 3);
+}
+
+TEST_F(TimelineTest, ARegistrationOfModelsStandsUntilOtherImagesOrAnotherMeasurement) {
+  using namespace operation::record;
+  const auto session = operation::SessionLog::open(folder_ / "session.log").value();
+  const auto add = [&](const operation::Record& record) {
+    ASSERT_TRUE(session->append(std::string(operation::kind_of(record)), operation::content_of(record)));
+  };
+  add(Registered{"case-1/registration", "aa", {}, {}});
+  add(RegistrationConfirmed{"aa", "tester"});
+  add(CaseBegun{"case-2", Json::object(), {}, "femur"});
+  add(Registered{"case-1/registration", "bb", {}, {}});
+  add(CaseBegun{"case-3", Json::object(), {}, {}});
+  add(Registered{"case-3/registration", "cc", {}, {}});
+  add(Exposure{"AP", "01", {}, {}, window_with(1), guidance::Poses{}});
+  const Timeline timeline = read();
+  const auto after = [&](std::size_t number) {
+    return state_at(timeline, session_kinds.size() - 1 + number).value();
+  };
+  EXPECT_FALSE(after(0).models);
+  EXPECT_EQ(after(1).models->digest, "aa");
+  EXPECT_FALSE(after(1).is_confirmed);
+  EXPECT_TRUE(after(2).is_confirmed);
+  EXPECT_TRUE(after(3).models) << "a verification is of the same images";
+  EXPECT_EQ(after(3).case_folder, folder_ / "case-1");
+  EXPECT_TRUE(after(3).measured);
+  EXPECT_FALSE(after(4).is_confirmed);
+  EXPECT_FALSE(after(5).models) << "another measurement";
+  EXPECT_EQ(after(6).models->digest, "cc");
+  EXPECT_FALSE(after(7).models) << "another image";
 }
 
 TEST_F(TimelineTest, TornLogIsReadUpToTheIncompleteRecord) {
@@ -96,8 +128,8 @@ TEST_F(TimelineTest, RecordWithoutContentIsNamedInTheMessage) {
 
 TEST_F(TimelineTest, CaseOutsideTheSessionIsRefused) {
   const auto session = operation::SessionLog::open(folder_ / "session.log").value();
-  const operation::Record begun = operation::record::CaseBegun{"../elsewhere", Json::object(), {}, {}};
-  ASSERT_TRUE(session->append("case", operation::content_of(begun)));
+  const operation::Record measured = operation::record::Measured{"../elsewhere", "05", {}};
+  ASSERT_TRUE(session->append("result", operation::content_of(measured)));
   EXPECT_EQ(state_at(read(), session_kinds.size()).error().reason, Reason::path_outside);
 }
 
@@ -127,6 +159,116 @@ TEST_F(TimelineTest, AHandHeldDrillReplaysWithItsTouchesAndGuidance) {
   EXPECT_EQ(state.tunnel, "tibia");
   EXPECT_EQ(state.tracker_from.at("femur").translation.x(), 6);
   EXPECT_FALSE(state_at(timeline, last - 1).value().guidance) << "before the first decision";
+  add(GuidanceEnded{"tibia", GuidanceEndedBy::person});
+  const Timeline ended = read();
+  EXPECT_EQ(ended.moments.back().summary, "Guidance to tibia ended: by the person");
+  EXPECT_FALSE(state_at(ended, last + 1).value().guidance);
+}
+
+/// A measurement of a plan with a tunnel of picks, in the tibia, and one of a model, in the femur.
+class MeasuredTimeline : public testing::Test {
+ protected:
+  void SetUp() override {
+    using namespace operation::record;
+    operation::OperationPlan plan;
+    plan.folder = folder_;
+    plan.models.emplace_back().name = "bone";
+    plan.models[0].volume = folder_ / "models/ct.nrrd";
+    plan.models[0].moves_with = "femur";
+    plan.models[0].plan = folder_ / "models/plan.mrk.json";
+    plan.tunnels = {{"tibia", "tibia", "TS", "TE"}, {"femur", "femur", "F_start", "F_end"}};
+    plan.tunnels[1].of_model = {.name = "femur", .model = "bone", .line = "F"};
+    add(Plan{plan});
+    for (const char* view : {"AP", "LAT"}) add(Exposure{view, "01", {}, {}, window_with(1), seen()});
+    add(CaseBegun{"case-1", Json::object(), {}, {}});
+    add(Measured{"case-1", "02", {}});
+  }
+
+  static guidance::Poses seen() {
+    guidance::Poses poses;
+    poses.tracker_from_bone = {{"femur", geometry::RigidTransform()}, {"tibia", geometry::RigidTransform()}};
+    return poses;
+  }
+  void add(const operation::Record& record) {
+    const auto session = operation::SessionLog::open(folder_ / "session.log").value();
+    ASSERT_TRUE(session->append(std::string(operation::kind_of(record)), operation::content_of(record)));
+  }
+  void add_outcomes() {
+    for (const char* tunnel : {"femur", "tibia"}) {
+      add(operation::record::Navigated{tunnel, {{1.5, 1, 0.1}}});
+      add(operation::record::Outcome{tunnel, {}, {}});
+    }
+  }
+  SessionState end() const {
+    const auto timeline = read_timeline(folder_);
+    if (!timeline) throw BadInput(timeline.error());
+    return state_at(*timeline, timeline->moments.size() - 1).value();
+  }
+
+  QTemporaryDir root_;
+  const std::filesystem::path folder_ = root_.path().toStdString();
+};
+
+TEST_F(MeasuredTimeline, ARegistrationIsOfTheMeasurementNotOfALaterVerification) {
+  using namespace operation::record;
+  add(CaseBegun{"case-2", Json::object(), {}, "tibia"});
+  EXPECT_TRUE(end().measured);
+  EXPECT_EQ(end().case_folder, folder_ / "case-1");
+  add(Measured{"case-2", "03", {}});
+  EXPECT_EQ(end().case_folder, folder_ / "case-2");
+  add(Registered{"case-1/registration", "aa", {}, {}});
+  EXPECT_EQ(end().case_folder, folder_ / "case-1");
+  EXPECT_TRUE(end().measured);
+  add(CaseBegun{"case-3", Json::object(), {}, "femur"});
+  add(Measured{"case-3", "04", {}});
+  EXPECT_EQ(end().case_folder, folder_ / "case-1");
+}
+
+TEST_F(MeasuredTimeline, ARegistrationEndsTheOutcomesInItsTunnels) {
+  add_outcomes();
+  add(operation::record::Registered{"case-1/registration", "aa", {}, {}});
+  EXPECT_FALSE(end().outcomes.contains("femur"));
+  EXPECT_FALSE(end().loops.contains("femur"));
+  EXPECT_TRUE(end().outcomes.contains("tibia"));
+}
+
+TEST_F(MeasuredTimeline, AnotherMeasurementEndsAllOutcomes) {
+  add_outcomes();
+  EXPECT_EQ(end().outcomes.size(), 2u);
+  add(operation::record::CaseBegun{"case-2", Json::object(), {}, {}});
+  EXPECT_TRUE(end().outcomes.empty());
+  EXPECT_TRUE(end().loops.empty());
+  EXPECT_FALSE(end().measured);
+}
+
+TEST_F(MeasuredTimeline, AnAcceptedImageEndsTheMeasurement) {
+  using namespace operation::record;
+  add(Registered{"case-1/registration", "aa", {}, {}});
+  add_outcomes();
+  add(Exposure{"AP", "05", {}, {}, window_with(1), seen()});
+  EXPECT_FALSE(end().measured);
+  EXPECT_FALSE(end().models);
+  EXPECT_TRUE(end().outcomes.empty());
+}
+
+TEST_F(MeasuredTimeline, AnImageWithoutTheMarkerOfATunnelsBoneEndsNothing) {
+  using namespace operation::record;
+  add(Registered{"case-1/registration", "aa", {}, {}});
+  const std::size_t exposed = end().exposed_at.at("AP");
+  guidance::Poses without_tibia = seen();
+  without_tibia.tracker_from_bone.erase("tibia");
+  add(Exposure{"AP", "05", {}, {}, window_with(1), without_tibia});
+  EXPECT_TRUE(end().measured);
+  EXPECT_TRUE(end().models);
+  EXPECT_EQ(end().exposed_at.at("AP"), exposed);
+}
+
+TEST_F(MeasuredTimeline, AnImageFoundToBeDelayedEndsTheMeasurement) {
+  using namespace operation::record;
+  add(Refused{"LAT", "05", "stale_pose", {}});
+  EXPECT_TRUE(end().measured);
+  add(Refused{"AP", {}, "stale_pose", {}});
+  EXPECT_FALSE(end().measured);
 }
 
 }  // namespace

@@ -51,6 +51,10 @@ SceneCamera SceneView::near_camera() const {
   std::vector<Eigen::Vector3d> places;
   for (const phantom::CalibratorBall& ball : scene_.balls) places.push_back(ball.centre_in_calibrator);
   for (const PointShape& point : scene_.points) places.push_back(point.error.centre);
+  constexpr double shown_mm = 100;  // about what the views show, without a calibrator
+  if (places.size() < 2 && !scene_.views.empty())
+    for (const double side : {-shown_mm, shown_mm})
+      places.push_back(middle_ + Eigen::Vector3d::Constant(side));
   if (live_.calibrator_from_tip) places.push_back(live_.calibrator_from_tip->translation);
   constexpr double scene_around = 0.72;
   return zoomed(overview_of(places, aspect()), scene_around);

@@ -8,6 +8,7 @@
 #include "helicarm/devices/robot/robot_registry.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/ray.h"
+#include "helicarm/pipeline/middle.h"
 #include "helicarm/simulation/calibrator_body.h"
 
 namespace helicarm::gui {
@@ -73,6 +74,7 @@ ViewShape view_shape(const std::string& name, const geometry::View& view, const 
 }
 
 Ellipsoid ellipsoid_95(const Vector3d& centre, const Eigen::Matrix3d& covariance) {
+  if (!covariance.allFinite()) return {centre, Eigen::Matrix3d::Identity(), Vector3d::Zero()};
   const auto [values, vectors] = geometry::symmetric_eigen(covariance);
   Eigen::Matrix3d axes = vectors;
   if (axes.determinant() < 0) axes.col(0) *= -1;
@@ -102,8 +104,9 @@ std::optional<phantom::TriangleMesh> cone_of(const phantom::Calibrator& calibrat
 
 ResultScene scene_of(const pipeline::Result& result, const phantom::Calibrator& calibrator) {
   ResultScene scene{calibrator.balls, cone_of(calibrator), {}, {}, {}};
+  const Vector3d middle = pipeline::middle_of(calibrator, result.views);
   for (const pipeline::ViewResult& view : result.views)
-    if (view.calibrated) scene.views.push_back(shape_of(view, phantom::middle_of(calibrator)));
+    if (view.calibrated) scene.views.push_back(shape_of(view, middle));
   for (const pipeline::PointResult& point : result.points)
     if (point.place) scene.points.push_back(shape_of(point, result, scene.views));
   for (std::size_t i = 0; i < result.tunnel_ends.size(); ++i) {

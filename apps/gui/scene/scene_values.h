@@ -34,6 +34,7 @@ struct Ellipsoid {
 /// The 95 % quantile of chi-square with three degrees of freedom.
 inline constexpr double chi2_95 = 7.815;
 
+/// A covariance that is not known gives a point.
 Ellipsoid ellipsoid_95(const Eigen::Vector3d& centre, const Eigen::Matrix3d& covariance);
 
 /// A calibrated view: source, edge of the image and central ray.

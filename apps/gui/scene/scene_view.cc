@@ -8,6 +8,7 @@
 
 #include "gui/scene/offscreen_stage.h"
 #include "gui/scene/palette.h"
+#include "helicarm/pipeline/middle.h"
 
 namespace helicarm::gui {
 
@@ -69,7 +70,8 @@ void SceneView::redraw() {
 
 void SceneView::show_result(const std::shared_ptr<const pipeline::Result>& result,
                             const phantom::Calibrator& calibrator, bool keeps_camera) {
-  show_scene(result ? scene_of(*result, calibrator) : ResultScene{}, phantom::middle_of(calibrator),
+  show_scene(result ? scene_of(*result, calibrator) : ResultScene{},
+             pipeline::middle_of(calibrator, result ? result->views : std::vector<pipeline::ViewResult>()),
              keeps_camera);
 }
 
@@ -254,7 +256,8 @@ void SceneView::paint_overlay(QPainter& painter) {
     taken.push_back(paint_note(
         painter, 0, tr("From the source of %1").arg(QString::fromStdString(view->name)), palette::text));
   if (!notice_.isEmpty()) taken.push_back(paint_note(painter, int(taken.size()), notice_, amber));
-  if (!drawn_scene().points.empty())
+  const auto has_ellipsoid = [](const PointShape& point) { return point.error.radii.maxCoeff() > 0; };
+  if (std::ranges::any_of(drawn_scene().points, has_ellipsoid))
     taken.push_back(paint_note(painter, int(taken.size()),
                                drawn_scale() == 1
                                    ? tr("95 % ellipsoids, true size")

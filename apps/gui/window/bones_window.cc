@@ -4,7 +4,6 @@
 #include <QApplication>
 #include <QGridLayout>
 #include <QHBoxLayout>
-#include <QHeaderView>
 #include <QPointer>
 #include <QThreadPool>
 #include <QVBoxLayout>
@@ -12,7 +11,10 @@
 
 #include "gui/controller/steps.h"
 #include "gui/window/ask_files.h"
+#include "gui/window/ct_body.h"
+#include "gui/window/list_table.h"
 #include "gui/xray/text.h"
+#include "helicarm/case_registration/load.h"
 #include "helicarm/segmentation/bones.h"
 #include "helicarm/volume/read_volume.h"
 
@@ -26,6 +28,23 @@ constexpr double no_threshold = -1001;
 
 QString mm(const Eigen::Vector3d& at) {
   return QString("%1, %2, %3").arg(at.x(), 0, 'f', 1).arg(at.y(), 0, 'f', 1).arg(at.z(), 0, 'f', 1);
+}
+
+/// The CT with the model's body, and what is to be said.
+struct OpenedCt {
+  volume::Volume ct;
+  CtBody body = {};
+  QStringList told = {};
+};
+
+OpenedCt opened(const fs::path& file, const std::optional<pipeline::CaseModel>& model) {
+  OpenedCt opened{value_or_throw(model ? case_registration::volume_of(*model) : volume::read_volume(file))};
+  for (const Warning& warning : opened.ct.warnings) opened.told << sentence_of(warning);
+  if (!model) return opened;
+  opened.body = body_of(opened.ct, *model);
+  if (opened.body.voxels)
+    opened.told << BonesWindow::tr("The line around the model's body is named in each slice.");
+  return opened;
 }
 
 }  // namespace
@@ -81,15 +100,10 @@ QWidget* BonesWindow::build_side() {
   remove_ = new QPushButton(tr("&Remove"));
   for (QWidget* part : std::initializer_list<QWidget*>{name_, add_, remove_}) seed->addWidget(part);
   column->addLayout(seed);
-  table_ = new QTableWidget(0, 4);
-  table_->setObjectName("seedTable");
-  table_->setAccessibleName(tr("Seeds"));
+  table_ = list_table("seedTable", tr("Seeds"));
+  table_->setColumnCount(4);
   table_->setHorizontalHeaderLabels({tr("Bone"), tr("HU"), tr("Volume, cm³"), tr("L, P, S, mm")});
-  table_->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
-  table_->verticalHeader()->hide();
-  table_->setEditTriggers(QAbstractItemView::NoEditTriggers);
   table_->setSelectionBehavior(QAbstractItemView::SelectRows);
-  table_->setTabKeyNavigation(false);
   column->addWidget(table_, 1);
   auto* acts = new QHBoxLayout;
   threshold_ = new QDoubleSpinBox;
@@ -147,20 +161,21 @@ void BonesWindow::run(const QString& doing, std::function<std::function<void()>(
   });
 }
 
-void BonesWindow::open_ct(const fs::path& file, CtPlan plan) {
+void BonesWindow::open_ct(const fs::path& file, CtPlan plan,
+                          const std::optional<pipeline::CaseModel>& model) {
   file_ = file;
   plan_ = std::move(plan);
   setWindowTitle(tr("CT: %1").arg(text(file.filename().string())));
-  run(tr("%1 is read.").arg(text(file.string())), [this, file] {
-    auto read = std::make_shared<Expected<volume::Volume>>(volume::read_volume(file));
+  run(tr("%1 is read.").arg(text(file.string())), [this, file, model] {
+    auto read = std::make_shared<Expected<OpenedCt>>(guarded([&] { return opened(file, model); }));
     return [this, read] {
       if (!*read) return says_->setText(sentence_of(read->error()));
       scene_ = {};
-      scene_.ct = std::make_shared<const volume::Volume>(**read);
+      scene_.ct = std::make_shared<const volume::Volume>(std::move((*read)->ct));
+      scene_.body = (*read)->body;
       scene_.plan = plan_;
       scene_.cursor = 0.5 * (scene_.ct->size.cast<double>().array() - 1).matrix();
-      QStringList words;
-      for (const Warning& warning : scene_.ct->warnings) words << sentence_of(warning);
+      QStringList words = (*read)->told;
       if (!plan_.tunnels.empty()) {
         words << tr("The planned tunnels are dashed, dotted before the bone, projected onto each slice.");
         const CtTunnel& first = plan_.tunnels.front();
@@ -248,7 +263,7 @@ void BonesWindow::fill_table() {
     const QStringList words{text(seed.name), fixed(value_at(voxel_from_patient * seed.point), 0), volume,
                             mm(seed.point)};
     for (int column = 0; column < words.size(); ++column)
-      table_->setItem(row, column, new QTableWidgetItem(words[column]));
+      table_->setItem(row, column, list_cell(words[column]));
   }
 }
 

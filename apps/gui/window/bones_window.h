@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "gui/window/slice_view.h"
+#include "helicarm/pipeline/case_model.h"
 #include "helicarm/segmentation/segment_files.h"
 
 namespace helicarm::gui {
@@ -29,7 +30,9 @@ class BonesWindow : public QDialog {
   explicit BonesWindow(QWidget* parent = nullptr);
   ~BonesWindow() override;
 
-  void open_ct(const std::filesystem::path& file, CtPlan plan = {});
+  /// `model`: of which it is the CT; its body is outlined.
+  void open_ct(const std::filesystem::path& file, CtPlan plan = {},
+               const std::optional<pipeline::CaseModel>& model = {});
   /// Instead of the earlier one.
   void show_plan(CtPlan plan);
   bool is_busy() const { return busy_; }

@@ -18,6 +18,25 @@ void paint_cross(QPainter& painter, const QPointF& at, double arm) {
   painter.drawLine(at - QPointF(0, arm), at + QPointF(0, arm));
 }
 
+/// Two standard deviations, the tolerances and the causes, in lines that fit beside the target.
+QString uncertain_words(const operation::TunnelAim& aim, double tolerance_mm, double tolerance_deg) {
+  const auto twice = [](const operation::AimError& error) {
+    return DrillTarget::tr("%1 mm, %2°")
+        .arg(2 * error.distance_mm, 0, 'f', 1)
+        .arg(2 * error.angle_deg, 0, 'f', 1);
+  };
+  return DrillTarget::tr("uncertain\n2 σ %1\nlimit %2 mm, %3°\nimages %4\ntracker %5\ndrill %6\nscatter %7")
+             .arg(twice({aim.distance_sigma_mm, aim.angle_sigma_deg}))
+             .arg(tolerance_mm)
+             .arg(tolerance_deg)
+             .arg(twice(aim.errors->images), twice(aim.errors->tracker), twice(aim.errors->tool),
+                  twice(aim.errors->scatter)) +
+         DrillTarget::tr("\noff %1 mm, %2°\ndepth %3 mm")
+             .arg(aim.distance_mm, 0, 'f', 1)
+             .arg(aim.angle_deg, 0, 'f', 1)
+             .arg(aim.depth_mm, 0, 'f', 1);
+}
+
 }  // namespace
 
 QPointF on_target(const Eigen::Vector2d& in_tolerances, double rim) {
@@ -33,7 +52,8 @@ DrillTarget::DrillTarget(QWidget* parent) : QWidget(parent) {
   setToolTip(tr(
       "Seen along the drill, in its own axes. Cross: its tip, from the tunnel's axis; ring: its direction. "
       "The circle is the tolerance, the rim four times as much. Bar: depth of the tip, from the entry to "
-      "the tunnel's end."));
+      "the tunnel's end. Uncertain: two standard deviations, and those by X-ray images or registration, "
+      "tracker, the drill's calibration and the scatter of its poses, whose squares add up."));
 }
 
 QSize DrillTarget::sizeHint() const { return {style::scaled(300), style::scaled(190)}; }
@@ -52,6 +72,8 @@ QString DrillTarget::words() const {
   QString words = guidance_->why_not ? sentence_of(*guidance_->why_not) : tr("on target: drill");
   if (!guidance_->aim) return words;
   const operation::TunnelAim& aim = *guidance_->aim;
+  if (guidance_->why_not && guidance_->why_not->reason == Reason::uncertain && aim.errors)
+    return uncertain_words(aim, tolerance_mm_, tolerance_deg_);
   return words + tr("\n%1 ± %2 mm off axis, %3 ± %4°\ndepth %5 of %6 mm")
                      .arg(aim.distance_mm, 0, 'f', 1)
                      .arg(aim.distance_sigma_mm, 0, 'f', 1)

@@ -4,7 +4,6 @@
 #include <QApplication>
 #include <QGridLayout>
 #include <QHBoxLayout>
-#include <QHeaderView>
 #include <QPointer>
 #include <QShortcut>
 #include <QSignalBlocker>
@@ -14,6 +13,8 @@
 #include "gui/controller/model_landmarks.h"
 #include "gui/controller/steps.h"
 #include "gui/scene/model_surface.h"
+#include "gui/window/ct_body.h"
+#include "gui/window/list_table.h"
 #include "gui/xray/text.h"
 #include "helicarm/case_registration/load.h"
 #include "helicarm/registration/flat_cut.h"
@@ -106,18 +107,13 @@ QWidget* LandmarksWindow::build_side() {
   at_ = new QLabel;
   at_->setObjectName("landmarksAt");
   column->addWidget(at_);
-  table_ = new QTableWidget(0, 5);
-  table_->setObjectName("modelLandmarkTable");
-  table_->setAccessibleName(tr("Landmarks in the model"));
+  table_ = list_table("modelLandmarkTable", tr("Landmarks in the model"));
+  table_->setColumnCount(5);
   const QStringList axes = files_.volume ? QStringList{tr("L, mm"), tr("P, mm"), tr("S, mm")}
                                          : QStringList{tr("x, mm"), tr("y, mm"), tr("z, mm")};
   table_->setHorizontalHeaderLabels(QStringList{tr("Landmark")} + axes + QStringList{tr("picked in")});
-  table_->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
-  table_->verticalHeader()->hide();
-  table_->setEditTriggers(QAbstractItemView::NoEditTriggers);
   table_->setSelectionBehavior(QAbstractItemView::SelectRows);
   table_->setSelectionMode(QAbstractItemView::SingleSelection);
-  table_->setTabKeyNavigation(false);
   connect(table_, &QTableWidget::itemSelectionChanged, this, [this] {
     if (const auto name = chosen()) {
       const auto of_it = std::ranges::find(landmarks(), *name, &PointInModel::name);
@@ -189,9 +185,11 @@ LandmarksWindow::Loaded LandmarksWindow::loaded(const pipeline::CaseModel& model
         loaded.mesh = std::move(mesh);
         for (const Warning& warning : body->warnings) say(warning);
       }
-      if (model.volume)
+      if (model.volume) {
         loaded.ct =
             std::make_shared<const volume::Volume>(value_or_throw(case_registration::volume_of(model)));
+        loaded.body = body_of(*loaded.ct, model);
+      }
     } catch (const BadInput&) {
       throw;
     } catch (const std::exception& problem) {  // such as no memory
@@ -225,6 +223,7 @@ void LandmarksWindow::take(const Loaded& loaded) {
   told_ = loaded.told;
   proposals_ = loaded.proposals;
   slices_scene_.ct = loaded.ct;
+  slices_scene_.body = loaded.body;
   if (loaded.ct) slices_scene_.cursor = 0.5 * (loaded.ct->size.cast<double>().array() - 1).matrix();
   surface_scene_.mesh = loaded.mesh;
   show_state();
@@ -345,7 +344,7 @@ void LandmarksWindow::fill_table() {
         text(point.name), in_mm(point.in_model.x()), in_mm(point.in_model.y()), in_mm(point.in_model.z()),
         tr("%1 of %2 views").arg(views_with(state.picks, point.name)).arg(state.views.size())};
     for (int column = 0; column < words.size(); ++column)
-      table_->setItem(row, column, new QTableWidgetItem(words[column]));
+      table_->setItem(row, column, list_cell(words[column]));
   }
   if (!current) return;
   const auto same = std::ranges::find(landmarks(), selected.toStdString(), &PointInModel::name);

@@ -35,6 +35,7 @@ class LandmarksWindow : public QDialog {
   /// What its files hold.
   struct Loaded {
     std::shared_ptr<const volume::Volume> ct;
+    CtBody body = {};
     std::shared_ptr<const phantom::TriangleMesh> mesh;
     std::vector<Eigen::Vector3d> proposals;
     QStringList told;

@@ -14,7 +14,6 @@
 #include <QVBoxLayout>
 #include <algorithm>
 
-#include "gui/controller/model_landmarks.h"
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/ask_files.h"
@@ -23,16 +22,11 @@
 #include "gui/window/register_page.h"
 #include "gui/window/style.h"
 #include "gui/xray/text.h"
-#include "helicarm/geometry/epipolar.h"
 
 namespace helicarm::gui {
 namespace {
 
 constexpr int live_ms = 20;
-/// The scene is usually rendered in software and updated less often than the images.
-constexpr unsigned scene_every = 4;
-/// Range about the calibrator's centre in which an end may lie along its ray.
-constexpr double epipolar_reach_mm = 150;
 
 /// The first step that is not done; the plan is the last one of a case of files.
 Phase open_phase(const std::array<StepCard, phases.size()>& cards, const ApplicationState& state) {
@@ -189,16 +183,6 @@ void MainWindow::build_pages() {
   connect(verify, &VerifyPage::report_wanted, this, &MainWindow::ask_and_export);
 }
 
-void MainWindow::build_replay() {
-  replay_dock_ = new QDockWidget(tr("Replay"), this);
-  replay_dock_->setObjectName("replayDock");
-  replay_ = new ReplayPanel;
-  replay_dock_->setWidget(replay_);
-  addDockWidget(Qt::BottomDockWidgetArea, replay_dock_);
-  replay_dock_->hide();
-  connect(replay_, &ReplayPanel::moment_changed, this, &MainWindow::show_moment);
-}
-
 void MainWindow::build_status() {
   told_ = new QLabel;
   told_->setObjectName("told");
@@ -220,17 +204,6 @@ void MainWindow::build_status() {
   connect(cancel, &QPushButton::clicked, &controller_, &Controller::cancel);
   row->addWidget(cancel);
   statusBar()->addPermanentWidget(busy_);
-}
-
-ApplicationState MainWindow::displayed_state() const {
-  ApplicationState state = controller_.state();
-  if (state.source != Source::files || !replay_->timeline() || replay_->moment() < 0) return state;
-  state.is_replayed = true;
-  const auto then = state_at(*replay_->timeline(), std::size_t(replay_->moment()));
-  if (!then || then->case_folder != state.folder || !state.measured) return state;
-  state.hand_eye_rms_mm = then->hand_eye_rms_mm;
-  state.outcomes = then->outcomes;
-  return state;
 }
 
 void MainWindow::show_state() {
@@ -320,138 +293,12 @@ void MainWindow::show_images() {
   show_tre();
 }
 
-void MainWindow::show_picks() {
-  const ApplicationState& state = controller_.state();
-  const auto wanted = state.measured && phase_ == Phase::plan ? plan_->target() : std::nullopt;
-  display_wanted(wanted);
-  for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    const auto view = panels_->view_in(i);
-    if (view && shown_ && *view < shown_->views.size()) show_picks_in(i, *view, wanted);
-  }
-}
-
-void MainWindow::show_outlines() {
-  const ApplicationState& state = controller_.state();
-  for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    const auto view = panels_->view_in(i);
-    xrays_[i]->set_outlines(view && panels_->panel(i).shows_own_frame() ? outlines_of(state, *view)
-                                                                        : std::vector<ModelOutline>{});
-  }
-}
-
-void MainWindow::show_models() {
-  const ApplicationState& state = controller_.state();
-  decltype(shown_nudge_) nudge;
-  if (state.nudged) nudge = {state.nudged->model, state.nudged->world_from_model.matrix()};
-  QString out_of_date;  // of each model
-  for (std::size_t i = 0; state.registration && i < state.registration->models.size(); ++i)
-    out_of_date += stale_model(state, i) + '\n';
-  if (shown_registration_ == state.registration && shown_nudge_ == nudge &&
-      shown_stale_models_ == out_of_date)
-    return;
-  shown_stale_models_ = out_of_date;
-  shown_registration_ = state.registration;
-  shown_nudge_ = nudge;
-  scene_->show_models(models_of(state));
-}
-
-void MainWindow::display_wanted(const std::optional<WantedPick>& wanted) {
-  const std::string view = wanted ? wanted->view : "";
-  if (std::exchange(wanted_view_, view) == view) return;  // the user may display others
-  const auto& views = controller_.state().views;
-  panels_->display(std::size_t(std::ranges::find(views, view) - views.begin()));
-}
-
-void MainWindow::show_picks_in(std::size_t panel, std::size_t number,
-                               const std::optional<WantedPick>& wanted) {
-  const ApplicationState& state = controller_.state();
-  const pipeline::ViewResult& view = shown_->views[number];
-  XrayView& xray = *xrays_[panel];
-  const bool takes = controller_.takes_picks() && panels_->panel(panel).shows_own_frame();
-  std::vector<FreshPick> picks;
-  for (const pipeline::Pick& pick : state.picks)
-    if (pick.view == view.name) {
-      const Failure* failed = failure_of(state, pick.name, pick.view);
-      picks.push_back({text(pick.name), pick.uv_raw, failed ? text(failed->message) : QString()});
-    }
-  xray.set_movable_picks(phase_ == Phase::plan && takes ? picks : std::vector<FreshPick>{});
-  xray.set_picking(wanted.has_value() && takes);
-  if (!panels_->panel(panel).shows_own_frame()) return;
-  if (!next_pick(state) && out_of_date_.isEmpty())  // the result shows the others
-    std::erase_if(picks, [&](const FreshPick& pick) {
-      return pick.why_failed.isEmpty() && !stale_points_.contains(pick.name.toStdString());
-    });
-  xray.set_picks(std::move(picks));
-  const auto path = state.path.by_view.find(view.name);
-  xray.set_path(path == state.path.by_view.end() ? std::vector<Eigen::Vector2d>{} : path->second);
-  xray.set_epipolar(wanted ? epipolar_lines_of(wanted->point, view) : std::vector<EpipolarLine>{});
-}
-
-std::vector<MainWindow::EpipolarLine> MainWindow::epipolar_lines_of(const std::string& point,
-                                                                    const pipeline::ViewResult& view) const {
-  const ApplicationState& state = controller_.state();
-  std::vector<EpipolarLine> lines;
-  for (const pipeline::ViewResult& other : shown_->views) {
-    const pipeline::Pick* pick = pick_of(state, point, other.name);
-    if (&other == &view || pick == nullptr || !other.calibrated || !view.calibrated ||
-        failure_of(state, point, other.name) != nullptr)
-      continue;
-    const auto uv = other.rectification->map.rectified_from_raw(pick->uv_raw);
-    const double depth = other.calibrated->view.depth(phantom::middle_of(state.calibrator));
-    if (uv)
-      lines.push_back(geometry::epipolar_line(other.calibrated->view, *uv, view.calibrated->view,
-                                              depth - epipolar_reach_mm, depth + epipolar_reach_mm));
-  }
-  return lines;
-}
-
 void MainWindow::show_phase(Phase phase) {
   phase_ = phase;
   strip_->choose(phase);
   pages_->setCurrentIndex(int(phase));
   show_picks();
   show_handles();
-}
-
-void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
-  const auto wanted = plan_->target();
-  if (!wanted || !shown_ || view >= shown_->views.size()) return;
-  pipeline::Pick pick;
-  pick.name = wanted->point;
-  pick.view = shown_->views[view].name;
-  pick.uv_raw = {raw.x(), raw.y()};
-  if (plan_->snaps() && !is_landmark_of_model(controller_.state(), pick.name))
-    pick.snap = pipeline::Snap::ball;
-  if (controller_.state().source != Source::files) pick.moves_with = wanted->bone;
-  controller_.pick(std::move(pick));
-  plan_->placed(wanted->point);
-}
-
-void MainWindow::move_pick(std::size_t view, const QString& name, const QPointF& raw) {
-  const std::string view_name = shown_->views[view].name;
-  for (pipeline::Pick pick : controller_.state().picks) {
-    if (pick.name != name.toStdString() || pick.view != view_name) continue;
-    pick.uv_raw = {raw.x(), raw.y()};
-    if (!plan_->snaps_new_clicks()) pick.snap = pipeline::Snap::none;
-    return controller_.pick(std::move(pick));
-  }
-}
-
-void MainWindow::ask_of_pick(std::size_t view, const QString& name, const QPoint& at) {
-  if (!shown_ || view >= shown_->views.size()) return;
-  const std::string point = name.toStdString(), view_name = shown_->views[view].name;
-  const pipeline::Pick* pick = pick_of(controller_.state(), point, view_name);
-  if (pick == nullptr) return;
-  const bool snaps = pick->snap == pipeline::Snap::ball;
-  auto* menu = new QMenu(this);
-  menu->setObjectName("pickMenu");
-  menu->setAttribute(Qt::WA_DeleteOnClose);
-  menu->addAction(snaps ? tr("Take the click of %1 as it is").arg(name) : tr("Snap %1 to a ball").arg(name),
-                  this, [this, point, view_name, snaps] {
-                    controller_.set_snap(point, snaps ? pipeline::Snap::none : pipeline::Snap::ball,
-                                         view_name);
-                  });
-  menu->popup(at);
 }
 
 void MainWindow::show_steps() { strip_->show_steps(with_devices(cards_, displayed_state(), live_)); }
@@ -471,55 +318,6 @@ void MainWindow::tell_of_the_export() {
            : tr("Exported to %1 at %2, without: %3.").arg(folder, done.at, done.lacks.join("; ")));
   moved_on_ = true;  // the page says the same
   show_phase(Phase::verify);
-}
-
-void MainWindow::show_live() {
-  const auto hidden = [](const LiveState& live) {
-    std::vector<std::pair<Light, QString>> all;
-    for (const StatusIndicator& indicator : live.indicators) all.emplace_back(indicator.light, indicator.why);
-    return all;
-  };
-  const auto before = hidden(live_);
-  live_ = controller_.live();
-  if (hidden(live_) != before) show_steps();
-  if (live_.stale) controller_.drop_plan(*live_.stale);
-  live_bar_->show_live(live_);
-  navigate_->show_live(live_);
-  const operation::ToolOverlay* tool = recorded_ ? &*recorded_ : nullptr;
-  if (live_.tool) tool = *live_.tool ? &**live_.tool : nullptr;
-  for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    std::optional<guidance::ImageLine> line;
-    const auto view = panels_->view_in(i);
-    if (tool && shown_ && view && *view < shown_->views.size() && panels_->panel(i).shows_own_frame())
-      if (const auto seen = tool->by_view.find(shown_->views[*view].name); seen != tool->by_view.end())
-        line = seen->second;
-    xrays_[i]->set_tool(line, tool && live_.tool ? age_text(tool->age_s) : QString());
-  }
-  if (++looks_ % scene_every != 0) return;
-  LiveScene scene;
-  scene.path = controller_.state().path.in_calibrator;
-  if (tool && tool->calibrator_from_tip) {
-    scene.calibrator_from_tip = tool->calibrator_from_tip;
-    scene.bones_moved = tool->other_bones_moved;
-    if (live_.robot.state) {
-      scene.calibrator_from_base = *scene.calibrator_from_tip * live_.robot.state->base_from_tcp.inverse();
-      scene.joints = live_.robot.state->joints;
-    }
-  }
-  scene_->show_live(scene);
-  look_at_the_robot(scene);
-}
-
-void MainWindow::look_at_the_robot(const LiveScene& scene) {
-  const ApplicationState& state = controller_.state();
-  const bool is_known = scene.calibrator_from_base && scene.joints;
-  const bool registers = state.busy == Phase::navigate && !state.hand_eye_rms_mm && !state.drill && !is_known;
-  if (out_of_date_.isEmpty())
-    scene_->set_notice(registers ? tr("The robot is drawn as soon as it is registered") : QString());
-  const RobotView wanted = !is_known ? RobotView::unknown : state.order ? RobotView::path : RobotView::whole;
-  if (std::exchange(robot_view_, wanted) == wanted) return;
-  if (wanted == RobotView::whole) scene_->look_at_robot();
-  if (wanted == RobotView::path) scene_->look_near();
 }
 
 bool MainWindow::eventFilter(QObject* watched, QEvent* event) {

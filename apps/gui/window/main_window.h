@@ -103,7 +103,8 @@ class MainWindow : public QMainWindow {
   /// A run of images of a calibrator, in a window of its own.
   void open_run(const std::filesystem::path& folder);
   /// Slices of a CT, to find its bones, in a window of its own.
-  BonesWindow* open_ct(const std::filesystem::path& file, CtPlan plan);
+  BonesWindow* open_ct(const std::filesystem::path& file, CtPlan plan,
+                       const std::optional<pipeline::CaseModel>& model = {});
   void open_ct_of(std::size_t model);
   void show_ct_plan();
   void open_session(const std::filesystem::path& session);

@@ -157,33 +157,6 @@ void MainWindow::build_recent() {
   recent_menu_->setEnabled(!recent_menu_->isEmpty());
 }
 
-void MainWindow::show_moment(int index) {
-  if (!replay_->timeline() || index < 0) return;
-  const auto then = state_at(*replay_->timeline(), std::size_t(index));
-  if (!then) return say(then.error());
-  if (then->case_folder && then->measured && controller_.state().folder != *then->case_folder)
-    controller_.open_case(*then->case_folder, false);
-  show_recorded();
-  show_state();
-}
-
-void MainWindow::show_recorded() {
-  recorded_.reset();
-  if (!replay_->timeline() || replay_->moment() < 0) return;
-  const auto then = state_at(*replay_->timeline(), std::size_t(replay_->moment()));
-  const bool is_shown = out_of_date_.isEmpty() && then && then->case_folder &&
-                        controller_.state().folder == *then->case_folder && controller_.state().measured;
-  if (!is_shown || !(then->registered_at || then->guidance)) return;
-  if (!recorded_tool_ || recorded_at_ != then->registered_at || recorded_of_ != shown_) {
-    const auto tool = tool_of(*replay_->timeline(), *then, *shown_);
-    if (!tool) return say(tool.error());
-    recorded_tool_ = *tool;
-    recorded_at_ = then->registered_at;
-    recorded_of_ = shown_;
-  }
-  if (const auto overlay = overlay_of(*recorded_tool_, *replay_->timeline(), *then)) recorded_ = *overlay;
-}
-
 void MainWindow::ask_and_export() {
   auto* dialog = new QFileDialog(this, tr("Folder for the report and the results"));
   dialog->setObjectName("exportDialog");
@@ -212,7 +185,8 @@ void MainWindow::ask_settings() {
     settings_ = dialog->settings();
     keep_settings(recent_, settings_);
     controller_.set_options({settings_.run, settings_.search});
-    tell(controller_.state().source == Source::files
+    const ApplicationState& state = controller_.state();
+    tell(state.source == Source::files && !state.is_replayed
              ? tr("The case is measured with these settings; those of devices apply to the next rehearsal or "
                   "connection.")
              : tr("Measurement settings apply to the next case; the others to the next rehearsal or "

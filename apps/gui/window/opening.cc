@@ -190,17 +190,19 @@ void MainWindow::open_run(const fs::path& folder) {
   run->open_case(folder);
 }
 
-BonesWindow* MainWindow::open_ct(const fs::path& file, CtPlan plan) {
+BonesWindow* MainWindow::open_ct(const fs::path& file, CtPlan plan,
+                                 const std::optional<pipeline::CaseModel>& model) {
   auto* bones = new BonesWindow(this);
   show_beside(bones);
-  bones->open_ct(file, std::move(plan));
+  bones->open_ct(file, std::move(plan), model);
   return bones;
 }
 
 void MainWindow::open_ct_of(std::size_t model) {
   const ApplicationState& state = controller_.state();
-  if (!state.registration || model >= state.model_volumes.size() || !state.model_volumes[model]) return;
-  ct_of_model_ = {open_ct(*state.model_volumes[model], plan_in_ct(state, model)), state.folder, model};
+  if (!state.registration || model >= state.model_files.size() || !state.model_files[model].volume) return;
+  const pipeline::CaseModel& files = state.model_files[model];
+  ct_of_model_ = {open_ct(*files.volume, plan_in_ct(state, model), files), state.folder, model};
 }
 
 void MainWindow::show_ct_plan() {
@@ -215,13 +217,6 @@ void MainWindow::open_images(const std::vector<fs::path>& files, bool offers_one
   std::vector<pipeline::NewImage> images;
   for (const fs::path& file : files) images.push_back({file});
   offer_case(images);
-}
-
-void MainWindow::open_session(const fs::path& session) {
-  if (const auto opened = replay_->open(session); !opened) return say(opened.error());
-  remember(Folder::sessions, session);
-  replay_dock_->show();
-  replay_dock_->raise();
 }
 
 void MainWindow::dragEnterEvent(QDragEnterEvent* event) {

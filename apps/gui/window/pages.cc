@@ -203,14 +203,33 @@ void RectifyPage::show_state(const ApplicationState& state) {
   table_->fill(report::rectification_table(views_of(state)));
 }
 
+namespace {
+
+QString lead_of_calibration(const ApplicationState& state) {
+  if (state.cameras.empty())
+    return CalibratePage::tr("Labels the calibrator's fiducials and calibrates each view from them.");
+  QStringList files;
+  for (std::size_t i = 0; i < state.cameras.size(); ++i)
+    files << CalibratePage::tr("%1 by %2")
+                 .arg(text(state.views[i]), text(state.cameras[i].filename().string()));
+  return CalibratePage::
+      tr("The cameras are given by files of another program: %1. No calibrator is looked for; the world is "
+         "that of the cameras.")
+          .arg(files.join(", "));
+}
+
+}  // namespace
+
 CalibratePage::CalibratePage(Controller& controller, QWidget* parent)
-    : Page(tr("Labels the calibrator's fiducials and calibrates each view from them."), controller, parent) {
+    : Page(lead_of_calibration({}), controller, parent) {
   views_ = add_table(report::calibration_table({}), "viewTable");
   balls_ = add_table(report::fiducials_table({}), "ballTable");
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
 void CalibratePage::show_state(const ApplicationState& state) {
+  findChild<QLabel*>("lead")->setText(lead_of_calibration(state));
+  for (PageTable* table : {views_, balls_}) table->setHidden(!state.cameras.empty());
   views_->fill(report::calibration_table(views_of(state)));
   balls_->fill(report::fiducials_table(views_of(state)));
 }

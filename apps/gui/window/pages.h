@@ -125,6 +125,7 @@ class PlanPage : public Page {
   void delete_chosen();
   void add_landmark_row();
   void add_map();
+  void show_map(const ApplicationState& state);
   void tell_next();
   QString next_words() const;
   void show_snap();
@@ -186,7 +187,7 @@ class VerifyPage : public Page {
 
  private:
   PageTable* table_;
-  QLabel *lacks_, *exported_;
+  QLabel *depths_, *lacks_, *exported_;
 };
 
 }  // namespace helicarm::gui

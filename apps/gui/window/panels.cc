@@ -76,8 +76,9 @@ void MainWindow::build_handles() {
 std::optional<MainWindow::HeldModel> MainWindow::held_model() const {
   const ApplicationState& state = controller_.state();
   const auto model = phase_ == Phase::registration ? register_->movable() : std::nullopt;
-  if (!model || !state.registration || *model >= state.registration->models.size()) return {};
-  const case_registration::RegisteredModel& registered = state.registration->models[*model];
+  const auto models = movable_models(state);
+  if (!model || !models || *model >= models->models.size()) return {};
+  const case_registration::RegisteredModel& registered = models->models[*model];
   if (!registered.model) return {};
   registration::RigidStep step = registration::RigidStep::Zero();
   if (state.nudged && state.nudged->model == *model) step = state.nudged->step;
@@ -95,7 +96,7 @@ void MainWindow::show_handles() {
     const auto view = panels_->view_in(i);
     std::optional<ModelHandle> handle;
     if (held && view && panels_->panel(i).shows_own_frame()) {
-      const auto& views = controller_.state().registration->models[held->model].views;
+      const auto& views = movable_models(controller_.state())->models[held->model].views;
       if (*view < views.size() && views[*view].depth(held->centre) > 1)
         handle = {views[*view].project(held->centre), ink};
     }
@@ -109,7 +110,7 @@ void MainWindow::drag_model(std::size_t panel, HandlePart part, const QPointF& f
   const auto number = panels_->view_in(panel);
   if (!held || !number || !shown_ || *number >= shown_->views.size()) return;
   const pipeline::ViewResult& view = shown_->views[*number];
-  const auto& views = controller_.state().registration->models[held->model].views;
+  const auto& views = movable_models(controller_.state())->models[held->model].views;
   if (!view.rectification || *number >= views.size()) return;
   const auto rectified = [&](const QPointF& raw) {
     return view.rectification->map.rectified_from_raw({raw.x(), raw.y()});

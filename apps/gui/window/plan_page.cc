@@ -189,6 +189,15 @@ void PlanPage::add_map() {
   notify();
 }
 
+/// Of given cameras, whose errors are not known, no error is predicted.
+void PlanPage::show_map(const ApplicationState& state) {
+  auto* map = findChild<QCheckBox*>("treMap");
+  const bool is_known = state.cameras.empty();
+  map->setEnabled(is_known);
+  map->setToolTip(is_known ? QString() : tr("The errors of the given cameras are not known"));
+  if (!is_known) map->setChecked(false);
+}
+
 std::optional<WantedPick> PlanPage::target() const {
   const ApplicationState& state = controller_.state();
   if (!chosen_) {
@@ -221,6 +230,7 @@ void PlanPage::show_state(const ApplicationState& state) {
   tunnels_->setVisible(std::ranges::any_of(tunnels, &PlanTunnelRow::is_of_model));
   of_models_->setVisible(tunnels_->isVisibleTo(this) && !is_operation(state));
   offered_->setVisible(!state.offered_picks.empty());
+  show_map(state);
   landmark_row_->setVisible(state.source == Source::files);
   no_tunnels_->setVisible(
       state.source == Source::files &&
@@ -329,6 +339,8 @@ QString PlanPage::next_words() const {
     return tr(
         "The points below come from the plans of the models and move with these (Alt+7). To locate another "
         "point, name it below.");
+  if (state.has_models && state.is_replayed)
+    return tr("No model is registered at this moment of the record: their plans hold the tunnels.");
   if (state.has_models)
     return tr(
         "Register the models first (Alt+7): their plans hold the tunnels. To locate another point, name it "

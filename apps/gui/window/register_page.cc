@@ -12,7 +12,6 @@
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
-#include "gui/xray/mark_painter.h"
 #include "helicarm/case_registration/registration_tables.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/report/markup.h"
@@ -30,14 +29,14 @@ QString reasons_of(const CaseRegistration& done) {
   bool is_doubtful = false;
   for (const RegisteredModel& model : done.models) {
     const registration::Registration& found = model.registration;
-    double worst = 0;
+    std::vector<double> errors_mm;
     for (const case_registration::RegisteredPoint& point : model.points)
-      worst = std::max(worst, localization::length_at_95(point.place.covariance_in_calibrator));
+      errors_mm.push_back(localization::length_at_95(point.place.covariance_in_calibrator));
     const auto decided = registration::word(found.decision);
     QString line =
         QString("%1: %2").arg(text(found.name), QString::fromUtf8(decided.data(), qsizetype(decided.size())));
     if (!found.failure && !model.points.empty())
-      line += RegisterPage::tr(", its plan's points within %1 mm (95 %)").arg(number(worst, 2));
+      line += RegisterPage::tr(", its plan's points: %1").arg(largest_error_words(errors_mm));
     lines << line;
     is_doubtful = is_doubtful || found.decision != registration::Decision::accept;
     if (found.failure) lines << sentence_of(*found.failure);
@@ -47,8 +46,7 @@ QString reasons_of(const CaseRegistration& done) {
   if (is_doubtful)
     lines << RegisterPage::tr(
         "What would help: move the model by hand until its outline follows the bone, then register from "
-        "here; "
-        "pick landmarks of it; add a view from another side.");
+        "here; pick landmarks of it; add a view from another side.");
   return lines.join("\n");
 }
 
@@ -77,7 +75,10 @@ report::Table table_of_models(const ApplicationState& state, const std::vector<R
   };
   for (std::size_t i = 0; i < models.size(); ++i) {
     if (!state.registration)
-      say(i, RegisterPage::tr("not registered"), false);
+      say(i,
+          is_moved(state, i) || is_placed(state, i) ? RegisterPage::tr("placed by hand")
+                                                    : RegisterPage::tr("not registered"),
+          false);
     else if (is_moved(state, i))
       say(i, RegisterPage::tr("moved by hand"), true);
     else if (!stale_model(state, i).isEmpty())
@@ -93,7 +94,7 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
               "bone's edges in every X-ray image."),
            controller, parent) {
   register_ = add_button(tr("Register models"), "registerModels", [this] {
-    leave_as_registered();  // the case's start
+    controller_.return_models();  // to the case's starts
     controller_.register_models();
   });
   confirm_ = add_button(tr("The outlines follow the bones in every view: &confirm"), "confirmRegistration",
@@ -108,6 +109,11 @@ RegisterPage::RegisterPage(Controller& controller, QWidget* parent)
   says_->setWordWrap(true);
   layout()->addWidget(says_);
   models_ = add_table(case_registration::models_table({}), "modelTable");
+  place_ =
+      add_button(tr("Place the models by hand..."), "placeModels", [this] { controller_.place_models(); });
+  place_->setToolTip(
+      tr("Shows each model where its search would begin, or in the middle of the images, to be moved before "
+         "the first registration"));
   add_hand();
   tunnels_ = add_table(case_registration::tunnels_in_bone_table({}), "modelTunnelTable");
   slices_ = new QLabel;
@@ -143,8 +149,8 @@ void RegisterPage::add_hand() {
     auto* by = by_[std::size_t(i)] = new PoseBox;
     by->setObjectName((turns ? "turn" : "shift") + axis.toUpper());
     by->setAccessibleName((turns ? tr("Turn about %1, degrees") : tr("Shift along %1, mm")).arg(axis));
-    by->setToolTip((turns ? tr("Turns the model about its centre, about the calibrator's %1")
-                          : tr("Moves the model along the calibrator's %1"))
+    by->setToolTip((turns ? tr("Turns it about its centre and %1 of the world (calibrator's or cameras')")
+                          : tr("Moves it along %1 of the world (calibrator's or cameras')"))
                        .arg(axis));
     by->setPrefix(axis + " ");
     by->setSuffix(turns ? tr(" °") : tr(" mm"));
@@ -157,7 +163,7 @@ void RegisterPage::add_hand() {
             [this, field = std::size_t(i)](double value) { nudge(field, value); });
   }
   connect(model_, &QComboBox::currentIndexChanged, this, [this] {
-    leave_as_registered();
+    choose();
     show_pose_images(controller_.state());
     emit held_changed();
   });
@@ -184,9 +190,10 @@ double field_of(const registration::RigidStep& step, std::size_t field) {
 
 }  // namespace
 
-void RegisterPage::leave_as_registered() {
-  if (model_->currentIndex() >= 0)
-    controller_.nudge(std::size_t(model_->currentIndex()), registration::RigidStep::Zero());
+void RegisterPage::choose() {
+  if (model_->currentIndex() < 0) return;
+  controller_.nudge(std::size_t(model_->currentIndex()), registration::RigidStep::Zero());
+  show_hand(controller_.state());  // also where nothing has moved
 }
 
 namespace {
@@ -238,22 +245,33 @@ void RegisterPage::show_hand(const ApplicationState& state) {
     const QSignalBlocker quiet(model_);
     model_->setCurrentIndex(int(state.nudged->model));
   }
+  const auto chosen = std::size_t(std::max(0, model_->currentIndex()));
+  const bool has_shape = shown_ && chosen < shown_->models.size() && shown_->models[chosen].model;
   for (std::size_t field = 0; field < by_.size(); ++field) {
     const double value = state.nudged ? field_of(state.nudged->step, field) : 0;
     const QSignalBlocker quiet(by_[field]);
+    by_[field]->setEnabled(has_shape);
     if (std::abs(value - by_[field]->value()) > 0.005) by_[field]->setValue(value);
   }
 }
 
 void RegisterPage::show_state(const ApplicationState& state) {
-  const bool can = can_register(state) && !state.busy && stale(state, Phase::calibrate).isEmpty();
+  const bool can =
+      can_register(state) && !state.busy && !state.is_replayed && stale(state, Phase::calibrate).isEmpty();
   register_->setEnabled(can);
-  hand_->setEnabled(can && state.registration);
+  const bool can_move = can && movable_models(state);
+  hand_->setEnabled(can_move);
+  hand_->setToolTip(can_move || !can ? QString()
+                                     : tr("No model is displayed yet: register the models, or place them by "
+                                          "hand"));
+  place_->setVisible(!state.is_replayed && state.has_models && !movable_models(state));
+  place_->setEnabled(can);
   confirm_->setVisible(is_operation(state) && state.has_models);
   confirm_->setEnabled(can && awaits_confirmation(state) && !state.nudged);
-  from_here_->setEnabled(can && state.nudged);
+  from_here_->setEnabled(can && has_poses_by_hand(state));
   const std::size_t chosen = std::size_t(std::max(0, model_->currentIndex()));
-  ct_->setEnabled(state.registration && chosen < state.model_volumes.size() && state.model_volumes[chosen]);
+  ct_->setEnabled(state.registration && chosen < state.model_files.size() &&
+                  state.model_files[chosen].volume);
   says_->setText(with_landmark_words(words_of(state), state));
   std::vector<RegisteredModel> models = listed_models(state);
   models_->fill(table_of_models(state, models));
@@ -284,13 +302,17 @@ void RegisterPage::allow_landmarks(const ApplicationState& state) {
 }
 
 void RegisterPage::list_models(const ApplicationState& state) {
-  if (shown_ == state.registration) return;
-  shown_ = state.registration;
+  if (shown_ == movable_models(state)) return;
+  shown_ = movable_models(state);
+  QStringList names, listed;
+  if (shown_)
+    for (const RegisteredModel& model : shown_->models) names << text(model.registration.name);
+  for (int i = 0; i < model_->count(); ++i) listed << model_->itemText(i);
+  if (names == listed) return;
   const QSignalBlocker quiet(model_);
   const int chosen = model_->currentIndex();
   model_->clear();
-  if (shown_)
-    for (const RegisteredModel& model : shown_->models) model_->addItem(text(model.registration.name));
+  model_->addItems(names);
   model_->setCurrentIndex(std::clamp(chosen, std::min(0, model_->count() - 1), model_->count() - 1));
 }
 
@@ -317,12 +339,12 @@ void RegisterPage::show_slices() {
         const int width = std::min(pixels.width(), std::max(120, this->width() - 24));
         slices_->setPixmap(pixels.scaledToWidth(width, Qt::SmoothTransformation));
         slices_->setAccessibleName(tr("Slices of the CT with tunnel %1").arg(text(model.tunnels[i].name)));
-        slices_->setToolTip(tr("Tunnel %1 in the CT: along it through the thinnest place of the bone beside "
-                               "it (cross), along it at "
-                               "a right angle to that, and across it there. Blue: the bone's surface; the "
-                               "walls are red where they "
-                               "may leave the bone, yellow where it is thinner than planned.")
-                                .arg(text(model.tunnels[i].name)));
+        slices_->setToolTip(
+            tr("Tunnel %1 in the CT: along it through the thinnest place of the bone beside "
+               "it (cross), along it at a right angle to that, and across it there. Blue: the "
+               "bone's surface; the walls are red where they may leave the bone, yellow where "
+               "it is thinner than planned.")
+                .arg(text(model.tunnels[i].name)));
         slices_->show();
         return;
       }
@@ -354,69 +376,24 @@ QString RegisterPage::words_of(const ApplicationState& state) const {
     guides =
         tr("Compare the outlines with the bones in every view: no tunnel of these models guides the tool "
            "before you confirm.\n");
-  if (state.is_confirmed) guides = tr("Confirmed: the tunnels of these models guide the tool (Alt+5).\n");
+  if (state.is_replayed && state.registration)
+    guides = state.is_confirmed
+                 ? tr("Recorded, and confirmed: the tunnels of these models guided the tool.\n")
+                 : tr("Recorded: at this moment no person had confirmed the outlines.\n");
+  else if (state.is_confirmed)
+    guides = tr("Confirmed: the tunnels of these models guide the tool (Alt+5).\n");
   if (state.registration) return ended + guides + reasons_of(*state.registration);
+  if (state.is_replayed) return ended + tr("No model is registered at this moment of the record.");
+  if (has_old_starts(state))
+    return ended +
+           tr("No model is registered yet. Landmarks or picks have changed since the models were displayed: "
+              "those placed by hand start there; another one may start elsewhere than it is displayed.");
+  if (state.at_starts)
+    return ended +
+           tr("No model is registered yet. Each is displayed where its search would begin: move it in the "
+              "images, in the scene or with the fields until its outline follows the bone's edges in every "
+              "view, then press \"Register from here\".");
   return ended + tr("No model is registered yet.");
-}
-
-std::vector<ModelShape> models_of(const ApplicationState& state) {
-  std::vector<ModelShape> shapes;
-  if (!state.registration) return shapes;
-  for (std::size_t i = 0; i < state.registration->models.size(); ++i) {
-    std::optional<geometry::RigidTransform> by_hand;
-    if (state.nudged && state.nudged->model == i) by_hand = state.nudged->world_from_model;
-    const QColor& ink = ink::of_model(i);
-    if (auto shape =
-            shape_of(state.registration->models[i], by_hand,
-                     {std::uint8_t(ink.red()), std::uint8_t(ink.green()), std::uint8_t(ink.blue())})) {
-      if (shape->state == ModelShape::State::registered && !stale_model(state, i).isEmpty()) {
-        shape->state = ModelShape::State::out_of_date;
-        shape->points.clear();
-        shape->tunnels.clear();
-      }
-      shapes.push_back(*std::move(shape));
-    }
-  }
-  return shapes;
-}
-
-namespace {
-
-/// Of a tunnel whose wall leaves the bone, or comes nearer to its surface than planned.
-std::optional<QColor> warning_ink(const RegisteredModel& model, std::size_t tunnel) {
-  if (tunnel >= model.bone_checks.size() || !model.bone_checks[tunnel]) return {};
-  const registration::BoneCheck& check = *model.bone_checks[tunnel];
-  if (check.is_breach()) return ink::breach;
-  if (check.is_thin()) return ink::thin;
-  return {};
-}
-
-}  // namespace
-
-std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t view) {
-  std::vector<ModelOutline> outlines;
-  if (!state.registration) return outlines;
-  for (std::size_t i = 0; i < state.registration->models.size(); ++i) {
-    const RegisteredModel& model = state.registration->models[i];
-    const bool is_nudged = state.nudged && state.nudged->model == i;
-    const auto& dots = is_nudged ? state.nudged->outlines : model.outlines;
-    ModelOutline& outline = outlines.emplace_back();
-    if (view < dots.size()) outline.dots = dots[view];
-    if (!stale_model(state, i).isEmpty() || model.registration.failure || view >= model.views.size())
-      continue;
-    const geometry::View& camera = model.views[view];
-    for (std::size_t k = 0; k < model.tunnel_ends.size(); ++k) {
-      const auto& [start, end] = model.tunnel_ends[k];
-      const Eigen::Vector3d &from = model.points[start].place.in_calibrator,
-                            &to = model.points[end].place.in_calibrator;
-      if (camera.depth(from) > 1 && camera.depth(to) > 1)
-        outline.tunnels.push_back({{camera.project(from), camera.project(to)}, warning_ink(model, k)});
-    }
-    for (const case_registration::RegisteredPoint& point : model.points)
-      if (const Eigen::Vector3d& at = point.place.in_calibrator; model.views[view].depth(at) > 1)
-        outline.points.emplace_back(text(point.name), model.views[view].project(at));
-  }
-  return outlines;
 }
 
 }  // namespace helicarm::gui

@@ -4,11 +4,9 @@
 #include <array>
 #include <utility>
 
-#include "gui/scene/scene_values.h"
 #include "gui/window/pages.h"
 #include "gui/window/pose_box.h"
 #include "gui/window/pose_images.h"
-#include "gui/xray/live_marks.h"
 #include "helicarm/case_registration/register_case.h"
 
 namespace helicarm::gui {
@@ -39,9 +37,10 @@ class RegisterPage : public Page {
   /// The one chosen, before a registration in the table; else the first.
   std::size_t chosen_model() const;
   void allow_landmarks(const ApplicationState& state);
-  /// The field's part of the chosen model's step from its registered pose.
+  /// The field's part of the chosen model's step from its registered pose or its start.
   void nudge(std::size_t field, double value);
-  void leave_as_registered();
+  /// Ends the move of another model: before the first registration it stays, after it it returns.
+  void choose();
   /// To one of the chosen model's pose images.
   void move_to(std::size_t pose);
   void show_pose_images(const ApplicationState& state);
@@ -49,7 +48,7 @@ class RegisterPage : public Page {
   void show_hand(const ApplicationState& state);
   QString words_of(const ApplicationState& state) const;
 
-  QPushButton *register_, *from_here_, *ct_, *in_model_, *confirm_;
+  QPushButton *register_, *from_here_, *place_, *ct_, *in_model_, *confirm_;
   QLabel* says_;
   PageTable *models_, *tunnels_, *points_, *measures_;
   QLabel* slices_;  ///< of the selected tunnel, or the first
@@ -61,11 +60,5 @@ class RegisterPage : public Page {
   std::array<PoseBox*, 6> by_{};  ///< mm, then degrees
   std::shared_ptr<const case_registration::CaseRegistration> shown_;
 };
-
-/// The registered models in the scene, the nudged one at its pose, in the colours of their outlines.
-std::vector<ModelShape> models_of(const ApplicationState& state);
-
-/// The registered models over a view, the nudged one at its pose.
-std::vector<ModelOutline> outlines_of(const ApplicationState& state, std::size_t view);
 
 }  // namespace helicarm::gui

@@ -7,6 +7,7 @@
 #include <QWheelEvent>
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "gui/xray/label_placer.h"
 #include "gui/xray/mark_painter.h"
@@ -35,35 +36,72 @@ bool is_flipped(const volume::Volume& ct, int axis, bool is_down) {
   return is_down && main == 2 ? !is_negative : is_negative;
 }
 
+const QColor body_ink(94, 234, 242);
+
+/// The voxels of the slice through the cursor, as they are drawn.
+struct Slice {
+  Slice(const CtScene& scene, int across)
+      : ct(*scene.ct),
+        axis(across),
+        at(std::clamp(int(std::lround(scene.cursor[axis])), 0, ct.size[axis] - 1)) {
+    std::tie(right, down) = axes_of(axis);
+    width = ct.size[right];
+    height = ct.size[down];
+    is_flipped_across = is_flipped(ct, right, false);
+    is_flipped_down = is_flipped(ct, down, true);
+  }
+
+  /// Of a pixel of the image.
+  std::size_t voxel(int u, int v) const {
+    Eigen::Vector3i voxel;
+    voxel[axis] = at;
+    voxel[right] = is_flipped_across ? width - 1 - u : u;
+    voxel[down] = is_flipped_down ? height - 1 - v : v;
+    return (std::size_t(voxel.z()) * std::size_t(ct.size.y()) + std::size_t(voxel.y())) *
+               std::size_t(ct.size.x()) +
+           std::size_t(voxel.x());
+  }
+
+  const volume::Volume& ct;
+  int axis, at, right = 0, down = 0, width = 0, height = 0;
+  bool is_flipped_across = false, is_flipped_down = false;
+};
+
 }  // namespace
 
 QImage slice_image(const CtScene& scene, int axis) {
-  const volume::Volume& ct = *scene.ct;
-  const auto [right, down] = axes_of(axis);
-  const int width = ct.size[right], height = ct.size[down];
-  const int at = std::clamp(int(std::lround(scene.cursor[axis])), 0, ct.size[axis] - 1);
-  QImage image(width, height, QImage::Format_RGB32);
-  const bool is_flipped_across = is_flipped(ct, right, false), is_flipped_down = is_flipped(ct, down, true);
+  const Slice slice(scene, axis);
+  QImage image(slice.width, slice.height, QImage::Format_RGB32);
   const double range = std::max(1.0, scene.high_hu - scene.low_hu);
-  for (int v = 0; v < height; ++v)
-    for (int u = 0; u < width; ++u) {
-      Eigen::Vector3i voxel;
-      voxel[axis] = at;
-      voxel[right] = u;
-      voxel[down] = v;
-      const std::size_t i = (std::size_t(voxel.z()) * std::size_t(ct.size.y()) + std::size_t(voxel.y())) *
-                                std::size_t(ct.size.x()) +
-                            std::size_t(voxel.x());
-      const double share = (double(ct.voxels[i]) - scene.low_hu) / range;
+  for (int v = 0; v < slice.height; ++v)
+    for (int u = 0; u < slice.width; ++u) {
+      const std::size_t i = slice.voxel(u, v);
+      const double share = (double(slice.ct.voxels[i]) - scene.low_hu) / range;
       const int grey = int(std::lround(255 * std::clamp(share, 0.0, 1.0)));
       QRgb colour = qRgb(grey, grey, grey);
       if (scene.labels && (*scene.labels)[i] > 0) {
         const QColor ink = ink::of_model(std::size_t((*scene.labels)[i] - 1));
         colour = qRgb((grey + ink.red()) / 2, (grey + ink.green()) / 2, (grey + ink.blue()) / 2);
       }
-      image.setPixel(is_flipped_across ? width - 1 - u : u, is_flipped_down ? height - 1 - v : v, colour);
+      image.setPixel(u, v, colour);
     }
   return image;
+}
+
+std::vector<QLineF> body_outline(const CtScene& scene, int axis) {
+  std::vector<QLineF> edges;
+  if (!scene.body.voxels) return edges;
+  const Slice slice(scene, axis);
+  const auto inside = [&](int u, int v) {
+    return u >= 0 && v >= 0 && u < slice.width && v < slice.height &&
+           (*scene.body.voxels)[slice.voxel(u, v)] != 0;
+  };
+  for (int v = 0; v <= slice.height; ++v)
+    for (int u = 0; u <= slice.width; ++u) {
+      if (inside(u, v) != inside(u - 1, v)) edges.emplace_back(u, v, u, v + 1);
+      if (inside(u, v) != inside(u, v - 1)) edges.emplace_back(u, v, u + 1, v);
+    }
+  return edges;
 }
 
 SliceView::SliceView(int axis, QWidget* parent) : QWidget(parent), axis_(axis) {
@@ -78,6 +116,7 @@ SliceView::SliceView(int axis, QWidget* parent) : QWidget(parent), axis_(axis) {
 void SliceView::show_scene(const CtScene& scene) {
   scene_ = scene;
   drawn_ = scene_.ct ? slice_image(scene_, axis_) : QImage();
+  outline_ = scene_.ct ? body_outline(scene_, axis_) : std::vector<QLineF>();
   update();
 }
 
@@ -154,6 +193,25 @@ void SliceView::keyPressEvent(QKeyEvent* event) {
   }
 }
 
+/// Its outline, and the legend in the corner.
+void SliceView::paint_body(QPainter& painter) const {
+  if (!scene_.body.voxels) return;
+  const Frame at = frame();
+  painter.save();
+  painter.translate(at.origin);
+  painter.scale(at.across, at.down);
+  QPen pen(body_ink, 1.5);
+  pen.setCosmetic(true);
+  painter.setPen(pen);
+  painter.drawLines(outline_.data(), int(outline_.size()));
+  painter.restore();
+  constexpr int off = 8, sample = 18;
+  const QPointF corner(off, height() - off);
+  painter.setPen(QPen(body_ink, 1.5));
+  painter.drawLine(corner - QPointF(0, 4), corner + QPointF(sample, -4));
+  outlined_text(painter, corner + QPointF(sample + 6, 0), scene_.body.says, body_ink);
+}
+
 void SliceView::paintEvent(QPaintEvent*) {
   QPainter painter(this);
   painter.fillRect(rect(), QColor(13, 16, 21));
@@ -162,6 +220,7 @@ void SliceView::paintEvent(QPaintEvent*) {
   painter.setRenderHint(QPainter::SmoothPixmapTransform);
   painter.drawImage(QRectF(at.origin, QSizeF(at.across * drawn_.width(), at.down * drawn_.height())), drawn_);
   painter.setRenderHint(QPainter::Antialiasing);
+  paint_body(painter);
   const Eigen::Affine3d voxel_from_patient = scene_.ct->patient_from_voxel.inverse();
   constexpr double near_voxels = 2;
   for (const CtTunnel& tunnel : scene_.plan.tunnels) {

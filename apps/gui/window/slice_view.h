@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <QLineF>
 #include <QWidget>
 #include <memory>
 #include <optional>
@@ -23,10 +24,17 @@ struct CtPlan {
   std::vector<Eigen::Vector3d> path = {};  ///< of the tool's tip, patient frame, mm
 };
 
+/// Voxels of a CT that are of a body.
+struct CtBody {
+  std::shared_ptr<const std::vector<std::uint8_t>> voxels;  ///< not 0; null: none are known
+  QString says;                                             ///< what of the body they are, for the legend
+};
+
 /// What slices of a CT show; places are voxels.
 struct CtScene {
   std::shared_ptr<const volume::Volume> ct;
   std::shared_ptr<const std::vector<std::uint8_t>> labels;  ///< of the bones; null: none found yet
+  CtBody body = {};                                         ///< outlined
   std::vector<std::pair<QString, Eigen::Vector3d>> seeds;
   CtPlan plan;
   Eigen::Vector3d cursor = Eigen::Vector3d::Zero();
@@ -35,6 +43,9 @@ struct CtScene {
 
 /// The grey values of a slice through the cursor across a voxel axis, with the bones' colours.
 QImage slice_image(const CtScene& scene, int axis);
+
+/// Edges between voxels of the body and others in that image, px; its first pixel ends at (1, 1).
+std::vector<QLineF> body_outline(const CtScene& scene, int axis);
 
 /// A slice of a CT across one of its axes. A click moves the cursor, the wheel the slice.
 class SliceView : public QWidget {
@@ -64,12 +75,14 @@ class SliceView : public QWidget {
     double across, down;  ///< screen px per voxel
   };
   Frame frame() const;
+  void paint_body(QPainter& painter) const;
   void place(const QPointF& at);
   void move_slice(double by);
 
   int axis_;
   CtScene scene_;
   QImage drawn_;
+  std::vector<QLineF> outline_;
 };
 
 }  // namespace helicarm::gui

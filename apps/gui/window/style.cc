@@ -66,6 +66,7 @@ constexpr const char* rules = R"(
     QTableWidget, QListWidget { selection-background-color: @selected; }
     QPlainTextEdit, QLineEdit, QComboBox { selection-background-color: @chosen; selection-color: @text; }
     QSpinBox, QDoubleSpinBox { background: @panel; selection-background-color: @chosen; selection-color: @text; }
+    QSpinBox:disabled, QDoubleSpinBox:disabled, QComboBox:disabled, QLineEdit:disabled { color: @disabled; }
     QHeaderView::section { background: @panel; color: @quiet; border: none; padding: 4px; }
     QMenuBar, QMenu { background: @panel; } QMenu::item:selected, QMenuBar::item:selected { background: @chosen; }
     QMenu::item:disabled { color: @disabled; }

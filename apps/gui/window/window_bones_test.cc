@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Slices of a CT: seeds clicked in its bones, masks and surfaces.
+#include <QPolygonF>
 #include <QTableWidget>
 
 #include "gui/controller/case_with_model_test.h"
@@ -80,6 +81,21 @@ TEST_F(WindowBones, ASeedInAirIsRefusedWithItsReason) {
   EXPECT_THAT(says(), HasSubstr("seed_off_bone"));
 }
 
+TEST_F(WindowBones, TheBodyOfAModelIsOutlinedInItsCt) {
+  pipeline::CaseModel model;
+  model.name = "femur";
+  model.volume = folder_ / "ct.nrrd";
+  model.window_hu = {150, 3000};
+  ASSERT_TRUE(write_file(*model.volume, to_nrrd(bone_in_tissue())));
+  BonesWindow window;
+  window.show();
+  window.open_ct(*model.volume, {}, model);
+  ASSERT_TRUE(wait("the CT is read", [&] { return !window.is_busy(); }));
+  EXPECT_EQ(window.scene().body.says, "femur: 150 HU or more");
+  EXPECT_GT(body_outline(window.scene(), 2).size(), 50u);
+  screenshot("body-in-ct", &window);
+}
+
 TEST_F(WindowBones, AFileThatIsNoCtIsNamed) {
   ASSERT_TRUE(write_file(folder_ / "broken.nrrd", "NRRD0004\n"));
   window_->open_paths({folder_ / "broken.nrrd"});
@@ -87,6 +103,26 @@ TEST_F(WindowBones, AFileThatIsNoCtIsNamed) {
   EXPECT_FALSE(bones()->scene().ct);
   EXPECT_THAT(says(), HasSubstr("broken.nrrd"));
   EXPECT_FALSE(part<QPushButton>("addSeed")->isEnabled());
+}
+
+TEST(BodyOutline, IsAroundTheVoxelsOfTheBodyAsTheyAreDrawn) {
+  CtScene scene;
+  volume::Volume ct;
+  ct.size = {4, 3, 2};
+  ct.voxels.assign(24, 0);
+  ct.patient_from_voxel = Eigen::Scaling(-1.0, 1.0, 1.0);  // x is drawn against its direction
+  scene.ct = std::make_shared<const volume::Volume>(ct);
+  EXPECT_TRUE(body_outline(scene, 2).empty());
+  std::vector<std::uint8_t> body(24, 0);
+  body[0] = body[1] = 1;  // x 0 and 1, y 0, z 0
+  scene.body.voxels = std::make_shared<const std::vector<std::uint8_t>>(body);
+  const auto edges = body_outline(scene, 2);
+  EXPECT_EQ(edges.size(), 6u);
+  QPolygonF ends;
+  for (const QLineF& edge : edges) ends << edge.p1() << edge.p2();
+  EXPECT_EQ(ends.boundingRect(), QRectF(2, 0, 2, 1));
+  scene.cursor.z() = 1;
+  EXPECT_TRUE(body_outline(scene, 2).empty());
 }
 
 TEST(SliceImage, ShowsTheSliceAtTheCursor) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <QComboBox>
 #include <QDoubleSpinBox>
 #include <QToolButton>
 
 #include "gui/controller/case_with_model_test.h"
+#include "gui/window/model_marks.h"
 #include "gui/window/plan_tables.h"
 #include "gui/window/register_page.h"
 #include "gui/window/window_test.h"
@@ -92,6 +94,123 @@ TEST_F(Window, AModelIsRegisteredAndMovedByHand) {
   ends->setCurrentItem(found[0]);
   EXPECT_FALSE(find("deletePick")->isEnabled());  // it is not picked
   screenshot("plan-of-model");
+}
+
+TEST_F(Window, AModelIsPlacedByHandBeforeItsFirstRegistration) {
+  const geometry::RigidTransform truth = write_case_with_model(folder_ / "case");
+  Json json = read_json(folder_ / "case/case.json").value();
+  json["models"][0].erase("start");
+  ASSERT_TRUE(write_file(folder_ / "case/case.json", to_text(json)));
+  window_->open_paths({folder_ / "case"});
+  ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
+  EXPECT_FALSE(find<QDoubleSpinBox>("shiftX")->isEnabled());
+  click("placeModels");
+  ASSERT_TRUE(wait("the model is displayed", [&] { return state().at_starts && !state().busy; }));
+  EXPECT_FALSE(find("placeModels")->isVisible());
+  EXPECT_FALSE(outlines_of(state(), 0).at(0).dots.empty());
+  screenshot("place-by-hand");
+  find<QDoubleSpinBox>("shiftX")->setValue(4);
+  ASSERT_TRUE(state().nudged);
+  EXPECT_EQ(find<QTableWidget>("modelTable")->item(0, 1)->text(), "placed by hand");
+  const registration::Registration start = state().at_starts->models[0].registration;
+  registration::RigidStep beside = registration::step_about(start.world_from_model, truth, start.centre);
+  beside[4] += 3;
+  window_->controller().nudge(0, beside);
+  ASSERT_TRUE(wait("the outline has moved",
+                   [&] { return state().nudged->outlines != state().at_starts->models[0].outlines; }));
+  screenshot("placed-by-hand");
+  click("registerFromHere");
+  ASSERT_TRUE(wait("the model is registered", [&] { return state().registration && !state().busy; }));
+  EXPECT_EQ(state().starts_by_hand.size(), 1u);
+  const registration::Registration& found = state().registration->models[0].registration;
+  EXPECT_FALSE(found.anywhere);
+  EXPECT_LT((found.world_from_model.translation - truth.translation).norm(), 1);
+}
+
+TEST_F(Window, SeveralModelsArePlacedByHandBeforeTheFirstRegistration) {
+  write_case_with_model(folder_ / "case");
+  Json json = read_json(folder_ / "case/case.json").value();
+  json["models"].push_back(json["models"][0]);
+  json["models"][1]["name"] = "again";
+  json["models"][1].erase("plan");
+  json["models"].push_back({{"name", "points"}, {"start", {{"landmarks", "points.csv"}}}});
+  ASSERT_TRUE(write_file(folder_ / "case/points.csv", "name,x_mm,y_mm,z_mm\na,0,0,0\nb,9,0,0\nc,0,9,0\n"));
+  ASSERT_TRUE(write_file(folder_ / "case/case.json", to_text(json)));
+  window_->open_paths({folder_ / "case"});
+  ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
+  click("placeModels");
+  ASSERT_TRUE(wait("the models are displayed", [&] { return state().at_starts && !state().busy; }));
+  EXPECT_EQ(models_of(state()).size(), 2u);  // the points have no start
+  auto* chosen = find<QComboBox>("nudgedModel");
+  auto* shift = find<QDoubleSpinBox>("shiftX");
+  shift->setValue(4);
+  chosen->setCurrentIndex(1);
+  EXPECT_EQ(chosen->currentIndex(), 1);
+  EXPECT_EQ(shift->value(), 0);
+  EXPECT_TRUE(find("registerFromHere")->isEnabled());
+  shift->setValue(6);
+  const auto* models = find<QTableWidget>("modelTable");
+  for (const int model : {0, 1}) EXPECT_EQ(models->item(model, 1)->text(), "placed by hand");
+  EXPECT_EQ(models->item(2, 1)->text(), "not registered");
+  ASSERT_TRUE(wait("both outlines follow", [&] {
+    return !outlines_of(state(), 0).at(0).dots.empty() &&
+           state().nudged->outlines != state().at_starts->models[1].outlines;
+  }));
+  screenshot("place-several-by-hand");
+  chosen->setCurrentIndex(2);
+  EXPECT_FALSE(shift->isEnabled());
+  chosen->setCurrentIndex(0);
+  EXPECT_TRUE(shift->isEnabled());
+  EXPECT_TRUE(find("registerFromHere")->isEnabled());
+  EXPECT_EQ(state().starts_by_hand.size(), 2u);
+}
+
+TEST_F(Window, AReplayShowsTheModelsAsTheyWereRegistered) {
+  open_rehearsal({.by_ct = true});
+  shoot_both();
+  click("registerModels");
+  ASSERT_TRUE(wait("the models are registered", [&] { return state().registration && !state().busy; }));
+  click("confirmRegistration");
+  ASSERT_TRUE(wait("the registration is confirmed", [&] { return state().is_confirmed && !state().busy; }));
+  const auto rows = [&](const char* name) {
+    QStringList cells;
+    const auto* table = find<QTableWidget>(name);
+    for (int row = 0; row < table->rowCount(); ++row)
+      for (int column = 0; column < table->columnCount(); ++column)
+        cells << (table->item(row, column) ? table->item(row, column)->text() : QString());
+    return cells;
+  };
+  const QStringList models = rows("modelTable"), tunnels = rows("modelTunnelTable");
+  const QString figure = card(Phase::registration).figure, plan = card(Phase::plan).figure;
+  const auto outlines = outlines_of(state(), 0);
+
+  window_->open_paths({state().folder});
+  auto* replay = window_->findChild<ReplayPanel*>();
+  ASSERT_TRUE(replay->timeline());
+  replay->set_moment(int(replay->timeline()->moments.size()) - 1);
+  replay->set_moment(0);  // while it is opened
+  ASSERT_TRUE(wait("the recorded case is shown", [&] { return state().is_replayed && !state().busy; }));
+  EXPECT_FALSE(state().registration);
+  replay->set_moment(int(replay->timeline()->moments.size()) - 1);
+  ASSERT_TRUE(wait("the recorded registration is shown",
+                   [&] { return state().is_replayed && state().registration && !state().busy; }));
+  EXPECT_EQ(rows("modelTable"), models);
+  EXPECT_EQ(rows("modelTunnelTable"), tunnels);
+  EXPECT_EQ(card(Phase::registration).figure, figure);
+  EXPECT_EQ(card(Phase::plan).figure, plan);
+  ASSERT_EQ(outlines_of(state(), 0).size(), outlines.size());
+  EXPECT_EQ(outlines_of(state(), 0)[0].dots, outlines[0].dots);
+  EXPECT_EQ(outlines_of(state(), 0)[0].tunnels.size(), 1u);
+  EXPECT_FALSE(find("registerModels")->isEnabled());
+  QTest::mouseClick(window_->strip().button(Phase::registration), Qt::LeftButton);
+  screenshot("replay-register");
+  QTest::mouseClick(window_->strip().button(Phase::plan), Qt::LeftButton);
+  screenshot("replay-plan");
+  replay->set_moment(0);
+  EXPECT_FALSE(state().registration);
+  EXPECT_EQ(card(Phase::plan).why, "no model is registered at this moment");
+  EXPECT_EQ(card(Phase::navigate).why, "no robot is registered at this moment");
+  screenshot("replay-before");
 }
 
 TEST_F(Window, AModelThatIsRefusedOffersItsBestPosesAsImages) {

@@ -151,6 +151,7 @@ TEST_F(WholeOperation, ReachesATunnelThatWasPlannedInTheCt) {
   const CtScene& scene = window_->findChild<BonesWindow*>("bones")->scene();
   ASSERT_EQ(scene.plan.tunnels.size(), 1U);
   ASSERT_TRUE(scene.plan.tunnels[0].approach);
+  EXPECT_EQ(scene.body.says, "femur: mask femur.nrrd");
   screenshot("ct-slices", window_->findChild<QDialog*>("bones"));
   ASSERT_NO_FATAL_FAILURE(expect_export_and_replay());
 }
@@ -161,6 +162,19 @@ TEST(DrillTargets, AreSeenFromBehindTheDrill) {
   EXPECT_EQ(down.y(), 10);
   EXPECT_EQ(on_target({1, 0}, 40), QPointF(10, 0));
   EXPECT_EQ(on_target({0, 100}, 40), QPointF(0, 40));  // at the rim
+}
+
+TEST(DrillTargets, SayWhatMakesADecisionUncertain) {
+  operation::Guidance guidance;
+  guidance.aim = operation::TunnelAim{12.5, 13.2, -14.1, 130.2, 0.65, 1.1, 0.4, {1, 0, 0}, {0, 0, 1}};
+  guidance.aim->errors = operation::AimErrors{{0.45, 0.2}, {0.25, 0.6}, {0.15, 0.2}, {0.35, 0.85}};
+  guidance.why_not = Failure{Reason::uncertain, "two standard deviations are 1.3 mm and 2.2 degrees"};
+  DrillTarget target;
+  target.show_guidance(guidance, {});
+  const std::string words = target.words().toStdString();
+  EXPECT_THAT(words, HasSubstr("uncertain\n2 σ 1.3 mm, 2.2°\nlimit 1 mm, 2°"));
+  EXPECT_THAT(words, HasSubstr("tracker 0.5 mm, 1.2°"));
+  EXPECT_THAT(words, HasSubstr("scatter 0.7 mm, 1.7°"));
 }
 
 TEST_F(Window, ADrillInTheHandIsGuidedAndTheTunnelVerified) {
@@ -193,8 +207,12 @@ TEST_F(Window, ADrillInTheHandIsGuidedAndTheTunnelVerified) {
   }
   ASSERT_TRUE(state().outcomes.contains("femur"));
   EXPECT_EQ(target->words(), "not guided");
+  EXPECT_TRUE(state().outcomes.at("femur").depth());
   EXPECT_THAT(card(Phase::navigate).figure.toStdString(), HasSubstr("1 of 2 tunnels"));
   screenshot("drill-verified");
+  QTest::mouseClick(window_->strip().button(Phase::verify), Qt::LeftButton);
+  EXPECT_THAT(find<QLabel>("depths")->text().toStdString(), HasSubstr("the drill's tip is"));
+  screenshot("drill-depth");
 }
 
 TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {

@@ -203,6 +203,17 @@ void NavigatePage::tell() {
   if (!is_held()) says_->setText(next_step());
 }
 
+namespace {
+
+QString depth_words(const std::string& tunnel, const guidance::TipDepth& depth) {
+  if (const auto off = depth.why_off(tunnel)) return sentence_of(*off);
+  return VerifyPage::tr("%1: the drill's tip is %2, tolerance %3 mm")
+      .arg(text(tunnel), text(guidance::words_of(depth)))
+      .arg(depth.tolerance_mm);
+}
+
+}  // namespace
+
 VerifyPage::VerifyPage(Controller& controller, QWidget* parent)
     : Page(tr("Error: distance of each tunnel end from the tool's axis by tracker and X-ray images, mm, with "
               "its predicted value. From the X-ray images alone: Eq. 17 in px and mm, and the distance in "
@@ -210,11 +221,12 @@ VerifyPage::VerifyPage(Controller& controller, QWidget* parent)
            controller, parent) {
   add_button(tr("&Export report, CSV, JSON and other formats..."), "export",
              [this] { emit report_wanted(); });
-  for (QLabel** label : {&lacks_, &exported_}) {
+  for (QLabel** label : {&depths_, &lacks_, &exported_}) {
     *label = new QLabel;
     (*label)->setWordWrap(true);
     layout()->addWidget(*label);
   }
+  depths_->setObjectName("depths");
   lacks_->setObjectName("exportLacks");
   lacks_->setProperty("class", "attention");
   exported_->setObjectName("exportedTo");
@@ -227,13 +239,21 @@ VerifyPage::VerifyPage(Controller& controller, QWidget* parent)
 
 void VerifyPage::show_state(const ApplicationState& state) {
   std::vector<report::ToolAtEnd> tools;
+  QStringList depths;
   const auto outcomes = stale(state, Phase::verify).isEmpty() ? state.outcomes : decltype(state.outcomes)();
-  for (const auto& [name, outcome] : outcomes)
+  for (const auto& [name, outcome] : outcomes) {
     for (const auto& [end, miss, in_images] :
          {std::tuple("start", &outcome.start, &guidance::Verification::start),
           std::tuple("end", &outcome.end, &guidance::Verification::end)})
       tools.push_back({name, end, miss->distance_mm(), miss->predicted_mm(),
                        outcome.verification ? (*outcome.verification).*in_images : std::nullopt});
+    const auto depth = outcome.depth();
+    if (!depth) continue;
+    tools.push_back({name, "tip", {}, {}, {}, depth});
+    depths << depth_words(name, *depth);
+  }
+  depths_->setText(depths.join("\n"));
+  depths_->setVisible(!depths.isEmpty());
   if (tools.empty() && state.result) tools = report::tools_at_ends(state.result->verifications);
   table_->fill(report::verification_table(tools));
   const QStringList lacks = lacks_of_export(state);

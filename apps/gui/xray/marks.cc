@@ -3,6 +3,7 @@
 
 #include <QObject>
 #include <algorithm>
+#include <cmath>
 
 #include "gui/xray/text.h"
 
@@ -29,7 +30,7 @@ QString tip_of(const report::PointMark& point) {
   QString tip = QString::fromStdString(point.name);
   tip += point.source == localization::PointSource::target ? QObject::tr("  check target")
                                                            : QObject::tr("  pick");
-  if (point.error_95_mm)
+  if (point.error_95_mm && std::isfinite(*point.error_95_mm))
     tip += QObject::tr("\nwithin %1 mm (95 %)").arg(fixed(*point.error_95_mm, 2));
   else
     tip += QObject::tr("\nnot located");
