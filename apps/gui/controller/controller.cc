@@ -130,6 +130,8 @@ void Controller::finish(Phase phase, const Expected<Change>& done) {
     (*done)(state_);
   else
     state_.refusals.insert_or_assign(phase, done.error());
+  if (!done && phase == Phase::registration && done.error().reason != Reason::interrupted)
+    registers_recorded_ = false;
   if (!outlining_) outline_nudged();
   emit changed();
   if (!done) emit refused(phase, sentence_of(done.error()));

@@ -4,8 +4,8 @@
 
 #include "gui/controller/controller.h"
 #include "gui/controller/equipment.h"
+#include "helicarm/operation/earlier_versions.h"
 #include "helicarm/operation/models.h"
-#include "helicarm/xray/digest.h"
 
 namespace helicarm::gui {
 
@@ -72,7 +72,7 @@ void Controller::follow_record() {
     return;
   state_.registration = registration;
   state_.is_confirmed = is_confirmed;
-  state_.registered_picks = state_.picks;
+  state_.registered_picks = equipment_->the_case->picks;
   state_.refusals.erase(Phase::registration);
   if (is_refused) state_.refusals.emplace(Phase::registration, as_recorded_.done.error());
   emit changed();
@@ -91,14 +91,15 @@ void Controller::register_as_recorded() {
             const pipeline::Case& the_case = *equipment->the_case;
             const auto measured =
                 value_or_throw(operation::measure_by_plan(the_case, plan, equipment->measurement));
-            auto found =
-                value_or_throw(operation::register_models(plan, the_case, measured, progress, then.starts));
-            if (xray::digest(to_text(operation::recorded(found))) != then.digest)
+            auto found = operation::as_recorded(
+                value_or_throw(operation::register_models(plan, the_case, measured, progress, then.starts)),
+                then.digest);
+            if (!found)
               throw BadInput(Reason::replay_differs,
                              fmt::format("{0}: the files of the session give another registration than the "
                                          "recorded one, whose report is {0}/report.html",
                                          then.folder));
-            return std::make_shared<const case_registration::CaseRegistration>(std::move(found));
+            return std::make_shared<const case_registration::CaseRegistration>(*std::move(found));
           });
           if (!done && done.error().reason == Reason::interrupted) throw BadInput(done.error());
           return [this, digest = then.digest, done](ApplicationState&) { as_recorded_ = {digest, done}; };

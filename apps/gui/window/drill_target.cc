@@ -67,9 +67,19 @@ void DrillTarget::show_guidance(const std::optional<operation::Guidance>& guidan
   update();
 }
 
+/// What to do where nothing is in the way.
+QString DrillTarget::words_on_target() const {
+  if (!guidance_->aim || guidance_->aim->depth_mm < 0) return tr("on target");
+  return is_at_end() ? tr("at the tunnel's end: stop, hold still and verify") : tr("on target: drill");
+}
+
+bool DrillTarget::is_at_end() const {
+  return guidance_->aim && guidance_->aim->depth_mm >= guidance_->aim->length_mm;
+}
+
 QString DrillTarget::words() const {
   if (!guidance_) return tr("not guided");
-  QString words = guidance_->why_not ? sentence_of(*guidance_->why_not) : tr("on target: drill");
+  QString words = guidance_->why_not ? sentence_of(*guidance_->why_not) : words_on_target();
   if (!guidance_->aim) return words;
   const operation::TunnelAim& aim = *guidance_->aim;
   if (guidance_->why_not && guidance_->why_not->reason == Reason::uncertain && aim.errors)
@@ -87,7 +97,7 @@ void DrillTarget::paintEvent(QPaintEvent*) {
   QPainter painter(this);
   painter.setRenderHint(QPainter::Antialiasing);
   painter.fillRect(rect(), style::colours().panel);
-  const bool is_on = guidance_ && !guidance_->why_not;
+  const bool is_on = guidance_ && !guidance_->why_not && !is_at_end();
   const QColor decision = !guidance_ ? style::colours().quiet
                           : is_on    ? style::colours().green
                                      : style::colours().amber;

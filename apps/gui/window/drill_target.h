@@ -33,6 +33,9 @@ class DrillTarget : public QWidget {
   void paintEvent(QPaintEvent* event) override;
 
  private:
+  QString words_on_target() const;
+  bool is_at_end() const;
+
   std::optional<operation::Guidance> guidance_;
   double tolerance_mm_ = 1, tolerance_deg_ = 2;
 };

@@ -27,6 +27,7 @@ namespace helicarm::gui {
 namespace {
 
 constexpr int live_ms = 20;
+constexpr int refusal_stays_ms = 5000;
 
 /// The first step that is not done; the plan is the last one of a case of files.
 Phase open_phase(const std::array<StepCard, phases.size()>& cards, const ApplicationState& state) {
@@ -61,6 +62,7 @@ MainWindow::MainWindow(std::filesystem::path sessions, QWidget* parent)
     show_phase(phase);
     log(why);
     statusBar()->showMessage(why);
+    if (controller_.state().busy) refusal_stays_.setRemainingTime(refusal_stays_ms);
   });
   connect(&controller_, &Controller::exported, this, &MainWindow::tell_of_the_export);
   connect(&controller_, &Controller::told, this, &MainWindow::tell);
@@ -231,7 +233,9 @@ void MainWindow::show_state() {
   const auto stands = [&](const auto& refusal) {
     return sentence_of(refusal.second) == statusBar()->currentMessage();
   };
-  if (state.busy)
+  if (!refusal_stays_.hasExpired()) {
+    // of what was asked for during other work, whose steps would replace it
+  } else if (state.busy)
     statusBar()->showMessage(text(state.doing));
   else if (std::ranges::none_of(state.refusals, stands))
     statusBar()->clearMessage();

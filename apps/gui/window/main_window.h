@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <QDeadlineTimer>
 #include <QLabel>
 #include <QMainWindow>
 #include <QPlainTextEdit>
@@ -227,7 +228,8 @@ class MainWindow : public QMainWindow {
   QWidget* busy_ = nullptr;  ///< progress and Cancel
   QLabel* recording_ = nullptr;
   QLabel* told_ = nullptr;
-  StepCards cards_;  ///< without the devices
+  QDeadlineTimer refusal_stays_;  ///< in the status line
+  StepCards cards_;               ///< without the devices
 
   LiveState live_;
   std::optional<TreCut> cut_;

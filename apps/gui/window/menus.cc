@@ -158,6 +158,7 @@ void MainWindow::build_recent() {
 }
 
 void MainWindow::ask_and_export() {
+  if (controller_.state().busy) return controller_.export_to({});  // says that it waits
   auto* dialog = new QFileDialog(this, tr("Folder for the report and the results"));
   dialog->setObjectName("exportDialog");
   dialog->setFileMode(QFileDialog::AnyFile);  // a new folder is made

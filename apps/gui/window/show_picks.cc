@@ -49,9 +49,15 @@ void MainWindow::show_picks_in(std::size_t panel, std::size_t number,
   xray.set_movable_picks(phase_ == Phase::plan && takes ? picks : std::vector<FreshPick>{});
   xray.set_picking(wanted.has_value() && takes);
   if (!panels_->panel(panel).shows_own_frame()) return;
+  const auto is_in_result = [&](const std::string& name) {
+    return std::ranges::any_of(shown_->points, [&](const pipeline::PointResult& point) {
+      return point.name == name && point.seen[number];
+    });
+  };
   if (!next_pick(state) && out_of_date_.isEmpty())  // the result shows the others
     std::erase_if(picks, [&](const FreshPick& pick) {
-      return pick.why_failed.isEmpty() && !stale_points_.contains(pick.name.toStdString());
+      const std::string name = pick.name.toStdString();
+      return pick.why_failed.isEmpty() && !stale_points_.contains(name) && is_in_result(name);
     });
   xray.set_picks(std::move(picks));
   const auto path = state.path.by_view.find(view.name);

@@ -76,6 +76,19 @@ TEST_F(WindowCameras, ALocatedPointHasNoError) {
   screenshot("cameras-points");
 }
 
+TEST_F(WindowCameras, APickInOneViewIsShownBesideTheModels) {
+  ASSERT_TRUE(open());
+  click("placeModels");
+  ASSERT_TRUE(wait("the models are displayed", [&] { return state().at_starts && !state().busy; }));
+  show(Phase::plan);
+  window_->controller().add_landmark("L1");
+  ASSERT_TRUE(wait("the X-ray is shown", [&] { return !state().busy && !window_->xray(0).is_computing(); }));
+  const QImage without = window_->xray(0).image_with_marks();
+  window_->controller().pick({.name = "L1", .view = state().views[0], .uv_raw = {250, 260}});
+  ASSERT_TRUE(wait("it is picked", [&] { return !state().busy && !window_->xray(0).is_computing(); }));
+  EXPECT_NE(window_->xray(0).image_with_marks(), without);
+}
+
 TEST_F(WindowCameras, ACameraThatCannotBeReadIsNamed) {
   write_case_with_cameras(folder_ / "case");
   ASSERT_TRUE(write_file(folder_ / "case" / "LAT.json", "{\"K\": 7}"));

@@ -23,6 +23,12 @@ TEST_F(Window, AModelIsRegisteredAndMovedByHand) {
   EXPECT_EQ(find<QTableWidget>("modelTable")->item(0, 1)->text(), "not registered");
   screenshot("register-first");
   click("registerModels");
+  ASSERT_TRUE(state().busy);
+  for (QAction* action : window_->findChildren<QAction*>())
+    if (action->shortcut() == QKeySequence("Ctrl+E")) action->trigger();
+  emit window_->controller().changed();  // a step of the registration
+  EXPECT_TRUE(window_->statusBar()->currentMessage().contains("Nothing is exported during other work"));
+  EXPECT_EQ(window_->findChild<QDialog*>("exportDialog"), nullptr);
   ASSERT_TRUE(wait("the model is registered", [&] { return state().registration && !state().busy; }));
   EXPECT_TRUE(window_->strip().button(Phase::registration)->isChecked());
   EXPECT_NE(card(Phase::registration).status, StepStatus::refused)

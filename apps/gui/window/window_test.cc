@@ -177,6 +177,21 @@ TEST(DrillTargets, SayWhatMakesADecisionUncertain) {
   EXPECT_THAT(words, HasSubstr("scatter 0.7 mm, 1.7°"));
 }
 
+TEST(DrillTargets, SayToDrillBetweenEntryAndEndAlone) {
+  const auto words_at = [](double depth_mm) {
+    operation::Guidance guidance;
+    guidance.aim.emplace();
+    guidance.aim->length_mm = 30;
+    guidance.aim->depth_mm = depth_mm;
+    DrillTarget target;
+    target.show_guidance(guidance, {});
+    return target.words().section('\n', 0, 0).toStdString();
+  };
+  EXPECT_EQ(words_at(-5), "on target");
+  EXPECT_EQ(words_at(12), "on target: drill");
+  EXPECT_THAT(words_at(30.2), HasSubstr("stop"));
+}
+
 TEST_F(Window, ADrillInTheHandIsGuidedAndTheTunnelVerified) {
   open_rehearsal({.by_hand = true});
   EXPECT_FALSE(find<HoldButton>("unlock")->isVisibleTo(find<QWidget>("pages")));

@@ -47,23 +47,25 @@ void judge_explained(const MarkupPlan& plan, registration::Registration& result)
   if (!result.not_explained) return;
   std::vector<std::string> points, tunnels;
   for (const PlanPoint& point : plan.points)
-    if (result.not_explained->has(point.in_model)) points.push_back(point.name);
+    if (result.not_explained->may_have(point.in_model)) points.push_back(point.name);
   for (const MarkupLine& tunnel : plan.tunnels)
     for (const std::size_t end : {tunnel.start, tunnel.end})
-      if (result.not_explained->has(plan.points[end].in_model)) {
+      if (result.not_explained->may_have(plan.points[end].in_model, tunnel.diameter_mm.value_or(0) / 2)) {
         tunnels.push_back(tunnel.name);
         break;
       }
-  if (points.empty()) return;
+  if (points.empty() && tunnels.empty()) return;
   const bool refuses = !tunnels.empty();
-  add_finding(result,
-              {Reason::wrong_model,
-               fmt::format("{}: planned in the part that the pose does not explain: {}; their stated errors "
-                           "do not hold. Register that part as a model of its own, with a mask of it",
-                           result.name, fmt::join(refuses ? tunnels : points, ", ")),
-               {},
-               {{"points", double(points.size())}, {"tunnels", double(tunnels.size())}}},
-              refuses);
+  add_finding(
+      result,
+      {Reason::wrong_model,
+       fmt::format(
+           "{}: planned in the part that the pose does not explain, or within {:.0f} mm of it: "
+           "{}; their stated errors do not hold. Register that part as a model of its own, with a mask of it",
+           result.name, registration::NotExplained::margin_mm, fmt::join(refuses ? tunnels : points, ", ")),
+       {},
+       {{"points", double(points.size())}, {"tunnels", double(tunnels.size())}}},
+      refuses);
 }
 
 void add_finding(registration::Registration& result, Failure finding, bool refuses) {

@@ -60,35 +60,41 @@ TEST(PlanErrors, AnErrorThatIsNotKnownExceedsEveryLimit) {
 class NotExplained : public testing::Test {
  protected:
   /// With the part above z = 10 not explained, and a plan of a point and a tunnel at these heights.
-  registration::Registration judged(double point_z, double tunnel_z) {
+  registration::Registration judged(double point_z, double tunnel_z, std::optional<double> diameter_mm = {}) {
     registration::Registration result;
     result.decision = registration::Decision::warn;
     result.not_explained = {Vector3d(0, 0, 10), Vector3d::UnitZ()};
     const MarkupPlan plan{{{"P", {0, 0, point_z}}, {"T_start", {0, 0, -30}}, {"T_end", {0, 0, tunnel_z}}},
-                          {{"T", 1, 2}}};
+                          {{"T", 1, 2, diameter_mm}}};
     judge_explained(plan, result);
     return result;
   }
 };
 
 TEST_F(NotExplained, AnythingPlannedInTheRestIsAccepted) {
-  const auto result = judged(5, 5);
+  const auto result = judged(-5, -5);
   EXPECT_FALSE(result.failure);
   EXPECT_TRUE(result.warnings.empty());
 }
 
 TEST_F(NotExplained, APointPlannedThereIsWarnedOf) {
-  const auto result = judged(15, 5);
+  const auto result = judged(15, -5);
   EXPECT_FALSE(result.failure);
   ASSERT_EQ(result.warnings.size(), 1u);
-  EXPECT_THAT(result.warnings[0].message, HasSubstr("does not explain: P; their"));
+  EXPECT_THAT(result.warnings[0].message, HasSubstr("or within 12 mm of it: P; their"));
 }
 
 TEST_F(NotExplained, ATunnelThatReachesThereIsRefused) {
-  const auto result = judged(5, 15);
+  const auto result = judged(-5, 15);
   ASSERT_TRUE(result.failure);
   EXPECT_EQ(result.failure->reason, Reason::wrong_model);
-  EXPECT_THAT(result.failure->message, HasSubstr("does not explain: T; their"));
+  EXPECT_THAT(result.failure->message, HasSubstr("or within 12 mm of it: T; their"));
+}
+
+TEST_F(NotExplained, TheCutIsKnownToAboutAMarginAndTunnelsAreWide) {
+  EXPECT_TRUE(judged(-5, 0).failure);
+  EXPECT_FALSE(judged(-5, -4).failure);
+  EXPECT_TRUE(judged(-5, -4, 6).failure);
 }
 
 }  // namespace

@@ -16,7 +16,8 @@ pipeline::Progress Progress::of_views() const {
   return progress;
 }
 
-Progress progress_in_words(std::function<void(const std::string&)> tell, std::function<void()> interrupt) {
+Progress progress_in_words(std::function<void(const std::string&)> tell, std::function<void()> interrupt,
+                           std::chrono::milliseconds between_shares) {
   using Clock = std::chrono::steady_clock;
   struct Step {
     std::string words;
@@ -29,9 +30,9 @@ Progress progress_in_words(std::function<void(const std::string&)> tell, std::fu
     *present = {fmt::format("{}{}{}", model, model.empty() ? "" : ": ", step), Clock::now()};
     tell(present->words);
   };
-  progress.share = [present, tell](double share) {
+  progress.share = [present, tell, between_shares](double share) {
     const auto now = Clock::now();
-    if (now - present->told < std::chrono::seconds(1)) return;
+    if (now - present->told < between_shares) return;
     present->told = now;
     tell(fmt::format("{}, {:.0f} %", present->words, std::floor(100 * share)));
   };

@@ -9,13 +9,23 @@
 namespace helicarm::case_registration {
 namespace {
 
-TEST(ProgressInWords, StepsAreToldAtOnceAndShortOnesWithoutShares) {
+/// What is told of a step that is half done.
+std::vector<std::string> told_of_half(std::chrono::milliseconds between_shares) {
   std::vector<std::string> told;
-  const Progress progress = progress_in_words([&](const std::string& words) { told.push_back(words); }, {});
+  const auto tell = [&](const std::string& words) { told.push_back(words); };
+  const Progress progress = progress_in_words(tell, {}, between_shares);
   progress.step("", "read");
   progress.step("femur", "search");
   progress.share(0.5);
-  EXPECT_THAT(told, testing::ElementsAre("read", "femur: search"));
+  return told;
+}
+
+TEST(ProgressInWords, AShareFollowsTheStep) {
+  EXPECT_THAT(told_of_half({}), testing::ElementsAre("read", "femur: search", "femur: search, 50 %"));
+}
+
+TEST(ProgressInWords, SharesAreNotToldMoreOften) {
+  EXPECT_THAT(told_of_half(std::chrono::hours(1)), testing::ElementsAre("read", "femur: search"));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -47,8 +48,9 @@ struct Progress {
   pipeline::Progress of_views() const;
 };
 
-/// Tells each step as "femur: search" and, once a second, with its share: "femur: search, 40 %".
-Progress progress_in_words(std::function<void(const std::string&)> tell, std::function<void()> interrupt);
+/// Tells each step as "femur: search" and, not more often, with its share: "femur: search, 40 %".
+Progress progress_in_words(std::function<void(const std::string&)> tell, std::function<void()> interrupt,
+                           std::chrono::milliseconds between_shares = std::chrono::seconds(1));
 
 /// A point of a plan carried to the world, bones and tool.
 struct RegisteredPoint {

@@ -6,8 +6,10 @@
 #include <utility>
 
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/operation/models.h"
 #include "helicarm/pipeline/poses_json.h"
 #include "helicarm/registration/causes.h"
+#include "helicarm/xray/digest.h"
 
 namespace helicarm::operation {
 namespace {
@@ -84,6 +86,13 @@ case_registration::CaseRegistration as_registered_earlier(case_registration::Cas
                                               : Decision::warn;
   }
   return registration;
+}
+
+std::optional<case_registration::CaseRegistration> as_recorded(
+    const case_registration::CaseRegistration& registration, const std::string& digest) {
+  for (const auto& each : {registration, as_registered_earlier(registration)})
+    if (xray::digest(to_text(recorded(each))) == digest) return each;
+  return std::nullopt;
 }
 
 bool states_depth(const Json& result) {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/operation/plan.h"
 
@@ -21,6 +24,11 @@ Json in_keys_of(const Json& then, const Json& now);
 
 /// Earlier versions did not know which part of a model its pose leaves unexplained.
 case_registration::CaseRegistration as_registered_earlier(case_registration::CaseRegistration registration);
+
+/// The registration, or what an earlier version made of it, whose record has this digest; nothing where the
+/// recorded one is another.
+std::optional<case_registration::CaseRegistration> as_recorded(
+    const case_registration::CaseRegistration& registration, const std::string& digest);
 
 /// Earlier versions did not state how deep a verified drill was.
 bool states_depth(const Json& result);

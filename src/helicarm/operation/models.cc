@@ -246,8 +246,8 @@ Expected<void> check_error_at_tip(const OperationPlan& plan, const OperationTunn
     const double of_start = error_95_mm(start, plan.tracker.noise(), tool);
     const double of_end = error_95_mm(end, plan.tracker.noise(), tool);
     if (of_start <= plan.max_error_mm && of_end <= plan.max_error_mm) return;
-    throw BadInput(of_start > of_end ? too_uncertain(plan, tunnel, tunnel.start, start, tool)
-                                     : too_uncertain(plan, tunnel, tunnel.end, end, tool));
+    throw BadInput(!(of_start <= of_end) ? too_uncertain(plan, tunnel, tunnel.start, start, tool)
+                                         : too_uncertain(plan, tunnel, tunnel.end, end, tool));
   });
 }
 

@@ -240,6 +240,9 @@ class Replay {
     measurement_.reset();
     registration_.reset();
     is_confirmed_ = false;
+    result_.reset();
+    without_models_.reset();
+    newest_.reset();
   }
 
   /// From the model files, images and picks before it.
@@ -252,17 +255,10 @@ class Replay {
     auto now = register_models(plan_, *measured_, *measurement_, {}, record.starts);
     if (!now) return differ(origin, now.error().message);
     registered_digest_ = record.digest;
-    const auto is_recorded = [&](const case_registration::CaseRegistration& registration) {
-      return record.digest == xray::digest(to_text(recorded(registration)));
-    };
-    if (!is_recorded(*now)) {
-      auto earlier = as_registered_earlier(*now);
-      if (!is_recorded(earlier))
-        differ(origin, "the registration differs from the recorded one on recomputation");
-      else
-        now = std::move(earlier);
-    }
+    registration_ = as_recorded(*now, record.digest);
+    if (registration_) return;
     registration_ = *std::move(now);
+    differ(origin, "the registration differs from the recorded one on recomputation");
   }
 
   /// Before it no tunnel of a model is known to the records that follow.
@@ -292,6 +288,7 @@ class Replay {
   void take(const record::Guided& then, const std::string& origin) {
     ++report.decisions;
     if (!guide_) return differ(origin, "a decision before guidance began");
+    if (!result_) return differ(origin, "a decision on images that had been replaced");
     const bool states_causes = !then.guidance.aim || then.guidance.aim->errors;
     const record::Guided now{then.tunnel, then.window, guide_->at(then.window, states_causes)};
     compare(content_of(then), content_of(now), origin, "decision");

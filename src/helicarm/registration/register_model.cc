@@ -35,7 +35,7 @@ constexpr double voxel_edge_sigma = 0.2;
 // changing thickness) shifts edges over longer ways than residuals show. Without it chi-square of simulated
 // wrist bones' poses was up to 30 for 6 degrees of freedom.
 constexpr double voxel_residual_inflation = 3;
-constexpr double part_shift_mm = 8, part_turn_deg = 10;  // searched for the parts of a refused model
+constexpr double part_shift_mm = 8, part_turn_deg = 10;  // searched for the parts of a model
 constexpr double alone_prior_mm = 10;                    // keeps a single view from running along its rays
 
 /// Levels from coarse to fine for this model and these views.

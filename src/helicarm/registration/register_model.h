@@ -82,7 +82,12 @@ struct NotExplained {
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< of the plane before it; model coordinates
   Eigen::Vector3d towards = Eigen::Vector3d::UnitX();
 
-  bool has(const Eigen::Vector3d& in_model) const { return towards.dot(in_model - at) > 0; }
+  /// As comparisons have no depth, the plane is known to about this.
+  static constexpr double margin_mm = 12;
+  /// Whether a ball about a point may reach the part.
+  bool may_have(const Eigen::Vector3d& in_model, double radius_mm = 0) const {
+    return !(towards.dot(in_model - at) < -(margin_mm + radius_mm));
+  }
 };
 
 /// Pose of a model in the views' world with what is known of its error.

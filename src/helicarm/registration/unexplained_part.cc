@@ -12,7 +12,7 @@ constexpr double largest_ray_cosine = 0.7;  // 45 degrees
 constexpr int least_side_comparisons = 16;
 constexpr double least_side_share = 0.1;
 constexpr double farthest_radii = 6;            // of a plane from the model's centre, in its rms radius
-constexpr double least_tried_difference = 0.2;  // a part is registered from it on: that takes a second
+constexpr double least_tried_difference = 0.2;  // a part is registered from it on
 // Of a part alone: by how much it agrees better, how far from the pose of the whole, and in how many places
 // of each view.
 constexpr double least_part_gain = 0.15;

@@ -200,13 +200,20 @@ TEST_F(GuidedDrill, TunnelDrilledTooDeepIsVerifiedWithItsDepth) {
   EXPECT_TRUE(earlier->complete()) << fmt::format("{}", fmt::join(earlier->differences, "\n"));
   EXPECT_FALSE(earlier->guidances.front().ended_s);
 
-  auto of_another = records();
+  auto of_another = records(), of_replaced_images = of_another;
   for (operation::SessionRecord& record : of_another)
     if (record.kind == "outcome") record.content["tunnel"] = "tibia";
   operation_.reset();
   rewrite_record(folder_.path() / "session", of_another);
   EXPECT_THAT(operation::replay(folder_.path() / "session")->differences,
               testing::Contains(testing::HasSubstr("femur: ended as verified without an outcome")));
+
+  const auto kind = &operation::SessionRecord::kind;
+  of_replaced_images.insert(std::ranges::find(of_replaced_images, "guided", kind),
+                            *std::ranges::find(of_replaced_images, "exposure", kind));
+  rewrite_record(folder_.path() / "session", of_replaced_images);
+  EXPECT_THAT(operation::replay(folder_.path() / "session")->differences,
+              testing::Contains(testing::HasSubstr("a decision on images that had been replaced")));
 }
 
 TEST_F(GuidedDrill, DrillIsVerifiedInTheGuidedTunnelOrWhereItIs) {
