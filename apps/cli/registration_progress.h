@@ -28,7 +28,7 @@ class RegistrationProgress {
 
  private:
   void begin(const std::string& model, std::string_view step) {
-    const std::string words = fmt::format("{}{}{}", model, model.empty() ? "" : ": ", step);
+    const std::string words = case_registration::words_of_step(model, step);
     line_.reset();
     console_.progress << fmt::format("helicarm: {}\n", words);
     if (!console_.tags) line_.emplace(console_, words);

@@ -40,7 +40,7 @@ case_registration::RegisterOptions measuring_options(const char* function, const
 
 case_registration::Progress progress_of(const RunHooks& hooks) {
   return {[&hooks](const std::string& model, std::string_view step) {
-            hooks.on_stage(model.empty() ? std::string(step) : model + ": " + std::string(step));
+            hooks.on_stage(case_registration::words_of_step(model, step));
           },
           hooks.on_view};
 }

@@ -7,7 +7,8 @@ import sys
 
 import numpy as np
 
-from motion_scene import AXES, DIAMETER, DISTANCE, FOCUS, SIZE, add_ball, blurred, png, projected, rms, table, track, turn
+from motion_scene import AXES, DIAMETER, DISTANCE, FOCUS, SIZE, add_ball, blurred, png, projected, rms, table, track
+from rotations import rotation
 
 
 def published_rows(path, scale):
@@ -53,7 +54,7 @@ def image_fit(body, places, cameras):
                 information += (by_place @ by_step).T @ by_place @ by_step
                 gradient += (by_place @ by_step).T @ by_place @ (seen - at)
         step = np.linalg.solve(information, gradient)
-        pose[:3, :3] = turn(step[:3]) @ pose[:3, :3]
+        pose[:3, :3] = rotation(step[:3]) @ pose[:3, :3]
         pose[:3, 3] += step[3:]
     return pose
 

@@ -10,18 +10,11 @@ import zlib
 
 import numpy as np
 
+from rotations import rotation
+
 SIZE, FOCUS, DISTANCE, DIAMETER, RATE_HZ = 1024, 3600.0, 900.0, 1.0, 50.0
 BODIES = ("jaw", "skull")
 AXES = [np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]]), np.array([[0.28, -0.96, 0], [0, 0, -1], [0.96, 0.28, 0.0]])]
-
-
-def turn(vector):
-    angle = np.linalg.norm(vector)
-    if angle < 1e-12:
-        return np.eye(3)
-    x, y, z = vector / angle
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 class Scene:
@@ -39,8 +32,8 @@ class Scene:
         """world_from_body of a moment, in frames."""
         wave = lambda period, k: np.sin(2 * np.pi * t / period + self.phase[k]) - np.sin(self.phase[k])
         if body == "skull":
-            return turn(np.array([0.02 * wave(70, 0), 0.01 * wave(55, 1), 0])), np.array([1.5 * wave(90, 2), 0, wave(75, 3)])
-        return (turn(np.array([0.2 * wave(25, 0), 0.04 * wave(40, 1), 0.07 * wave(25, 4)])),
+            return rotation(np.array([0.02 * wave(70, 0), 0.01 * wave(55, 1), 0])), np.array([1.5 * wave(90, 2), 0, wave(75, 3)])
+        return (rotation(np.array([0.2 * wave(25, 0), 0.04 * wave(40, 1), 0.07 * wave(25, 4)])),
                 np.array([3.5 * wave(30, 5), 3 * wave(25, 3), 4 * wave(25, 0)]))
 
     def places(self, t):

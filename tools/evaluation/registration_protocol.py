@@ -39,19 +39,11 @@ import numpy as np
 
 import evaluation_rows
 from registration_bodies import KINDS, Heads, Knees, Surfaces
+from rotations import rotation
 
 VISIBLE = ("patient", "mirrored", "tibia", "moved", "scaled", "camera")
 CHI2_95 = 7.815
 BINS = 20  # of 1 mm
-
-
-def rotation(vector):
-    angle = np.linalg.norm(vector)
-    if angle < 1e-12:
-        return np.eye(3)
-    x, y, z = vector / angle
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * k + (1 - math.cos(angle)) * k @ k
 
 
 def moved(pose, centre, shift, vector):

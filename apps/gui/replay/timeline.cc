@@ -179,7 +179,6 @@ struct Take {
   }
   void forget_measurement() const {
     state.measured = false;
-    state.guidance.reset();
     state.outcomes.clear();
     state.loops.clear();
     forget_models();
@@ -204,15 +203,12 @@ struct Take {
   void operator()(const record::Touched& touched) const { see(touched.window); }
   void operator()(const record::Guide& guide) const {
     state.tunnel = guide.tunnel;
-    state.guidance.reset();
     see(guide.window);
   }
   void operator()(const record::Guided& guided) const {
     state.tunnel = guided.tunnel;
-    state.guidance = guided.guidance;
     see(guided.window);
   }
-  void operator()(const record::GuidanceEnded&) const { state.guidance.reset(); }
   void operator()(const record::Refused& refused) const {
     if (!refused.picture) forget_measurement();  // an earlier image was found to be delayed
   }

@@ -50,9 +50,8 @@ struct SessionState {
   std::optional<std::size_t> registered_at;                      ///< moment of the latest registration
   std::optional<double> hand_eye_rms_mm;                         ///< of it
   std::string tunnel;                                            ///< target of the newest order or guidance
-  std::optional<operation::Guidance> guidance;          ///< the newest decision on a drill guided now
-  std::optional<operation::record::Registered> models;  ///< the registration of the plan's models
-  bool is_confirmed = false;                            ///< by a person, that registration
+  std::optional<operation::record::Registered> models;           ///< the registration of the plan's models
+  bool is_confirmed = false;                                     ///< by a person, that registration
 };
 
 /// Reads session.log in a session's folder. An incomplete end is left out and reported in `torn`; refuses as

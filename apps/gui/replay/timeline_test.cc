@@ -154,15 +154,10 @@ TEST_F(TimelineTest, AHandHeldDrillReplaysWithItsTouchesAndGuidance) {
   EXPECT_EQ(timeline.moments[last].summary,
             "Drill at tibia, 1.25 mm and 3.0° off its axis: 1.2 mm off the axis");
   const SessionState state = state_at(timeline, last).value();
-  ASSERT_TRUE(state.guidance);
-  EXPECT_EQ(operation::to_json(*state.guidance), operation::to_json(off));
   EXPECT_EQ(state.tunnel, "tibia");
   EXPECT_EQ(state.tracker_from.at("femur").translation.x(), 6);
-  EXPECT_FALSE(state_at(timeline, last - 1).value().guidance) << "before the first decision";
   add(GuidanceEnded{"tibia", GuidanceEndedBy::person});
-  const Timeline ended = read();
-  EXPECT_EQ(ended.moments.back().summary, "Guidance to tibia ended: by the person");
-  EXPECT_FALSE(state_at(ended, last + 1).value().guidance);
+  EXPECT_EQ(read().moments.back().summary, "Guidance to tibia ended: by the person");
 }
 
 /// A measurement of a plan with a tunnel of picks, in the tibia, and one of a model, in the femur.

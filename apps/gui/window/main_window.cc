@@ -230,15 +230,7 @@ void MainWindow::show_state() {
   recording_->setText(replays ? tr("▶ replay") : tr("● recording"));
   recording_->setVisible(replays || state.source == Source::virtual_or || state.source == Source::devices);
   recording_->setToolTip(tr("Every step is recorded in %1").arg(text(state.folder.string())));
-  const auto stands = [&](const auto& refusal) {
-    return sentence_of(refusal.second) == statusBar()->currentMessage();
-  };
-  if (!refusal_stays_.hasExpired()) {
-    // of what was asked for during other work, whose steps would replace it
-  } else if (state.busy)
-    statusBar()->showMessage(text(state.doing));
-  else if (std::ranges::none_of(state.refusals, stands))
-    statusBar()->clearMessage();
+  show_work(state);
   save_->setEnabled(state.has_unsaved_picks);
   show_edits();
   show_images();
@@ -249,6 +241,16 @@ void MainWindow::show_state() {
   show_ct_plan();
   points_->show_state(state);
   focus_->restore(pages_->currentWidget());
+}
+
+/// In the status line.
+void MainWindow::show_work(const ApplicationState& state) {
+  if (!refusal_stays_.hasExpired()) return;
+  if (state.busy) return statusBar()->showMessage(text(state.doing));
+  const auto stands = [&](const auto& refusal) {
+    return sentence_of(refusal.second) == statusBar()->currentMessage();
+  };
+  if (std::ranges::none_of(state.refusals, stands)) statusBar()->clearMessage();
 }
 
 void MainWindow::show_edits() {

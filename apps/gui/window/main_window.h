@@ -115,6 +115,7 @@ class MainWindow : public QMainWindow {
   /// The controller's, with the recorded steps at a replayed moment.
   ApplicationState displayed_state() const;
   void refresh_present();
+  void show_work(const ApplicationState& state);
   void show_edits();
   void show_state();
   void show_images();
@@ -228,7 +229,7 @@ class MainWindow : public QMainWindow {
   QWidget* busy_ = nullptr;  ///< progress and Cancel
   QLabel* recording_ = nullptr;
   QLabel* told_ = nullptr;
-  QDeadlineTimer refusal_stays_;  ///< in the status line
+  QDeadlineTimer refusal_stays_;  ///< of what was asked for during other work: its steps do not replace it
   StepCards cards_;               ///< without the devices
 
   LiveState live_;

@@ -48,12 +48,11 @@ void judge_explained(const MarkupPlan& plan, registration::Registration& result)
   std::vector<std::string> points, tunnels;
   for (const PlanPoint& point : plan.points)
     if (result.not_explained->may_have(point.in_model)) points.push_back(point.name);
+  const auto reaches = [&](const MarkupLine& tunnel, std::size_t end) {
+    return result.not_explained->may_have(plan.points[end].in_model, tunnel.diameter_mm.value_or(0) / 2);
+  };
   for (const MarkupLine& tunnel : plan.tunnels)
-    for (const std::size_t end : {tunnel.start, tunnel.end})
-      if (result.not_explained->may_have(plan.points[end].in_model, tunnel.diameter_mm.value_or(0) / 2)) {
-        tunnels.push_back(tunnel.name);
-        break;
-      }
+    if (reaches(tunnel, tunnel.start) || reaches(tunnel, tunnel.end)) tunnels.push_back(tunnel.name);
   if (points.empty() && tunnels.empty()) return;
   const bool refuses = !tunnels.empty();
   add_finding(

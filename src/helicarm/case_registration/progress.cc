@@ -16,6 +16,10 @@ pipeline::Progress Progress::of_views() const {
   return progress;
 }
 
+std::string words_of_step(const std::string& model, std::string_view step) {
+  return fmt::format("{}{}{}", model, model.empty() ? "" : ": ", step);
+}
+
 Progress progress_in_words(std::function<void(const std::string&)> tell, std::function<void()> interrupt,
                            std::chrono::milliseconds between_shares) {
   using Clock = std::chrono::steady_clock;
@@ -27,7 +31,7 @@ Progress progress_in_words(std::function<void(const std::string&)> tell, std::fu
   Progress progress;
   progress.interrupt = std::move(interrupt);
   progress.step = [present, tell](const std::string& model, std::string_view step) {
-    *present = {fmt::format("{}{}{}", model, model.empty() ? "" : ": ", step), Clock::now()};
+    *present = {words_of_step(model, step), Clock::now()};
     tell(present->words);
   };
   progress.share = [present, tell, between_shares](double share) {

@@ -48,6 +48,9 @@ struct Progress {
   pipeline::Progress of_views() const;
 };
 
+/// "femur: search"; the step alone where it is of the views.
+std::string words_of_step(const std::string& model, std::string_view step);
+
 /// Tells each step as "femur: search" and, not more often, with its share: "femur: search, 40 %".
 Progress progress_in_words(std::function<void(const std::string&)> tell, std::function<void()> interrupt,
                            std::chrono::milliseconds between_shares = std::chrono::seconds(1));

@@ -89,10 +89,11 @@ case_registration::CaseRegistration as_registered_earlier(case_registration::Cas
 }
 
 std::optional<case_registration::CaseRegistration> as_recorded(
-    const case_registration::CaseRegistration& registration, const std::string& digest) {
-  for (const auto& each : {registration, as_registered_earlier(registration)})
-    if (xray::digest(to_text(recorded(each))) == digest) return each;
-  return std::nullopt;
+    case_registration::CaseRegistration registration, const std::string& digest) {
+  const auto is_recorded = [&] { return xray::digest(to_text(recorded(registration))) == digest; };
+  if (is_recorded()) return registration;
+  registration = as_registered_earlier(std::move(registration));
+  return is_recorded() ? std::optional(std::move(registration)) : std::nullopt;
 }
 
 bool states_depth(const Json& result) {

@@ -28,7 +28,7 @@ case_registration::CaseRegistration as_registered_earlier(case_registration::Cas
 /// The registration, or what an earlier version made of it, whose record has this digest; nothing where the
 /// recorded one is another.
 std::optional<case_registration::CaseRegistration> as_recorded(
-    const case_registration::CaseRegistration& registration, const std::string& digest);
+    case_registration::CaseRegistration registration, const std::string& digest);
 
 /// Earlier versions did not state how deep a verified drill was.
 bool states_depth(const Json& result);

@@ -5,40 +5,21 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/registration/scene_test.h"
+#include "helicarm/registration/cut_scene_test.h"
 
 namespace helicarm::registration {
 namespace broken_test {
 
-using Eigen::Vector2d;
-using Eigen::Vector3d;
 using geometry::RigidTransform;
 
-constexpr double cut_z = 40;  // of the model; its bone reaches from 7 to 63
-
 /// A refused registration whose patches agree below the cut and, by `beyond`, not beyond it.
-struct Refused {
-  Model model = *model_from("bone", lopsided_bone(), std::nullopt, HuWindow{150, 3000});
-  std::vector<RegistrationView> views = std::vector<RegistrationView>(2);
-  Registration found;
+struct Refused : CutScene {
   int registered = 0;
-  RigidTransform of_part[2];  ///< poses of the part below and of the one beyond
+  RigidTransform of_part[2] = {found.world_from_model,
+                               found.world_from_model};  ///< of the part below and of the one beyond
   bool is_refused[2] = {false, false};
 
-  explicit Refused(double beyond = 0.05) {
-    const RigidTransform pose{Eigen::Matrix3d::Identity(), -model.centre};
-    found.world_from_model = of_part[0] = of_part[1] = pose;
-    found.centre = pose * model.centre;
-    for (std::size_t i = 0; i < 2; ++i) {
-      views[i].view = view_from(i == 0 ? 0 : 80);
-      RegisteredView& view = found.views.emplace_back();
-      for (double x = -10; x <= 10; x += 4)
-        for (double z = 8; z < 68; z += 4) {
-          const Vector3d at = model.centre + Vector3d(x, x, z - model.centre.z());
-          view.agreements.push_back({views[i].view.project(pose * at), z < cut_z ? 0.7 : beyond, 1});
-        }
-    }
-  }
+  explicit Refused(double beyond = 0.05) : CutScene({beyond, beyond}) {}
   auto broken() {
     return broken_bone(model, views, found, [&](const Model& part, const RigidTransform&) {
       ++registered;
