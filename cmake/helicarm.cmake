@@ -31,7 +31,8 @@ if(NOT HELICARM_PORTABLE)
 endif()
 if(HELICARM_SANITIZE STREQUAL "thread")
   # GCC warns that it does not instrument fences; std::atomic_thread_fence occurs in Asio alone.
-  target_compile_options(helicarm_flags INTERFACE -fsanitize=thread -fno-omit-frame-pointer -Wno-tsan)
+  target_compile_options(helicarm_flags INTERFACE -fsanitize=thread -fno-omit-frame-pointer
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-tsan>)
   target_link_options(helicarm_flags INTERFACE -fsanitize=thread)
 elseif(HELICARM_SANITIZE)
   target_compile_options(helicarm_flags INTERFACE -fsanitize=address,undefined -fno-sanitize-recover=all

@@ -20,6 +20,12 @@ struct Column {
   std::string title, definition;
   bool is_number = false;
 };
+inline Column words(std::string title, std::string definition) {
+  return {std::move(title), std::move(definition), false};
+}
+inline Column number(std::string title, std::string definition) {
+  return {std::move(title), std::move(definition), true};
+}
 
 /// Every cell is plain text: the outputs escape it. Each row has a cell per column.
 struct Table {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/sweep/estimate_frame.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -161,6 +162,30 @@ Expected<FrameEstimate> estimate_frame(const Frame& frame, const xray::ImageFile
   estimate.failure = done.error();
   estimate.failure->view = frame.view.name;
   return estimate;
+}
+
+void refuse(FrameEstimate& estimate, Failure failure, const std::string& view) {
+  failure.view = view;
+  estimate.failure = std::move(failure);
+}
+
+void calibrate_with(double factor, const pipeline::Case& base, FrameEstimate& at, const std::string& view) {
+  constexpr double largest_ratio = 4;  // of a frame's residuals to the run's noise
+  if (at.failure) return;
+  for (fiducials::Fiducial& ball : at.fiducials.fiducials) ball.sigma_px *= factor;
+  at.fiducials.map_covariance_px2 *= factor * factor;
+  at.fiducials.start = at.alone->view;
+  auto again = calibrate_alone(at, base);
+  if (again) {
+    const double ratio = std::sqrt(at.alone->chi2 / std::max(1, at.alone->dof));
+    if (ratio > largest_ratio)
+      again = fail(Reason::residual_too_large,
+                   fmt::format("residuals are {:.1f} times those of the other images, limit {:g}: labels are "
+                               "wrong, or a fiducial moved",
+                               ratio, largest_ratio),
+                   {{"ratio", ratio}, {"limit", largest_ratio}});
+  }
+  if (!again) refuse(at, again.error(), view);
 }
 
 }  // namespace helicarm::sweep

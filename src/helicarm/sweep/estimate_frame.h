@@ -54,4 +54,12 @@ Expected<xray::XrayImage> rectified_image_of(const Frame& frame, const SweepCase
 /// `calibration::calibrate`.
 Expected<void> calibrate_alone(FrameEstimate& estimate, const pipeline::Case& base);
 
+/// Sets `failure`, as of `view`.
+void refuse(FrameEstimate& estimate, Failure failure, const std::string& view);
+
+/// Calibrates a frame that is not refused again with the noise of the run: `factor` times the fiducials'
+/// standard deviations. Refuses it if its residuals exceed that.
+void calibrate_with(double factor, const pipeline::Case& base, FrameEstimate& estimate,
+                    const std::string& view);
+
 }  // namespace helicarm::sweep

@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <map>
 #include <mutex>
-#include <numeric>
-#include <set>
 
 #include <fmt/format.h>
 
@@ -16,6 +12,8 @@
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/sweep/estimate_frame.h"
 #include "helicarm/sweep/joint_estimate.h"
+#include "helicarm/sweep/label_by_neighbours.h"
+#include "helicarm/sweep/refused_run.h"
 #include "helicarm/sweep/sweep.h"
 #include "helicarm/sweep/sweep_findings.h"
 
@@ -42,11 +40,6 @@ std::vector<FrameEstimate> estimates_of(const SweepCase& the_case, const SweepOp
   std::vector<FrameEstimate> estimates;
   for (auto& estimate : estimated) estimates.push_back(value_or_throw(std::move(estimate)));
   return estimates;
-}
-
-void refuse(FrameEstimate& estimate, Failure failure, const std::string& view) {
-  failure.view = view;
-  estimate.failure = std::move(failure);
 }
 
 /// A repeated image is no second measurement: its noise is the same.
@@ -140,101 +133,6 @@ double noise_factor(const std::vector<FrameEstimate>& estimates) {
   return dof < enough_dof ? std::max(1.0, factor) : std::max(least, factor);
 }
 
-/// Calibrates a frame again with the run's noise, and refuses it if its residuals exceed that.
-void calibrate_with(double factor, const SweepCase& the_case, FrameEstimate& at, const std::string& view) {
-  constexpr double largest_ratio = 4;  // of a frame's residuals to the run's noise
-  if (at.failure) return;
-  for (fiducials::Fiducial& ball : at.fiducials.fiducials) ball.sigma_px *= factor;
-  at.fiducials.map_covariance_px2 *= factor * factor;
-  at.fiducials.start = at.alone->view;
-  auto again = calibrate_alone(at, the_case.base);
-  if (again) {
-    const double ratio = std::sqrt(at.alone->chi2 / std::max(1, at.alone->dof));
-    if (ratio > largest_ratio)
-      again = fail(Reason::residual_too_large,
-                   fmt::format("residuals are {:.1f} times those of the other images, limit {:g}: labels are "
-                               "wrong, or a fiducial moved",
-                               ratio, largest_ratio),
-                   {{"ratio", ratio}, {"limit", largest_ratio}});
-  }
-  if (!again) refuse(at, again.error(), view);
-}
-
-/// The camera on the way between two others, or beyond them, by the share of the way; nothing where the run
-/// turns by too much between them.
-std::optional<fiducials::ExpectedView> camera_between(const geometry::View& before,
-                                                      const geometry::View& after, double share) {
-  constexpr double most_deg = 15, least_within_deg = 2, of_the_way = 0.5;
-  const Eigen::Quaterniond first(before.camera_from_world.rotation), last(after.camera_from_world.rotation);
-  const double turned_deg = first.angularDistance(last) * 180 / EIGEN_PI;
-  if (turned_deg > most_deg) return {};
-  const auto mean = [&](const auto& a, const auto& b) { return ((1 - share) * a + share * b).eval(); };
-  geometry::View view = before;
-  view.camera_from_world.rotation = first.slerp(share, last).toRotationMatrix();
-  view.camera_from_world.translation =
-      -view.camera_from_world.rotation * mean(before.source_in_world(), after.source_in_world());
-  const geometry::Intrinsics &k = before.intrinsics, &l = after.intrinsics;
-  const Eigen::Vector4d inner =
-      mean(Eigen::Vector4d(k.fx, k.fy, k.u0, k.v0), Eigen::Vector4d(l.fx, l.fy, l.u0, l.v0));
-  view.intrinsics = {inner[0], inner[1], inner[2], inner[3]};
-  return fiducials::ExpectedView{view,
-                                 std::max(least_within_deg, of_the_way * turned_deg * std::max(1.0, share))};
-}
-
-/// Pairs of accepted frames from which the camera of a frame follows: those on both sides, then the two
-/// nearest ones on either side; each at most `reach` away.
-std::vector<std::pair<std::ptrdiff_t, std::ptrdiff_t>> neighbours_of(
-    std::ptrdiff_t frame, const std::vector<FrameEstimate>& frames) {
-  constexpr std::ptrdiff_t reach = 5;
-  const auto next = [&](std::ptrdiff_t from, std::ptrdiff_t step) -> std::optional<std::ptrdiff_t> {
-    for (std::ptrdiff_t i = from + step; std::abs(i - frame) <= reach; i += step)
-      if (i >= 0 && i < std::ssize(frames) && !frames[std::size_t(i)].failure) return i;
-    return {};
-  };
-  std::vector<std::pair<std::ptrdiff_t, std::ptrdiff_t>> pairs;
-  const auto before = next(frame, -1), after = next(frame, 1);
-  if (before && after) pairs.emplace_back(*before, *after);
-  for (const auto& [nearest, step] : {std::pair(before, -1), std::pair(after, 1)})
-    if (nearest)
-      if (const auto farther = next(*nearest, step)) pairs.emplace_back(*farther, *nearest);
-  return pairs;
-}
-
-/// The camera of a frame by the accepted frames beside it, if they tell.
-std::optional<fiducials::ExpectedView> expected_at(std::ptrdiff_t frame,
-                                                   const std::vector<FrameEstimate>& frames) {
-  for (const auto& [first, second] : neighbours_of(frame, frames))
-    if (auto expected =
-            camera_between(frames[std::size_t(first)].alone->view, frames[std::size_t(second)].alone->view,
-                           double(frame - first) / double(second - first)))
-      return expected;
-  return {};
-}
-
-/// Labels again the frames that their image alone leaves ambiguous and whose camera the accepted frames
-/// beside them tell; returns how many. A phantom seen along its axis, or half out of the field, looks alike
-/// from two directions: a run does not jump.
-int label_by_neighbours(double factor, const SweepCase& the_case, std::vector<FrameEstimate>& estimates,
-                        unsigned threads) {
-  const std::vector<FrameEstimate> alone = estimates;
-  pipeline::RunOptions run;
-  run.maps = the_case.maps;
-  std::atomic<int> labelled = 0;
-  parallel_for(estimates.size(), threads, [&](std::size_t index) {
-    if (!alone[index].failure || alone[index].failure->reason != Reason::ambiguous_labels) return;
-    const auto expected = expected_at(std::ptrdiff_t(index), alone);
-    if (!expected) return;
-    const Frame& frame = the_case.frames[index];
-    auto again = estimate_frame(frame, file_of(frame, the_case), the_case.base, run, expected);
-    if (!again || again->failure) return;
-    calibrate_with(factor, the_case, *again, frame.view.name);
-    if (again->failure) return;
-    estimates[index] = *std::move(again);
-    ++labelled;
-  });
-  return labelled;
-}
-
 /// One run tells of its own noise and calibrator many times over: more of its frames would crowd out other
 /// days.
 std::vector<calibration::HistoryEntry> acquisitions_of(const std::vector<FrameEstimate>& estimates,
@@ -262,68 +160,6 @@ std::vector<calibration::HistoryEntry> acquisitions_of(const std::vector<FrameEs
 bool is_one_run(const SweepCase& the_case) {
   return std::ranges::all_of(the_case.frames,
                              [&](const Frame& frame) { return frame.run == the_case.frames.front().run; });
-}
-
-/// Of the refused images those of the most frequent of these reasons, or of all.
-std::vector<std::size_t> most_frequent(const std::vector<FrameEstimate>& estimates,
-                                       const std::set<Reason>& reasons = {}) {
-  std::map<Reason, std::vector<std::size_t>> images;
-  for (std::size_t i = 0; i < estimates.size(); ++i)
-    if (const auto& failure = estimates[i].failure;
-        failure && (reasons.empty() || reasons.contains(failure->reason)))
-      images[failure->reason].push_back(i);
-  const auto most =
-      std::ranges::max_element(images, {}, [](const auto& entry) { return entry.second.size(); });
-  return most == images.end() ? std::vector<std::size_t>{} : most->second;
-}
-
-Failure nothing_accepted(const std::vector<FrameEstimate>& estimates, const SweepCase& the_case,
-                         unsigned threads) {
-  const auto most = most_frequent(estimates);
-  const std::size_t first = most.front();
-  Failure failure = with_cause(*estimates[first].failure, the_case.frames[first], the_case, threads);
-  failure.message = fmt::format("none of {} images is accepted; {} with this reason, the first: {}",
-                                estimates.size(), most.size(), failure.message);
-  failure.view.clear();
-  failure.figures["images"] = double(estimates.size());
-  return failure;
-}
-
-bool is_explained(const Failure& failure) {
-  return std::ranges::any_of(
-      std::array{"fitting_pixel_mm", "fitting_source_detector_mm", "fitting_diameters", "aspect"},
-      [&](const char* key) { return failure.figures.contains(key); });
-}
-
-/// Why the accepted images of a run are not used, where the labels of more are refused: another pixel size,
-/// source distance or size of the balls explains an image that was refused, or the accepted ones are too few
-/// for a path. A file that states some of a phantom's balls, or a wrong size, fits single images by chance.
-std::optional<Failure> unconfirmed(const std::vector<FrameEstimate>& estimates, std::size_t accepted,
-                                   double noise_factor, const SweepCase& the_case, unsigned threads) {
-  constexpr std::size_t least_confirmed = 8;  // frames of a path
-  constexpr double doubtful_noise = 3;        // of accepted images that a wrong size may explain
-  const std::set<Reason> unclear{Reason::ambiguous_labels, Reason::calibrator_mismatch};
-  std::size_t refused = 0, unseen = 0;
-  for (const FrameEstimate& at : estimates)
-    if (at.failure) {
-      refused += unclear.contains(at.failure->reason);
-      unseen += at.failure->reason == Reason::too_few_fiducials;
-    }
-  if (refused + unseen <= accepted || (accepted >= least_confirmed && noise_factor < doubtful_noise))
-    return std::nullopt;
-  const std::size_t first =
-      most_frequent(estimates, refused > 0 ? unclear : std::set{Reason::too_few_fiducials}).front();
-  Failure failure = with_cause(*estimates[first].failure, the_case.frames[first], the_case, threads);
-  if (!is_explained(failure) && (accepted >= least_confirmed || refused <= accepted)) return std::nullopt;
-  failure.message = fmt::format(
-      "only {} of {} images would be accepted, and the labels of {} are refused: too few "
-      "to confirm each other; the first: {}",
-      accepted, estimates.size(), refused + unseen, failure.message);
-  failure.view.clear();
-  failure.figures["accepted"] = double(accepted);
-  failure.figures["refused"] = double(refused + unseen);
-  failure.figures["images"] = double(estimates.size());
-  return failure;
 }
 
 SweepFrame reported(const Frame& frame, const FrameEstimate& estimate) {
@@ -354,7 +190,7 @@ Sweep swept(const SweepCase& the_case, const SweepOptions& options,
   take_handedness(the_case, estimates, sweep.detector);
   sweep.noise_factor = noise_factor(estimates);
   parallel_for(estimates.size(), options.threads, [&](std::size_t i) {
-    calibrate_with(sweep.noise_factor, the_case, estimates[i], the_case.frames[i].view.name);
+    calibrate_with(sweep.noise_factor, the_case.base, estimates[i], the_case.frames[i].view.name);
   });
   // Those in the middle of several follow from those beside them, labelled before.
   while (is_one_run(the_case) &&
