@@ -11,7 +11,11 @@ void run(std::string_view bytes) {
     check((*transform)->matrix().allFinite(), "the transform is finite");
   exchange::ImportOptions options{.mm_per_unit = 10, .column = 1, .image_size = Eigen::Vector2i(1024, 768)};
   options.pixel_mm = {0.4, 0.4};
-  const auto matrix = exchange::import_matrix(file, options);
+  auto matrix = exchange::import_matrix(file, options);
+  if (!matrix) {  // a format that is in mm
+    options.mm_per_unit.reset();
+    matrix = exchange::import_matrix(file, options);
+  }
   if (!matrix) return;
   check(matrix->view.camera_from_world.matrix().allFinite(), "the camera's position is finite");
   check(std::isfinite(matrix->view.intrinsics.fx) && std::isfinite(matrix->view.intrinsics.fy),

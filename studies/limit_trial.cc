@@ -180,10 +180,11 @@ LimitOutcomes try_once(const LimitSetting& setting, const std::vector<Vector3d>&
     seen.push_back(pictured(i == 0 ? "AP" : "LAT", views[i], balls, setting.sigma_px, random));
     seen[i].prior.aspect = prior_knowledge.aspect;
     seen[i].prior.skew = prior_knowledge.skew;
-    if (c_arm) seen[i].prior = calibration::learned_prior(seen[i].prior, c_arm->knowledge, false);
+    if (c_arm)
+      seen[i].prior = calibration::learned_prior(seen[i].prior, c_arm->knowledge.deviation.mm, false);
   }
   calibration::CalibrationOptions options;
-  options.common.c_arm = c_arm ? c_arm->knowledge.prior : prior_knowledge.c_arm;
+  options.common.c_arm = c_arm ? c_arm->knowledge.deviation.prior : prior_knowledge.c_arm;
   const auto calibration = calibration::calibrate(seen, options);
   const auto dlt = calibration::calibrate_paper(seen, options);
 

@@ -65,6 +65,7 @@ CommandResult c_arm_add_command(const CArmAddArguments& arguments, Console& cons
 CommandResult c_arm_report_command(const CArmReportArguments& arguments, Console& console) {
   return guarded([&] {
     value_or_throw(check_can_write(arguments.out));
+    report::forget_c_arm_report(arguments.out);
     const report::CArmFindings findings = report::c_arm_findings(value_or_throw(pipeline::model_of_record(
         value_or_throw(calibration::read_history(arguments.record)), arguments.record.string())));
     value_or_throw(report::write_c_arm_report(findings, arguments.out));

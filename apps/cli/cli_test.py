@@ -74,6 +74,8 @@ class CommandLine(SimulatedCase):
         self.assertEqual([each["code"] for each in json.loads(done.stdout)["warnings"]], ["plate_mismatch"])  # two maps do not tell
         self.assertEqual(run("c-arm", "report", record, "--out", self.root / "arm").returncode, 0)
         self.assertEqual(len((self.root / "arm/c_arm.csv").read_text().splitlines()), 3)
+        self.assertEqual(run("c-arm", "report", self.root / "none.json", "--out", self.root / "arm").returncode, 2)
+        self.assertEqual(list((self.root / "arm").iterdir()), [])
         moved = json.loads(record.read_text())
         for shot in moved["shots"]:
             shot["estimate_mm"][1] += 60

@@ -68,14 +68,25 @@ bool Consent::agreed(const robot::RobotOrder& order, const std::function<Expecte
   return std::getline(std::cin, answer) && answer == "go";
 }
 
-bool Consent::plans_again(const Failure& why) {
+void Consent::unlock() {
+  for (;;) {
+    const robot::RobotLinkStatus shown = robot_.status();
+    if (shown.phase == robot::LinkPhase::stopped && !enters(shown.why.value(), "go on"))
+      throw BadInput(*shown.why);
+    const auto unlocked = robot_.unlock("the operator at the terminal", shown);
+    if (unlocked) return;
+    if (robot_.status().phase != robot::LinkPhase::stopped) throw BadInput(unlocked.error());
+  }
+}
+
+bool Consent::enters(const Failure& why, std::string_view what) {
   if (yes_ || !at_terminal()) return false;
   discard_input();
   console_.progress
       << fmt::format(
              "{}: {}\nThe robot does not move. Remove the cause, then press Enter to unlock the "
-             "robot and plan again, or Ctrl-C to end:\n",
-             code(why.reason), without_control_characters(why.message))
+             "robot and {}, or Ctrl-C to end:\n",
+             code(why.reason), without_control_characters(why.message), what)
       << std::flush;
   ending_.wait_until([] { return input_waits(); });
   std::string answer;

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "command.h"
@@ -46,13 +47,18 @@ class Consent {
       const robot::RobotOrder& order,
       const std::function<Expected<void>()>& holds = [] { return Expected<void>(); });
 
+  /// Unlocks the robot at the beginning. Asks before, with the reason, if it is stopped; without consent, and
+  /// with `yes`, it throws that reason.
+  void unlock();
+
   /// Asks whether to unlock the robot and plan again. `yes` does not agree: it was given before the stop.
   operation::Operation::Again again() {
-    return [this](const Failure& why) { return plans_again(why); };
+    return [this](const Failure& why) { return enters(why, "plan again"); };
   }
 
  private:
-  bool plans_again(const Failure& why);
+  /// Shows why the robot is stopped and waits for Enter.
+  bool enters(const Failure& why, std::string_view what);
   bool agreed(const robot::RobotOrder& order, const std::function<Expected<void>()>& holds);
 
   robot::RobotLink& robot_;

@@ -164,6 +164,36 @@ class Tracker(unittest.TestCase):
         both = run(*words, "--tip-sigma", "0.4")
         self.assertEqual((both.returncode, "omit one" in both.stderr), (2, True), both.stderr)
 
+    def test_mount_in_a_plan_is_of_the_plans_calibrator(self):
+        folder = self.file.parent / "mounts"
+        folder.mkdir()
+        mine, plan, tip = (folder / name for name in ("mine.json", "plan.json", "tip.json"))
+        self.assertEqual(run("phantom", "export", "--file", mine).returncode, 0)
+        calibrator = json.loads(mine.read_text())
+        calibrator["name"] = "mine"
+        mine.write_text(json.dumps(calibrator))
+        tracker = {"address": "127.0.0.1", "port": 18944, "markers": {"femur": "F", "tibia": "T", "tool": "D"},
+                   "facets": [], "sigma_mm": 0.1, "sigma_deg": 0.05}
+        plan.write_text(json.dumps({"format": "helicarm-plan/2", "calibrator": "mine.json", "views": ["AP", "LAT"],
+                                    "tracker": tracker, "tunnels": [], "max_error_mm": 2,
+                                    "drill": {"tip_in_tool": [0, -140, 20], "back_in_tool": [0, -20, 20]}}))
+        tip.write_text(json.dumps({"tip_in_tool": [0, -100, 0]}))
+        words = ["tracker", "calibrate-mount", "--pointer", "Pointer", "--tip", tip, "--tip-sigma", "0.05",
+                 "--out", folder / "mount.json", "--plan", plan]
+        for name, (x, y, z) in {"D1": (60, 0, 0), "D2": (0, 45, 0), "D3": (-40, -20, 50), "D4": (0, 5, 80)}.items():
+            words += ["--divot", f"{name}={x},{y},{z}", "--recorded", self.recorded_touch(name, (x, y, z + 900))]
+        before = plan.read_text()
+        other = run(*words, "--facet", "Facet", "--calibrator", "udcsc")
+        self.assertEqual(other.returncode, 2, other.stderr)
+        for word in ("bad_value", "udcsc", "plan.json", "mine.json"):
+            self.assertIn(word, other.stderr)
+        self.assertEqual(plan.read_text(), before)
+        for stated in ((), ("--calibrator", mine)):
+            done = run(*words, "--facet", "Facet", *stated)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(json.loads((folder / "mount.json").read_text())["calibrator"], "mine")
+            self.assertEqual([facet["name"] for facet in json.loads(plan.read_text())["tracker"]["facets"]], ["Facet"])
+
     def test_missing_or_invalid_arguments_are_named(self):
         for words, said in ((("tracker", "pivot", self.file, "--tool", "Pointer"), "which holds ToolToTracker"),
                             (("tracker", "calibrate-mount", "--facet", "F", "--recorded", "P1=x"), "need --tip"),

@@ -62,6 +62,8 @@ CommandResult export_command(const ExportArguments& arguments, Console& console)
       object = value_or_throw(case_registration::object_named(measured, *arguments.at));
     const auto written = value_or_throw(report::write_exports(result, arguments.run.out, kinds, object));
     if (object) print_spacings(result, *object, console);
+    if (const std::string note = report::one_pixel_size_note(result, kinds); !note.empty() && !console.quiet)
+      console.progress << fmt::format("helicarm: note: {}\n", note);
     if (console.json) {
       Json files = Json::array();
       for (const auto& path : written) files.push_back(path.string());

@@ -148,13 +148,8 @@ class Frames(unittest.TestCase):
         self.assertEqual([(self.root / "out" / name).read_bytes() for name in ("registration.csv", "smoothed.csv")], expected)
 
     def test_distortion_map_beside_a_camera_is_used(self):
-        shift = 3.0  # of undistorted pixels to raw ones
-        grid = [(u, v) for v in range(-16, SIZE + 17, 8) for u in range(-16, SIZE + 17, 8)]
-        (self.root / "raw.csv").write_text("".join(f"{u + shift},{v}\n" for u, v in grid))
-        (self.root / "straight.csv").write_text("".join(f"{u},{v}\n" for u, v in grid))
-        done = run("rectify", "--xmalab", self.root / "raw.csv", self.root / "straight.csv", "--size", SIZE, SIZE,
-                   "--out", self.root / "map")
-        self.assertEqual(done.returncode, 0, done.stderr)
+        shift = 3.0
+        self.map_of(shift, "map")
         case = json.loads(json.dumps(self.case))
         for view in case["views"]:
             camera = json.loads((self.root / view["camera"]).read_text())
@@ -189,6 +184,47 @@ class Frames(unittest.TestCase):
         (out / "sequence.json").unlink()
         anew = self.register(self.case, "--frames", "0-0", "--search-mm", 4, "--search-deg", 4)
         self.assertIn("3 frames that an interrupted sequence left", anew.stderr)
+
+    def map_of(self, shift, out):
+        """A map of undistorted pixels to raw ones, displaced along u."""
+        grid = [(u, v) for v in range(-16, SIZE + 17, 8) for u in range(-16, SIZE + 17, 8)]
+        (self.root / "raw.csv").write_text("".join(f"{u + shift},{v}\n" for u, v in grid))
+        (self.root / "straight.csv").write_text("".join(f"{u},{v}\n" for u, v in grid))
+        done = run("rectify", "--xmalab", self.root / "raw.csv", self.root / "straight.csv", "--size", SIZE, SIZE,
+                   "--out", self.root / out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def landmarks(self, name, off):
+        """The balls' centres, the first one displaced."""
+        rows = [f"b{i},{x + (off if i == 0 else 0)},{y},{z}" for i, ((x, y, z), _) in enumerate(BALLS)]
+        (self.root / name).write_text("name,x_mm,y_mm,z_mm\n" + "\n".join(rows) + "\n")
+
+    def test_frames_of_other_files_of_the_same_names_are_not_resumed(self):
+        options = ("--frames", "0-1", "--search-mm", 4, "--search-deg", 4)
+        picks = []
+        for view, axes in CAMERAS.items():
+            for i, (centre, _) in enumerate(BALLS):
+                x, y, z = (sum(a * c for a, c in zip(axis, centre)) for axis in axes)
+                z += DISTANCE
+                picks.append({"name": f"b{i}", "view": view,
+                              "uv": [FOCUS * x / z + (SIZE - 1) / 2, FOCUS * y / z + (SIZE - 1) / 2]})
+        views = [dict(view, map="same/map.json") for view in self.case["views"]]
+        model = {"name": "balls", "volume": "same.nrrd", "window_hu": [100, 3000], "start": {"landmarks": "same.csv"}}
+        case = dict(self.case, views=views, models=[model], picks=picks)
+        ct = volume()
+        changes = {"map": lambda: self.map_of(0.2, "same"), "start": lambda: self.landmarks("same.csv", 0.3),
+                   "CT": lambda: (self.root / "same.nrrd").write_bytes(ct.replace(struct.pack("<h", 1000), struct.pack("<h", 1200), 9))}
+        for what, change in changes.items():
+            with self.subTest(what):
+                self.map_of(0.0, "same")
+                self.landmarks("same.csv", 0)
+                (self.root / "same.nrrd").write_bytes(ct)
+                self.assertEqual(self.register(case, *options).returncode, 0)
+                self.assertEqual(self.register(case, *options, "--resume").returncode, 0)
+                change()
+                done = self.register(case, *options, "--resume")
+                self.assertEqual(done.returncode, 2, done.stderr)
+                self.assertIn("another sequence", done.stderr)
 
     def test_a_view_may_start_at_another_number(self):
         for frame in range(3):

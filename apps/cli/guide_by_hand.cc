@@ -147,6 +147,7 @@ void guide_by_hand(const operation::OperationTunnel& tunnel, operation::Operatio
       tell_again(begun.error(), console);
       continue;
     }
+    input.discard();
     console.progress << fmt::format(
                             "{}: press Enter with the drill held still in the drilled tunnel to verify it\n",
                             name)
@@ -154,6 +155,7 @@ void guide_by_hand(const operation::OperationTunnel& tunnel, operation::Operatio
     while (follow(tunnel.name, operation, input, ending, console) != code(Reason::plan_stale)) {
       const auto outcome = operation.verify_drilled(tunnel.name);
       if (outcome) return print_verified(*outcome, console);
+      input.discard();
       tell_again(outcome.error(), console);
     }
   }

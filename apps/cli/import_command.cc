@@ -203,8 +203,10 @@ void add_import(CLI::App& app, Action& action) {
           "(.seq.mha, RAS, as track and register write it)")
       ->required();
   command
-      ->add_option("--unit", a.unit,
-                   "Unit of length in the file: mm, cm or m; needed where mm would be implausible")
+      ->add_option(
+          "--unit", a.unit,
+          "Unit of length in the file: mm, cm or m; needed where mm would be implausible (RTK: of its "
+          "distances, not of --pixel-mm)")
       ->type_name("WORD");
   command
       ->add_option("--column", a.column, "This camera of a file of several, from 1 (default: all, as a list)")

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <termios.h>
 #include <unistd.h>
 
 #include "helicarm/core/failure.h"
@@ -35,6 +36,12 @@ std::optional<std::string> LineInput::next(int patience_ms) {
     else
       held_.append(bytes.data(), static_cast<std::size_t>(size));
   }
+}
+
+void LineInput::discard() {
+  if (::isatty(descriptor_) != 1) return;
+  ::tcflush(descriptor_, TCIFLUSH);
+  held_.clear();
 }
 
 }  // namespace helicarm::cli

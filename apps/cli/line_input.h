@@ -17,6 +17,9 @@ class LineInput {
   /// the end of the input, `bad_size` for a line over 1000 bytes.
   std::optional<std::string> next(int patience_ms);
 
+  /// Before a question: what was typed at a terminal before it is no answer. Lines of a pipe or a file stay.
+  void discard();
+
  private:
   int descriptor_;
   std::string held_;

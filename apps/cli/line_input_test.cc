@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "line_input.h"
 
+#include <sstream>
+
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include "helicarm/core/failure.h"
+#include "terminal_test.h"
+#include "touch_points.h"
 
 namespace helicarm::cli {
 namespace {
 
-constexpr int at_once = 0;
+constexpr int at_once = 0, patient = 10000;
 
 /// Writes into the input under test.
 struct Pipe {
@@ -62,6 +66,37 @@ TEST(LineInput, LineOf1000BytesIsReadAndALongerOneRefused) {
   EXPECT_EQ(input.next(at_once).value().size(), LineInput::longest);
   pipe.write(std::string(LineInput::longest + 1, 'x') + "\n");
   EXPECT_EQ(reason_of_next(input), Reason::bad_size);
+}
+
+TEST(LineInput, WhatWasTypedAtATerminalBeforeAQuestionIsNoAnswer) {
+  const Terminal terminal;
+  LineInput input(terminal.slave);
+  terminal.type("one\ntwo\nthr");
+  EXPECT_EQ(input.next(patient), "one");
+  input.discard();
+  EXPECT_EQ(input.next(at_once), std::nullopt);
+  terminal.type("answer\n");
+  EXPECT_EQ(input.next(patient), "answer");
+}
+
+TEST(LineInput, LinesOfAPipeWaitForTheirQuestions) {
+  Pipe pipe;
+  LineInput input(pipe.ends[0]);
+  pipe.write("one\ntwo\n");
+  EXPECT_EQ(input.next(at_once), "one");
+  input.discard();
+  EXPECT_EQ(input.next(at_once), "two");
+}
+
+TEST(AskToTouch, AnEarlierEnterIsNoAnswer) {
+  const Terminal terminal;
+  LineInput input(terminal.slave);
+  terminal.type("\n");
+  std::ostringstream out, progress;
+  Console console{out, progress};
+  ask_to_touch("femur notch", input, console);
+  EXPECT_EQ(input.next(at_once), std::nullopt);
+  EXPECT_NE(progress.str().find("touch \"femur notch\""), std::string::npos);
 }
 
 TEST(LineInput, InputWithoutLineEndsIsBounded) {

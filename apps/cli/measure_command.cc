@@ -2,6 +2,7 @@
 #include "measure_command.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <span>
 #include <vector>
@@ -128,7 +129,7 @@ std::optional<measures::ObjectPlane> plane_of(const MeasureArguments& arguments,
   if (arguments.depth_mm) {
     const auto& map = measured.calibration.maps[view_named(measured, view.name, "--depth")];
     if (map && map->rectified_pixel_mm) {
-      const double receiver_mm = view.view.intrinsics.fx * *map->rectified_pixel_mm;
+      const double receiver_mm = std::abs(view.view.intrinsics.fx) * *map->rectified_pixel_mm;
       if (*arguments.depth_mm > receiver_mm)
         throw BadInput(Reason::bad_value,
                        fmt::format("--depth: {:g} mm is behind the receiver of {}, {:.0f} mm "
@@ -166,7 +167,9 @@ measures::Click click_from(const CsvTable& table, std::size_t row, const std::op
   const auto sigma = table.optional_number(row, "sigma_px");
   if (sigma && *sigma < 0)
     throw BadInput(Reason::bad_value, fmt::format("{}: sigma_px: {} is negative", where, *sigma));
-  if (!u || !v) {
+  if (u.has_value() != v.has_value())
+    throw BadInput(Reason::bad_value, fmt::format("{}: u_px, v_px: both or none", where));
+  if (!u) {
     if (!measured)
       throw BadInput(Reason::bad_value,
                      fmt::format("{}: no pixels: a located point needs --calibration", where));

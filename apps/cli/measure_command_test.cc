@@ -194,6 +194,8 @@ TEST(MeasureCommand, RefusalsNameTheRow) {
   EXPECT_THAT(refusal("d,distance,AP,from,1,2,\n"), HasSubstr("no view \"AP\""));
   EXPECT_THAT(refusal("q,tibia_ml,LAT,lost,,,\n"), HasSubstr("no located point \"lost\""));
   EXPECT_THAT(refusal("q,tibia_ml,LAT,FS,,,\n", false), HasSubstr("needs --calibration"));
+  EXPECT_THAT(refusal("q,tibia_ml,LAT,FS,100,,\n"), HasSubstr("row 1: u_px, v_px: both or none"));
+  EXPECT_THAT(refusal("q,tibia_ml,LAT,FS,,100,\n"), HasSubstr("row 1: u_px, v_px: both or none"));
   EXPECT_THAT(refusal("d,distance,LAT,from,1,2,\n"), HasSubstr("measure \"d\": distance: \"to\" is missing"));
   EXPECT_THAT(refusal("d,distance,LAT,from,1024.5,2,\n"), HasSubstr("not in the rectified image of LAT"));
   EXPECT_THAT(refusal(distance + "d,angle,LAT,vertex,1,2,\n"), HasSubstr("another kind"));

@@ -39,7 +39,7 @@ struct MountArguments {
   std::string facet;                   ///< name of the calibrator's marker
   std::string pointer = "pointer";     ///< name of the pointer's marker
   std::filesystem::path tip;           ///< as `tracker pivot --json` writes
-  std::string calibrator = "udcsc";    ///< a built-in or a file
+  std::string calibrator;              ///< a built-in or a file; empty: the plan's, or the UDCSC
   std::vector<std::string> divots;     ///< NAME=X,Y,Z in the calibrator's frame, mm
   std::vector<std::string> touch;      ///< places to touch, in order
   std::vector<std::string> recorded;   ///< LABEL=FILE: the pointer at rest on a place
@@ -59,6 +59,28 @@ struct CalibratedTip {
   Eigen::Vector3d tip_in_pointer;
   std::optional<Eigen::Matrix3d> covariance = {};
 };
+
+phantom::Calibrator calibrator_of(const std::string& name, const std::filesystem::path& folder) {
+  return name == phantom::udcsc().name ? phantom::udcsc()
+                                       : value_or_throw(phantom::read_calibrator(folder / name));
+}
+
+/// The plan's, of which the stated one must not differ: a facet belongs to one calibrator.
+phantom::Calibrator calibrator_of(const MountArguments& arguments) {
+  const std::string& stated = arguments.calibrator;
+  if (arguments.plan.empty()) return calibrator_of(stated.empty() ? phantom::udcsc().name : stated, {});
+  const operation::OperationPlan plan = value_or_throw(
+      operation::plan_from(value_or_throw(read_json(arguments.plan)), arguments.plan.string()));
+  phantom::Calibrator planned = calibrator_of(plan.calibrator, plan.folder);
+  if (!stated.empty() && phantom::to_json(calibrator_of(stated, {})) != phantom::to_json(planned))
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("--calibrator: {} differs from \"calibrator\" of {}, {}: leave it out, or state "
+                    "it in the plan",
+                    without_control_characters(stated), arguments.plan.string(),
+                    without_control_characters(plan.calibrator)));
+  return planned;
+}
 
 /// "NAME=VALUE".
 std::pair<std::string, std::string> split(const std::string& option, const std::string& text) {
@@ -163,9 +185,7 @@ void add_touched(Observations& observations, const MountArguments& arguments, co
   };
   for (const std::string& label : arguments.touch) {
     for (bool done = false; !done;) {
-      console.progress << fmt::format("touch \"{}\" with the pointer, hold it still and press Enter\n",
-                                      without_control_characters(label))
-                       << std::flush;
+      ask_to_touch(label, input, console);
       while (!input.next(50)) wait(0.01);
       wait(reading_s);
       const double middle_s = tracker::monotonic_seconds() - reading_s / 2;
@@ -219,7 +239,6 @@ Json mount_json(const tracker::MountCalibration& mount, const MountArguments& ar
 void put_into_plan(const std::filesystem::path& file, const Json& facet) {
   const FileLock lock = value_or_throw(FileLock::of(file));
   Json plan = value_or_throw(read_json(lock.file()));
-  value_or_throw(operation::plan_from(plan, file.string()));
   Json& facets = plan["tracker"]["facets"];
   const auto known =
       std::ranges::find_if(facets, [&](const Json& one) { return one["name"] == facet["name"]; });
@@ -227,6 +246,7 @@ void put_into_plan(const std::filesystem::path& file, const Json& facet) {
     facets.push_back(facet);
   else
     *known = facet;
+  value_or_throw(operation::plan_from(plan, file.string()));
   value_or_throw(write_file(lock.file(), to_text(plan)));
 }
 
@@ -263,10 +283,7 @@ CommandResult calibrate_mount_command(const MountArguments& arguments, Console& 
     const bool touches = !arguments.touch.empty() || !arguments.recorded.empty();
     if (touches && arguments.tip.empty())
       throw BadInput(Reason::usage, "touches need --tip: the file written by `tracker pivot --json`");
-    const phantom::Calibrator calibrator =
-        arguments.calibrator == phantom::udcsc().name
-            ? phantom::udcsc()
-            : value_or_throw(phantom::read_calibrator(arguments.calibrator));
+    const phantom::Calibrator calibrator = calibrator_of(arguments);
     const auto places = places_of(calibrator, arguments);
     for (const std::string& label : arguments.touch)
       if (!places.contains(label))
@@ -316,7 +333,8 @@ void add_calibrate_mount(CLI::App* tracker, Action& action) {
   command->add_option("--tip-radius", a.tip_radius_mm, "Radius of the pointer's tip, mm; counts on balls")
       ->check(within(0, 20))
       ->capture_default_str();
-  command->add_option("--calibrator", a.calibrator, "A built-in or a file")->capture_default_str();
+  command->add_option("--calibrator", a.calibrator,
+                      "A built-in or a file. Default: that of --plan, without a plan udcsc");
   command->add_option("--divot", a.divots,
                       "NAME=X,Y,Z: a point of the calibrator that holds the tip, mm; repeatable");
   command

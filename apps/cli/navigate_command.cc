@@ -245,6 +245,7 @@ void register_models(const NavigateArguments& arguments, operation::Operation& o
   if (!arguments.yes) {
     const std::string report =
         without_control_characters((arguments.out / "case-1/registration/report.html").string());
+    input.discard();
     console.progress
         << fmt::format(
                "Compare the outlines with the bones in every view: {}\nType \"yes\" if they follow "
@@ -272,7 +273,7 @@ void drive_robot(const operation::OperationPlan& plan, const NavigateArguments& 
   Consent consent(robot, ending, arguments.yes, console);
   const auto until = std::chrono::steady_clock::now() + connect_patience;
   ending.wait_until([&] { return robot.wait_connected({}) || std::chrono::steady_clock::now() > until; });
-  value_or_throw(robot.unlock("the operator at the terminal"));
+  consent.unlock();
   print_tour(value_or_throw(operation.preview_tour()), console);
   value_or_throw(operation.register_robot(
       [&](const robot::RobotOrder& order) { return consent(order, [&] { return operation.recorded(); }); },

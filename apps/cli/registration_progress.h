@@ -11,7 +11,8 @@
 
 namespace helicarm::cli {
 
-/// Says the steps of a registration and, of a search that takes longer than a second, its progress.
+/// Says the steps of a registration and, with those that take longer than a second, the share of all searches
+/// that is done.
 class RegistrationProgress {
  public:
   explicit RegistrationProgress(const Console& console) : console_(console) {}

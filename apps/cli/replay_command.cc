@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -7,6 +8,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
 #include "helicarm/operation/replay.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm::cli {
 
@@ -29,11 +31,21 @@ std::string words_of(const operation::GuidanceSpan& span) {
                       : begun + ", its end is not recorded";
 }
 
-Json to_json(const operation::GuidanceSpan& span) {
-  return {{"tunnel", span.tunnel},
-          {"begun_s", span.begun_s},
-          {"ended_s", span.ended_s ? Json(*span.ended_s) : Json()},
-          {"ended_by", span.ended_s ? Json(span.ended_by) : Json()}};
+std::optional<Failure> failure_of(const operation::ReplayReport& report,
+                                  const std::filesystem::path& session) {
+  if (!report.differences.empty())
+    return Failure{Reason::replay_differs,
+                   fmt::format("{} recorded values or files differ from what the record implies",
+                               report.differences.size()),
+                   {},
+                   {}};
+  if (report.complete()) return {};
+  return Failure{Reason::replay_differs,
+                 fmt::format("{}: the record has no end: the program was killed or is still running, or "
+                             "records were removed",
+                             session.string()),
+                 {},
+                 {}};
 }
 
 }  // namespace
@@ -42,48 +54,31 @@ Json to_json(const operation::GuidanceSpan& span) {
 CommandResult replay_command(const ReplayArguments& arguments, Console& console) {
   return guarded([&] {
     const operation::ReplayReport report = value_or_throw(operation::replay(arguments.session));
+    const std::optional<Failure> failure = failure_of(report, arguments.session);
     if (console.json) {
-      Json guidances = Json::array();
-      for (const operation::GuidanceSpan& span : report.guidances) guidances.push_back(to_json(span));
-      console.out << to_text({{"records", report.records},
-                              {"torn", report.torn},
-                              {"finished", report.finished},
-                              {"exposures", report.exposures},
-                              {"pictures", report.images},
-                              {"results", report.results},
-                              {"hand_eyes", report.hand_eyes},
-                              {"decisions", report.decisions},
-                              {"guidances", guidances},
-                              {"orders", report.orders},
-                              {"confirmations", report.confirmations},
-                              {"replans", report.replans},
-                              {"outcomes", report.outcomes},
-                              {"files", report.files},
-                              {"ended_by", report.ended_by.empty() ? Json() : Json(report.ended_by)},
-                              {"differences", report.differences}})
-                  << '\n';
+      Json answer = operation::to_json(report);
+      answer["status"] = failure ? "refused" : "ok";
+      answer["failure"] = failure ? pipeline::to_json(*failure) : Json();
+      console.out << to_text(answer) << '\n';
+      console.answered = true;
     } else {
       console.out << fmt::format(
-          "{} records{}{}: {} acquisitions, {} images of cases, {} results, {} hand-eye calibrations, {} "
-          "orders, {} confirmed, {} planned again, {} outcomes, {} decisions on a hand-held drill, {} "
-          "files\n",
+          "{} records{}{}: {} acquisitions, {} images of cases, {} results, {} registrations of models, {} "
+          "hand-eye calibrations, {} orders, {} confirmed, {} planned again, {} outcomes, {} decisions on a "
+          "hand-held drill, {} files\n",
           report.records, report.torn ? " and an incomplete one" : "", end_of(report), report.exposures,
-          report.images, report.results, report.hand_eyes, report.orders, report.confirmations,
-          report.replans, report.outcomes, report.decisions, report.files);
+          report.images, report.results, report.registrations, report.hand_eyes, report.orders,
+          report.confirmations, report.replans, report.outcomes, report.decisions, report.files);
       for (const operation::GuidanceSpan& span : report.guidances)
         console.out << "  " << words_of(span) << '\n';
+      for (const std::string& note : report.notes) console.out << "  note: " << note << '\n';
       for (const std::string& difference : report.differences) console.out << "  " << difference << '\n';
     }
-    if (!report.differences.empty())
-      throw BadInput(Reason::replay_differs,
-                     fmt::format("{} recorded values or files differ from what the record implies",
-                                 report.differences.size()));
-    if (!report.complete())
-      throw BadInput(Reason::replay_differs,
-                     fmt::format("{}: the record has no end: the program was killed or is still running, or "
-                                 "records were removed",
-                                 arguments.session.string()));
-    if (!console.json) console.out << "all recorded values are reproduced bit for bit\n";
+    if (failure) throw BadInput(*failure);
+    if (!console.json)
+      console.out << (report.notes.empty() ? "all recorded values are reproduced bit for bit\n"
+                                           : "all recorded values are reproduced, bit for bit but for the "
+                                             "notes above\n");
   });
 }
 

@@ -7,11 +7,16 @@
 
 namespace helicarm::cli {
 
-void touch_point(operation::Operation& operation, const std::string& name, LineInput& input,
-                 const Ending& ending, Console& console) {
+void ask_to_touch(const std::string& name, LineInput& input, Console& console) {
+  input.discard();
   console.progress << fmt::format("touch \"{}\" with the pointer, hold it still and press Enter\n",
                                   without_control_characters(name))
                    << std::flush;
+}
+
+void touch_point(operation::Operation& operation, const std::string& name, LineInput& input,
+                 const Ending& ending, Console& console) {
+  ask_to_touch(name, input, console);
   for (;;) {
     ending.wait_until([&] { return input.next(0).has_value(); });
     const auto off = operation.touch(name);
@@ -22,6 +27,7 @@ void touch_point(operation::Operation& operation, const std::string& name, LineI
       return;
     }
     if (!operation::is_of_a_reading(off.error())) throw BadInput(off.error());
+    input.discard();
     console.progress << fmt::format("{}: {}; again\n", code(off.error().reason),
                                     without_control_characters(off.error().message))
                      << std::flush;

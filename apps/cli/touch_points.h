@@ -10,6 +10,9 @@
 
 namespace helicarm::cli {
 
+/// Input typed at a terminal before is discarded.
+void ask_to_touch(const std::string& name, LineInput& input, Console& console);
+
 /// Waits until the pointer is held still on the check point in view of the tracker. Throws BadInput as
 /// `Operation::touch`.
 void touch_point(operation::Operation& operation, const std::string& name, LineInput& input,

@@ -320,8 +320,9 @@ or of its plan, may be off by more (95 %). motion_sigma_mm: standard deviation p
 bone or model between the acquisitions. search_mm, search_deg: about each model's start, per axis. history: a C-arm's history
 file, which serves as prior and to which this case is added unless it is refused; made where there is none. cache: a
 folder that keeps the distortion maps of plate images, True for the user's cache folder, False for none. progress:
-called with the name of each stage (read, rectify, detect, label, calibrate, locate) before it begins; an exception
-from it ends the run, and Ctrl-C does between two views. Releases the GIL. Returns a Result.
+called with the name of each stage (read, rectify, detect, label, calibrate, locate) before it begins, and, if it takes a
+second argument, with name and share while models are searched for, as register does; an exception from it ends the run,
+and Ctrl-C does between two views. Releases the GIL. Returns a Result.
 Raises InputError; RefusedError with .result, which holds all that was computed until then.)");
   const simulation::SimulationOptions usual_simulation;
   module.def(

@@ -30,6 +30,8 @@ std::vector<std::string> exported(const case_registration::Measurement& measured
   if (at && !measured.result.failure) object = value_or_raise(case_registration::object_named(measured, *at));
   const auto written = value_or_raise(
       without_gil([&] { return report::write_exports(measured.result, folder, kinds, object); }));
+  if (const std::string note = report::one_pixel_size_note(measured.result, kinds); !note.empty())
+    if (PyErr_WarnEx(PyExc_UserWarning, note.c_str(), 1) != 0) throw py::error_already_set();
   std::vector<std::string> files;
   for (const auto& path : written) files.push_back(path.string());
   return files;

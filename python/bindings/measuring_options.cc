@@ -42,7 +42,7 @@ case_registration::Progress progress_of(const RunHooks& hooks) {
   return {[&hooks](const std::string& model, std::string_view step) {
             hooks.on_stage(case_registration::words_of_step(model, step));
           },
-          hooks.on_view};
+          hooks.on_view, hooks.on_share};
 }
 
 }  // namespace helicarm::python

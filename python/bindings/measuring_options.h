@@ -20,7 +20,7 @@ case_registration::RegisterOptions measuring_options(const char* function, const
                                                      const std::optional<std::filesystem::path>& history,
                                                      const py::object& cache, bool extends_history = false);
 
-/// Hears of every stage and step, and may end the work between them. Refers to `hooks`.
+/// Hears of every stage, step and share, and may end the work between them. Refers to `hooks`.
 case_registration::Progress progress_of(const RunHooks& hooks);
 
 }  // namespace helicarm::python

@@ -215,7 +215,9 @@ void add_registration(py::module_& module) {
       "its\n"
       "plan may be off by more (95 %). search_mm, search_deg: searched about each start, per axis. threads: "
       "0\n"
-      "for all cores. progress: called with the name of each step.\n\n"
+      "for all cores. progress: called with the name of each step before it begins and, if it takes a "
+      "second\n"
+      "argument, with the name and the share (0 to 1) of the searches for all models that is done.\n\n"
       "Raises as run_case; RefusedError if the views or a model are refused, with all that was computed in\n"
       ".result.");
   module.def(

@@ -25,20 +25,7 @@ py::tuple records_of(const std::filesystem::path& session) {
   return py::make_tuple(records, read.torn);
 }
 
-py::list guidances_of(const operation::ReplayReport& report) {
-  py::list spans;
-  for (const operation::GuidanceSpan& span : report.guidances) {
-    py::dict one;
-    one["tunnel"] = span.tunnel;
-    one["begun_s"] = span.begun_s;
-    one["ended_s"] = span.ended_s;
-    one["ended_by"] = span.ended_s ? py::object(py::str(span.ended_by)) : py::object(py::none());
-    spans.append(one);
-  }
-  return spans;
-}
-
-py::dict replay(const std::filesystem::path& session, const py::object& progress) {
+py::object replay(const std::filesystem::path& session, const py::object& progress) {
   const RunHooks hooks = run_hooks(py::none());
   const operation::ReplayReport report = value_or_raise(without_gil([&] {
     return operation::replay(session, [&](std::size_t done, std::size_t all) {
@@ -49,26 +36,7 @@ py::dict replay(const std::filesystem::path& session, const py::object& progress
       return true;
     });
   }));
-  py::dict answer;
-  answer["records"] = report.records;
-  answer["torn"] = report.torn;
-  answer["finished"] = report.finished;
-  answer["ended_by"] = report.ended_by.empty() ? py::object(py::none()) : py::str(report.ended_by);
-  answer["complete"] = report.complete();
-  answer["exposures"] = report.exposures;
-  answer["pictures"] = report.images;
-  answer["results"] = report.results;
-  answer["registrations"] = report.registrations;
-  answer["hand_eyes"] = report.hand_eyes;
-  answer["decisions"] = report.decisions;
-  answer["guidances"] = guidances_of(report);
-  answer["orders"] = report.orders;
-  answer["confirmations"] = report.confirmations;
-  answer["replans"] = report.replans;
-  answer["outcomes"] = report.outcomes;
-  answer["files"] = report.files;
-  answer["differences"] = report.differences;
-  return answer;
+  return python_from(operation::to_json(report));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "helicarm/calibration/calibrated_view.h"
 #include "helicarm/core/files.h"
 #include "helicarm/exchange/import_matrix.h"
+#include "helicarm/track/view_map.h"
 #include "module.h"
 #include "signals.h"
 
@@ -87,7 +88,7 @@ std::unique_ptr<Tracked> tracked_images(
     view.images.image = name;
     view.image_size = camera.image_size;
     view.camera = camera.view;
-    view.map = map;
+    value_or_raise(guarded([&] { track::take_map(view, map, name); }));
     std::vector<xray::XrayImage> frames;
     for (const auto& image : images) frames.push_back(*image);
     view.opened = value_or_raise(xray::ImageFile::of(std::move(frames)));

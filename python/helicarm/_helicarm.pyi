@@ -319,7 +319,7 @@ def measure_landmarks(kind: str, landmarks: Mapping[str, Optional[ArrayLike]], *
 def run_case(folder: _Path, *, method: str = "best", max_error_mm: Optional[float] = None,
              motion_sigma_mm: float = 0, search_mm: float = ..., search_deg: float = ..., threads: int = 0,
              history: Optional[_Path] = None, cache: Union[bool, _Path] = True,
-             progress: Optional[Callable[[str], Any]] = None) -> Result: ...
+             progress: Optional[Callable[..., Any]] = None) -> Result: ...
 def simulate_case(folder: _Path, *, seed: int = 1, kind: str = "accuracy", preset: Optional[str] = None,
                   size: int = 1024, bits: int = 12, knee: bool = True, faults: Sequence[str] = ...,
                   views: Sequence[str] = ..., ct: Optional[_Path] = None, run: Optional[int] = None,
@@ -328,7 +328,7 @@ def simulate_case(folder: _Path, *, seed: int = 1, kind: str = "accuracy", prese
 def register(folder: _Path, *, out: Optional[_Path] = None, dicom: bool = False, method: str = "best", max_error_mm: Optional[float] = None,
              motion_sigma_mm: float = 0, search_mm: float = ..., search_deg: float = ..., threads: int = 0,
              history: Optional[_Path] = None, cache: Union[bool, _Path] = True,
-             progress: Optional[Callable[[str], Any]] = None) -> _Dict: ...
+             progress: Optional[Callable[..., Any]] = None) -> _Dict: ...
 def register_sequence(folder: _Path, frames: Union[str, Sequence[int]], *, out: Optional[_Path] = None,
                       resume: bool = False, method: str = "best", max_error_mm: Optional[float] = None, motion_sigma_mm: float = 0,
                       search_mm: float = ..., search_deg: float = ..., threads: int = 0, history: Optional[_Path] = None,

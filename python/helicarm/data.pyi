@@ -12,7 +12,7 @@ _Volume = Any
 _Model = Any
 _Image = Any
 _Camera = Any
-_Progress = Optional[Callable[[Any], Any]]
+_Progress = Optional[Callable[..., Any]]
 _Views = Union[Mapping[str, Tuple[_Image, _Camera]], Sequence[Tuple[_Image, _Camera]]]
 
 def drr(volume: _Volume, camera: Union[_Camera, list[_Camera]], *, shape: Optional[Tuple[int, int]] = None,

@@ -65,7 +65,8 @@ class Session:
         """Recomputes the operation from its record, as `helicarm replay` does; all must agree to the last bit.
 
         progress: called with the share of the records that are done; an exception from it ends the replay, and Ctrl-C does.
-        Releases the GIL. Returns {"complete": True, "records", "results", "orders", "files", ...}. Raises RefusedError
+        Releases the GIL. Returns {"complete": True, "records", "results", "orders", "files", "notes", ...}; notes: sentences
+        on what equals the record in the form of an earlier version alone. Raises RefusedError
         (replay_differs), with the same in .result, where a value or file differs or the record has no end; InputError.
         """
         report = _c._replay(self.folder, progress)

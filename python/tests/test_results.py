@@ -179,6 +179,24 @@ def test_an_exception_of_progress_ends_the_call(sequence, run):  # noqa: F811
             call()
 
 
+def test_progress_that_takes_a_share_is_told_how_much_of_the_search_is_done(sequence):  # noqa: F811
+    steps, told = [], []
+    registration(sequence, progress=steps.append)
+    registration(sequence, progress=lambda step, share=None: told.append((step, share)))
+    assert [step for step, share in told if share is None] == steps
+    shares = [share for _, share in told if share is not None]
+    assert len(shares) > 10 and shares == sorted(shares) and shares[-1] == 1 and shares[0] > 0
+    assert {step for step, share in told if share is not None} <= set(steps)
+
+
+def test_an_exception_of_progress_at_a_share_ends_the_call(sequence):  # noqa: F811
+    def stop(step, share=None):
+        if share is not None:
+            raise ZeroDivisionError
+    with pytest.raises(ZeroDivisionError):
+        registration(sequence, progress=stop)
+
+
 def test_other_threads_run_meanwhile():
     volume = helicarm.Volume(np.ones((200, 200, 200), np.float32), np.eye(4), frame="LPS")
     camera = helicarm.Camera.orbit(volume.centre_mm, size=1500)

@@ -123,6 +123,31 @@ def drill_motion(program, folder):
             devices.command(f"fault {fault} on", f"{fault} on")
             devices.expect_end(f"{fault} at a terminal", reason)
             devices.expect_replay(f"{fault} at a terminal")
+    with VirtualDevices(program, folder / "stopped_behind", terminal=True) as devices:
+        devices.acquire_both()
+        devices.confirm()
+        devices.wait_moving()
+        devices.command("fault hide:tool on", "hide:tool on")
+        devices.navigation.wait_for("press Enter to unlock")
+        devices.command("fault protective_stop on", "protective_stop on")
+        time.sleep(6)  # from then on the robot permits its release
+        devices.type("\n")
+        devices.expect_end("protective stop behind a hidden tool", "robot_stopped")
+        devices.expect_replay("protective stop behind a hidden tool")
+    for terminal in (False, True):
+        with VirtualDevices(program, folder / f"stopped_before_{terminal}", terminal=terminal) as devices:
+            devices.acquire("AP", "waiting for LAT")
+            devices.command("fault protective_stop on", "protective_stop on")
+            time.sleep(6)
+            devices.acquire("LAT", "^measure: ")
+            if not terminal:
+                devices.expect_end("protective stop before the registration, --yes", "robot_stopped")
+                continue
+            devices.navigation.wait_for("press Enter to unlock the robot and go on", 120)
+            devices.type("\n")
+            check("protective stop before the registration is released by Enter",
+                  devices.navigation.wait_for("Type \"go\"", 120))
+            devices.navigation.end(signal.SIGKILL)
     with VirtualDevices(program, folder / "bone") as devices:
         devices.acquire_both()
         devices.navigation.wait_for("navigate: femur", 120)

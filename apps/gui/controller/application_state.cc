@@ -25,7 +25,7 @@ std::shared_ptr<const case_registration::CaseRegistration> movable_models(const 
 
 bool is_placed(const ApplicationState& state, std::size_t model) {
   return !state.registration && model < state.models.size() &&
-         std::ranges::find(state.starts_by_hand, state.models[model], &operation::ModelStart::model) !=
+         std::ranges::find(state.starts_by_hand, state.models[model].name, &operation::ModelStart::model) !=
              state.starts_by_hand.end();
 }
 

@@ -107,14 +107,12 @@ struct ApplicationState {
   std::vector<pipeline::Pick> registered_picks =
       {};                     ///< at the registration; before the first, of `at_starts`
   bool is_confirmed = false;  ///< the registration, of an operation: a person compared the outlines
-  std::vector<std::string> models = {};               ///< names of the case's or plan's
-  std::vector<pipeline::CaseModel> model_files = {};  ///< likewise
-  std::vector<pipeline::CaseModel> case_models = {};  ///< of files only
-  ModelLandmarks model_landmarks = {};                ///< placed; at first those of the case
-  ModelLandmarks planned_points = {};                 ///< of the models' plans
-  ModelLandmarks case_landmarks = {};                 ///< of the case as it was read
-  ModelLandmarks saved_landmarks = {};                ///< of case.json
-  ModelLandmarks registered_landmarks = {};           ///< as `registered_picks`
+  std::vector<pipeline::CaseModel> models = {};  ///< of the case, or of the operation's plan
+  ModelLandmarks model_landmarks = {};           ///< placed; at first those of the case
+  ModelLandmarks planned_points = {};            ///< of the models' plans
+  ModelLandmarks case_landmarks = {};            ///< of the case as it was read
+  ModelLandmarks saved_landmarks = {};           ///< of case.json
+  ModelLandmarks registered_landmarks = {};      ///< as `registered_picks`
 
   std::optional<operation::HandDrill> drill = {};  ///< held by a person; the plan has no robot then
   double stand_off_mm = robot::ApproachOptions().stand_off_mm;  ///< before a tunnel
@@ -125,6 +123,7 @@ struct ApplicationState {
   std::optional<robot::RobotOrder> order;  ///< previewed, not yet carried out
   operation::PathPreview path;
   bool is_replayed = false;  ///< a moment of a recorded operation
+  bool is_guided = false;    ///< at that moment, the drill
   bool tool_is_out = false;  ///< moving to a tunnel or in it; can be withdrawn
   bool has_arrived = false;  ///< the tool is in the tunnel `bound_for`
   std::string bound_for = {};

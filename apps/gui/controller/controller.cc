@@ -104,7 +104,9 @@ void Controller::begin(Phase phase, std::string doing, std::function<Change()> w
   state_.refusals.erase(phase);
   if (equipment_) equipment_->stopped = false;
   emit changed();
-  worker_.post([this, phase, work = std::move(work)] {
+  worker_.post([this, phase, work = std::move(work), equipment = equipment_, order = state_.order] {
+    const operation::Operation* operation = equipment ? equipment->operation.get() : nullptr;
+    const MeasuredImages before = operation ? measured_images(*operation) : MeasuredImages();
     const auto done = guarded([&]() -> Change {
       try {
         return work();
@@ -114,9 +116,35 @@ void Controller::begin(Phase phase, std::string doing, std::function<Change()> w
         throw BadInput(Reason::unsupported, fmt::format("unexpected: {}", problem.what()));
       }
     });
+    if (!done && operation) meanwhile(held_after(*equipment, before, order));
     QMetaObject::invokeMethod(
         this, [this, phase, done] { finish(phase, done); }, Qt::QueuedConnection);
   });
+}
+
+Controller::Change Controller::held_after(const Equipment& equipment, const MeasuredImages& before,
+                                          const std::optional<robot::RobotOrder>& order) {
+  const operation::Operation& operation = *equipment.operation;
+  const MeasuredImages after = measured_images(operation);
+  const bool forgot = after != before && !after.have_result;
+  const auto images = forgot ? images_of(operation) : Images();
+  const auto live = operation.live_tool();
+  return [this, forgot, images, live = live ? std::optional(*live) : std::nullopt,
+          is_registered = operation.registration().has_value(), is_confirmed = operation.is_confirmed(),
+          order_is_void = order && !operation.is_planned(*order)](ApplicationState& state) {
+    if (forgot) {
+      forget_measurement(state);
+      if (images) state.result = result_with(*images);
+      state.failed_picks = failed_picks(state, {});
+    }
+    if (state.registration && !is_registered) {
+      forget_registration(state);
+      forget_registrations();
+    }
+    state.is_confirmed = is_confirmed;
+    if (order_is_void && std::exchange(state.order, std::nullopt)) state.path = {};
+    live_tool_ = live;
+  };
 }
 
 void Controller::finish(Phase phase, const Expected<Change>& done) {
@@ -171,9 +199,8 @@ void Controller::expect(const std::string& view) {
 
 void Controller::shoot(const std::string& view) {
   if (!equipment_ || !equipment_->virtual_or) return;
-  begin(Phase::acquire, "acquiring " + view, [this, view, equipment = equipment_]() -> Change {
-    return came(*equipment, shoot_and_take(*equipment, view));
-  });
+  begin(Phase::acquire, "acquiring " + view,
+        [this, view, equipment = equipment_]() -> Change { return came(shoot_and_take(*equipment, view)); });
 }
 
 void Controller::take_waiting_image() {
@@ -187,23 +214,16 @@ void Controller::take_waiting_image() {
   if (!view_image) return;
   begin(Phase::acquire, "image received",
         [this, view = state_.next_view, equipment = equipment_, view_image]() -> Change {
-          return came(*equipment, take(*equipment, view, *view_image));
+          return came(take(*equipment, view, *view_image));
         });
 }
 
-Controller::Change Controller::came(Equipment& equipment, const Expected<Images>& images) {
-  const Change forget = [this](ApplicationState& state) {
+Controller::Change Controller::came(const Expected<Images>& images) {
+  return [this, images = value_or_throw(images)](ApplicationState& state) {
     forget_measurement(state);
     forget_registration(state);
     forget_registrations();
     live_tool_.reset();  // its lines belong to the previous images
-  };
-  if (!images) {  // an earlier image may have been found to be delayed
-    if (!equipment.operation->measured_case()) meanwhile(forget);
-    throw BadInput(images.error());
-  }
-  return [this, forget, images = *images](ApplicationState& state) {
-    forget(state);
     state.result = result_with(images);
     state.failed_picks = failed_picks(state, {});
     state.next_view = missing_view(state);

@@ -12,6 +12,7 @@
 #include "gui/controller/worker.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/operation/connections.h"
+#include "helicarm/operation/earlier_versions.h"
 #include "helicarm/operation/session_records.h"
 #include "helicarm/registration/motion.h"
 #include "helicarm/virtual_devices/virtual_devices.h"
@@ -19,6 +20,7 @@
 namespace helicarm::gui {
 
 struct Equipment;
+struct MeasuredImages;
 struct OpenedLandmarks;
 
 /// The live data of the window at one time.
@@ -135,7 +137,8 @@ class Controller : public QObject {
   /// Models moved or placed by hand return to their registered poses or their starts.
   void return_models();
 
-  void unlock(const std::string& who);
+  /// `shown`: the robot's status that this person sees. Refuses as `RobotLink::unlock`.
+  void unlock(const std::string& who, const robot::RobotLinkStatus& shown);
   void register_robot();
   /// Guides a hand-held drill to a tunnel until `end_guidance`, or until `verify_drilled` has compared it
   /// with the tunnel. In a rehearsal a virtual person follows the guidance.
@@ -167,6 +170,8 @@ class Controller : public QObject {
   void changed();
   void refused(helicarm::gui::Phase phase, const QString& why);
   void exported(const QString& folder);
+  /// Undo or redo has changed a model's pose or registration alone.
+  void models_stepped();
   /// What was done, or will be, in one sentence.
   void told(const QString& words);
 
@@ -190,6 +195,10 @@ class Controller : public QObject {
 
   void begin(Phase phase, std::string doing, std::function<Change()> work);
   void finish(Phase phase, const Expected<Change>& done);
+  /// What the operation holds after work that failed: it may have forgotten what it held `before`, which is
+  /// shown. `order`: the displayed one.
+  Change held_after(const Equipment& equipment, const MeasuredImages& before,
+                    const std::optional<robot::RobotOrder>& order);
   void open(Source source, const std::filesystem::path& folder, std::string doing,
             std::function<Change(Equipment&)> work);
   void start_operation(Equipment& equipment, operation::OperationPlan plan,
@@ -239,7 +248,7 @@ class Controller : public QObject {
   const operation::OperationTunnel* tunnel_not_moved(const std::string& name);
   std::optional<operation::TunnelOutcome> verified(Equipment& equipment, const std::string& tunnel);
   /// `images`: of all views, or why the new one was refused.
-  Change came(Equipment& equipment, const Expected<std::vector<pipeline::ViewResult>>& images);
+  Change came(const Expected<std::vector<pipeline::ViewResult>>& images);
 
   ApplicationState state_;
   std::shared_ptr<Equipment> equipment_;
@@ -253,7 +262,7 @@ class Controller : public QObject {
   bool registers_recorded_ = false;  ///< until cancelled
   struct {
     std::string digest;  ///< of the record
-    Expected<std::shared_ptr<const case_registration::CaseRegistration>> done = nullptr;
+    Expected<std::shared_ptr<const operation::RecordedRegistration>> done = nullptr;
   } as_recorded_;                      ///< registered last
   bool measures_again_ = false;        ///< after the work in progress
   std::function<void()> next_source_;  ///< opened as soon as the work in progress has ended

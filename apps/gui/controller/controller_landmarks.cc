@@ -22,7 +22,6 @@ void Controller::take_landmarks(const OpenedLandmarks& opened) {
   if (opened.unsaved) {
     earlier_.push_back(edit_named(tr("the restored landmarks")));
     state_.model_landmarks = *opened.unsaved;
-    state_.has_unsaved_picks = true;
     emit told(tr("Landmarks of models that are not in case.json are restored: Ctrl+S saves them."));
   }
   ask_for_landmarks(state_);
@@ -99,19 +98,18 @@ void Controller::landmarks_changed() {
 
 void Controller::keep_landmarks() {
   if (!state_.case_folder) return;
-  state_.has_unsaved_picks = true;
-  const auto kept = keep_unsaved_landmarks(*state_.case_folder, state_.case_models, state_.model_landmarks,
+  const auto kept = keep_unsaved_landmarks(*state_.case_folder, state_.models, state_.model_landmarks,
                                            state_.saved_landmarks);
   state_.picks_not_kept = kept ? std::nullopt : std::optional(kept.error());
 }
 
 Expected<QStringList> Controller::save_landmarks() {
   if (are_same(state_.model_landmarks, state_.saved_landmarks)) return QStringList();
-  return gui::save_landmarks(*state_.case_folder, state_.case_models, state_.model_landmarks,
+  return gui::save_landmarks(*state_.case_folder, state_.models, state_.model_landmarks,
                              state_.saved_landmarks, state_.picks)
       .map([this](const SavedLandmarks& done) {
         state_.saved_landmarks = state_.case_landmarks = done.saved;
-        state_.case_models = done.models;
+        state_.models = done.models;
         worker_.post([equipment = equipment_, models = done.models] {
           if (equipment && equipment->the_case) equipment->the_case->models = models;
         });

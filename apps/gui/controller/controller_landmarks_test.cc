@@ -6,6 +6,7 @@
 #include "gui/controller/model_landmarks.h"
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
+#include "gui/controller/unsaved_changes.h"
 #include "helicarm/case_registration/plan.h"
 #include "helicarm/case_registration/register_case.h"
 #include "helicarm/core/files.h"
@@ -151,10 +152,11 @@ TEST_F(ControllerLandmarks, StartsOfOtherLandmarksAreNoLongerDisplayed) {
 TEST_F(ControllerLandmarks, SavedOnesAreTheStartOfTheCase) {
   place();
   for (const auto& point : in_bone) pick(point);
-  EXPECT_TRUE(state().has_unsaved_picks);
+  EXPECT_EQ(unsaved_changes(state()).words(), "the picks, the landmarks of bone");
+  EXPECT_EQ(unsaved_changes(state()).files().size(), 2);
   EXPECT_TRUE(fs::exists(folder_.path() / "unsaved_landmarks.json"));
   controller_->save_picks();
-  EXPECT_FALSE(state().has_unsaved_picks);
+  EXPECT_FALSE(unsaved_changes(state()).any());
   EXPECT_FALSE(fs::exists(folder_.path() / "unsaved_landmarks.json"));
   EXPECT_THAT(told_.back().toStdString(), HasSubstr("replace its \"world_from_model\""));
   const pipeline::Case the_case = pipeline::read_case(folder_.path()).value();
@@ -174,17 +176,20 @@ TEST_F(ControllerLandmarks, SavedOnesAreTheStartOfTheCase) {
 TEST_F(ControllerLandmarks, FewerThanThreePickedOnesAreKeptBesideTheCase) {
   const Json before = case_file()["models"];
   place(2);
+  EXPECT_FALSE(unsaved_changes(state()).can_be_saved());
+  EXPECT_EQ(unsaved_changes(state()).files(), QStringList("unsaved_landmarks.json"));
   controller_->save_picks();
   EXPECT_EQ(case_file()["models"], before);
-  EXPECT_THAT(told_.back().toStdString(), HasSubstr("are not its start yet"));
+  EXPECT_TRUE(told_.back().startsWith("The landmarks of bone are not its start yet")) << "no pick is saved";
   open();  // as after a crash
   ASSERT_EQ(state().model_landmarks[0].size(), 2U);
   EXPECT_EQ(state().model_landmarks[0][1].in_model, in_bone[1].in_model);
   EXPECT_EQ(state().landmarks.size(), 2U);
-  EXPECT_TRUE(state().has_unsaved_picks);
+  EXPECT_EQ(unsaved_changes(state()).not_yet.size(), 1);
   EXPECT_THAT(told_.back().toStdString(), HasSubstr("are restored"));
   controller_->undo();
   EXPECT_TRUE(state().model_landmarks[0].empty());
+  EXPECT_FALSE(unsaved_changes(state()).any());
 }
 
 TEST_F(ControllerLandmarks, AnUnreadableFileOfUnsavedOnesIsNamedAndKept) {

@@ -79,6 +79,7 @@ void Controller::step_edits(std::vector<Edit>& from, std::vector<Edit>& to) {
     state_.path = {};
   }
   if (!outlining_) outline_nudged();
+  if (edit.of_models) emit models_stepped();
   if (!other_picks) return emit changed();
   keep_unsaved_picks();
   picks_changed(has_all_images());
@@ -90,7 +91,7 @@ void Controller::keep_unsaved_picks() {
   if (!state_.case_folder) return;
   state_.has_unsaved_picks = true;
   const auto kept = keep_unsaved(*state_.case_folder, state_.picks).and_then([&] {
-    return keep_unsaved_landmarks(*state_.case_folder, state_.case_models, state_.model_landmarks,
+    return keep_unsaved_landmarks(*state_.case_folder, state_.models, state_.model_landmarks,
                                   state_.saved_landmarks);
   });
   state_.picks_not_kept = kept ? std::nullopt : std::optional(kept.error());
@@ -104,17 +105,21 @@ void Controller::save_picks() {
   std::vector<pipeline::CaseTunnel> tunnels;
   for (const operation::OperationTunnel& tunnel : state_.tunnels)
     tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
+  const bool has_picks = state_.has_unsaved_picks;
   watch_no_files();  // this change is its own
   const auto saved = gui::save_picks(*state_.case_folder, state_.picks, tunnels).and_then([this] {
     return save_landmarks();
   });
   watch_files_of(*state_.case_folder);
-  state_.has_unsaved_picks = !saved || !are_same(state_.model_landmarks, state_.saved_landmarks);
+  state_.has_unsaved_picks = has_picks && !saved;
   state_.picks_not_kept = saved ? std::nullopt : std::optional(saved.error());
   emit changed();
   if (!saved) return emit told(sentence_of(saved.error()));
-  const QString file = QString::fromStdString((*state_.case_folder / "case.json").string());
-  emit told((QStringList{tr("The picks are saved in %1.").arg(file)} + *saved).join(' '));
+  QStringList words = *saved;
+  if (has_picks || words.isEmpty())
+    words.prepend(tr("The picks are saved in %1.")
+                      .arg(QString::fromStdString((*state_.case_folder / "case.json").string())));
+  emit told(words.join(' '));
 }
 
 void Controller::add_landmark(const std::string& name, std::optional<pipeline::BoneLabel> bone) {

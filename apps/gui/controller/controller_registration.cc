@@ -102,7 +102,7 @@ std::vector<operation::ModelStart> Controller::starts_by_hand() const {
   if (!has_poses_by_hand(state_)) return {};
   std::vector<operation::ModelStart> starts = state_.starts_by_hand;
   if (!state_.nudged) return starts;
-  const std::string& name = state_.models.at(state_.nudged->model);
+  const std::string& name = state_.models.at(state_.nudged->model).name;
   std::erase_if(starts, [&](const operation::ModelStart& start) { return start.model == name; });
   starts.push_back({name, state_.nudged->world_from_model});
   return starts;

@@ -35,6 +35,21 @@ TEST_F(ControllerRehearsal, StopAndFaultsReachTheRobotFromOtherThreads) {
   EXPECT_FALSE(state().hand_eye_rms_mm);
 }
 
+TEST_F(ControllerRehearsal, ProtectiveStopThatWasNotShownIsNotReleased) {
+  ASSERT_TRUE(idle());
+  ASSERT_TRUE(unlock());
+  const robot::RobotLinkStatus shown = controller_->live().robot;
+  controller_->set_fault("protective_stop", true);
+  ASSERT_TRUE(
+      wait("the robot stops", [&] { return controller_->live().robot.phase == robot::LinkPhase::stopped; }));
+  controller_->unlock("tester", shown);
+  ASSERT_TRUE(idle());
+  const Failure& refused = state().refusals.at(Phase::navigate);
+  EXPECT_EQ(refused.reason, Reason::robot_stopped);
+  EXPECT_NE(refused.message.find("PROTECTIVE_STOP"), std::string::npos) << refused.message;
+  EXPECT_EQ(controller_->live().robot.state->safety_mode, robot::SafetyMode::protective_stop);
+}
+
 TEST_F(ControllerRehearsal, EndsWhileTheRobotMoves) {
   ASSERT_TRUE(idle());
   ASSERT_TRUE(unlock());
@@ -76,7 +91,7 @@ TEST_F(ControllerCtRehearsal, AConfirmedRegistrationGuidesTheToolToTheTunnelsOfT
   controller_->nudge(1, step);
   ASSERT_TRUE(register_models());
   ASSERT_EQ(state().starts_by_hand.size(), 2U);  // each keeps its own
-  EXPECT_EQ(state().starts_by_hand[0].model, state().models[0]);
+  EXPECT_EQ(state().starts_by_hand[0].model, state().models[0].name);
   controller_->undo();  // to no earlier registration
   EXPECT_TRUE(state().registration);
   EXPECT_FALSE(state().nudged);
@@ -106,6 +121,38 @@ TEST_F(ControllerCtRehearsal, AnotherImageEndsTheRegistrationACancelledOneDoesNo
       [&] { return !state().is_confirmed; }));
   ASSERT_TRUE(wait("the views are measured again", [&] { return state().measurements > measurements; }));
   EXPECT_FALSE(state().registration);
+}
+
+TEST_F(ControllerCtRehearsal, WhatTheOperationForgetsWhereItsRecordFailsIsNotShownAnyMore) {
+  ASSERT_TRUE(idle());
+  ASSERT_TRUE(acquire());
+  ASSERT_TRUE(register_models());
+  controller_->confirm_registration();
+  ASSERT_TRUE(idle());
+  ASSERT_TRUE(state().is_confirmed);
+  std::filesystem::remove(state().folder / "session.log");
+  controller_->measure();
+  ASSERT_TRUE(idle());
+  EXPECT_EQ(state().refusals.at(Phase::calibrate).reason, Reason::record_lost);
+  EXPECT_FALSE(state().measured);
+  EXPECT_FALSE(state().registration);
+  EXPECT_FALSE(state().is_confirmed);
+  for (const pipeline::ViewResult& view : state().result->views) {
+    EXPECT_TRUE(view.xray_image) << view.name;
+    EXPECT_FALSE(view.calibrated) << view.name;
+  }
+}
+
+TEST_F(ControllerCtRehearsal, WorkThatFailsWithoutAChangeOfTheOperationKeepsWhatIsShown) {
+  ASSERT_TRUE(idle());
+  ASSERT_TRUE(acquire());
+  ASSERT_TRUE(register_models());
+  const auto result = state().result;
+  const auto registration = state().registration;
+  EXPECT_EQ(refusal_of_plan(), Reason::registration_not_confirmed);
+  EXPECT_TRUE(state().measured);
+  EXPECT_EQ(state().result, result);
+  EXPECT_EQ(state().registration, registration);
 }
 
 TEST_F(ControllerCtRehearsal, ARegistrationAgainEndsTheMovesFromTheOneBefore) {

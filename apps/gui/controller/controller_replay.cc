@@ -47,9 +47,9 @@ void Controller::open_recorded() {
            state.landmarks.clear();
            complete_landmarks(state);
            state.stand_off_mm = plan.robot.approach.stand_off_mm;
+           state.drill = plan.drill;
            state.has_models = !plan.models.empty();
-           for (const pipeline::CaseModel& model : plan.models) state.models.push_back(model.name);
-           state.model_files = plan.models;
+           state.models = plan.models;
          };
        });
   opens_recorded_ = true;
@@ -64,18 +64,24 @@ void Controller::follow_record() {
     if (registers_recorded_) register_as_recorded();
     return;
   }
-  const auto registration = wanted ? as_recorded_.done.value_or(nullptr) : nullptr;
+  const auto shown = wanted ? as_recorded_.done.value_or(nullptr) : nullptr;
+  const std::shared_ptr<const case_registration::CaseRegistration> registration(
+      shown, shown ? &shown->registration : nullptr);
   const bool is_confirmed = registration && recorded_->is_confirmed;
   const bool is_refused = wanted && !as_recorded_.done;
   if (registration == state_.registration && is_confirmed == state_.is_confirmed &&
       is_refused == state_.refusals.contains(Phase::registration))
     return;
+  const bool is_new = registration && registration != state_.registration;
   state_.registration = registration;
   state_.is_confirmed = is_confirmed;
   state_.registered_picks = equipment_->the_case->picks;
   state_.refusals.erase(Phase::registration);
   if (is_refused) state_.refusals.emplace(Phase::registration, as_recorded_.done.error());
   emit changed();
+  if (is_new && shown->note)
+    emit told(
+        tr("%1: %2.").arg(QString::fromStdString(wanted->folder), QString::fromStdString(*shown->note)));
 }
 
 void Controller::register_as_recorded() {
@@ -99,7 +105,7 @@ void Controller::register_as_recorded() {
                              fmt::format("{0}: the files of the session give another registration than the "
                                          "recorded one, whose report is {0}/report.html",
                                          then.folder));
-            return std::make_shared<const case_registration::CaseRegistration>(*std::move(found));
+            return std::make_shared<const operation::RecordedRegistration>(*std::move(found));
           });
           if (!done && done.error().reason == Reason::interrupted) throw BadInput(done.error());
           return [this, digest = then.digest, done](ApplicationState&) { as_recorded_ = {digest, done}; };

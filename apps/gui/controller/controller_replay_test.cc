@@ -87,6 +87,22 @@ TEST_F(ControllerReplay, ARegistrationThatIsNotTheRecordedOneIsRefused) {
   EXPECT_FALSE(state().refusals.contains(Phase::registration));
 }
 
+TEST_F(ControllerReplay, AnUnexpectedErrorIsNotTriedAgainBeforeAnotherMomentIsChosen) {
+  ASSERT_NO_FATAL_FAILURE(record());
+  RecordedMoment moment = moment_of("registered");
+  moment.plan.models[0].volume = folder_.path() / "loop";
+  fs::create_directory(*moment.plan.models[0].volume);
+  fs::create_symlink("itself", *moment.plan.models[0].volume / "itself");
+  int refused = 0;
+  QObject::connect(controller_.get(), &Controller::refused, [&] { ++refused; });
+  controller_->show_recorded(moment);
+  ASSERT_TRUE(wait("it is refused", [&] { return refused > 0; }));
+  EXPECT_FALSE(state().busy) << observed();
+  EXPECT_EQ(state().refusals.at(Phase::registration).reason, Reason::unsupported) << observed();
+  ASSERT_TRUE(follows(moment_of("registration_confirmed")));
+  EXPECT_TRUE(state().registration) << observed();
+}
+
 TEST_F(ControllerReplay, AMomentOfTheOpenCaseWithdrawsTheOneBeforeOfAnotherCase) {
   ASSERT_NO_FATAL_FAILURE(record());
   const RecordedMoment here = moment_of("registered");

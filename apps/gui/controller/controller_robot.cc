@@ -81,11 +81,11 @@ void Controller::touch(const std::string& check_point) {
   });
 }
 
-void Controller::unlock(const std::string& who) {
+void Controller::unlock(const std::string& who, const robot::RobotLinkStatus& shown) {
   if (!equipment_ || !equipment_->devices) return;
-  begin(Phase::navigate, "unlocking the robot", [equipment = equipment_, who]() -> Change {
+  begin(Phase::navigate, "unlocking the robot", [equipment = equipment_, who, shown]() -> Change {
     value_or_throw(equipment->devices->robot().wait_connected(robot_patience));
-    value_or_throw(equipment->devices->robot().unlock(who));
+    value_or_throw(equipment->devices->robot().unlock(who, shown));
     const auto tour = equipment->operation->preview_tour();
     return [words = tour ? tour_words(*tour) : QString()](ApplicationState& state) { state.tour = words; };
   });

@@ -6,6 +6,7 @@
 #include "gui/controller/equipment.h"
 #include "gui/controller/model_landmarks.h"
 #include "gui/controller/pick_checks.h"
+#include "gui/controller/unsaved_changes.h"
 #include "gui/controller/unsaved_picks.h"
 #include "helicarm/core/private_files.h"
 #include "helicarm/operation/plan_fields.h"
@@ -40,15 +41,6 @@ std::vector<operation::OperationTunnel> tunnels_of(const pipeline::Case& the_cas
   const bool has_none =
       std::ranges::all_of(tunnels, [&](const auto& tunnel) { return is_unpicked(picked, tunnel); });
   return unsaved.empty() || !has_none ? tunnels : std::vector<operation::OperationTunnel>{};
-}
-
-/// Those that keep what case.json does not hold.
-QStringList unsaved_files(const fs::path& case_folder) {
-  QStringList files;
-  std::error_code unreadable;
-  for (const char* file : {"unsaved_picks.json", "unsaved_landmarks.json"})
-    if (fs::exists(case_folder / file, unreadable)) files << file;
-  return files;
 }
 
 /// Every file of the folder that a JSON value names.
@@ -103,10 +95,10 @@ void Controller::open(Source source, const fs::path& folder, std::string doing,
     next_source_ = [=, this] { open(source, folder, doing, work); };
     return cancel();
   }
-  if (state_.has_unsaved_picks && state_.case_folder && !state_.picks_not_kept)
-    emit told(tr("The changes of %1 that are not in its case.json are kept in %2.")
-                  .arg(QString::fromStdString(state_.case_folder->string()),
-                       unsaved_files(*state_.case_folder).join(tr(" and "))));
+  if (const UnsavedChanges changes = unsaved_changes(state_); changes.any() && !state_.picks_not_kept)
+    emit told(
+        tr("The changes of %1 that are not in its case.json are kept in %2.")
+            .arg(QString::fromStdString(state_.case_folder->string()), changes.files().join(tr(" and "))));
   auto old = std::exchange(equipment_, nullptr);
   opens_recorded_ = false;
   live_tool_.reset();
@@ -207,8 +199,7 @@ Controller::Change Controller::with_plan(const operation::OperationPlan& plan,
     state.stand_off_mm = plan.robot.approach.stand_off_mm;
     state.offered_picks = offered;
     state.has_models = !models.empty();
-    for (const pipeline::CaseModel& model : models) state.models.push_back(model.name);
-    state.model_files = models;
+    state.models = models;
     Images none(plan.views.size());
     for (std::size_t i = 0; i < none.size(); ++i) none[i].name = plan.views[i];
     state.result = result_with(std::move(none));
@@ -293,10 +284,8 @@ Controller::Change Controller::with_case(pipeline::Case the_case, Equipment& equ
   equipment.the_case = the_case;
   const std::vector<ViewFile> files = files_of(the_case);
   const Change found = measured(equipment, unsaved.value_or(the_case.picks));
-  std::vector<std::string> models;
-  for (const pipeline::CaseModel& model : the_case.models) models.push_back(model.name);
-  return [this, the_case = std::move(the_case), unsaved = std::move(unsaved), files, found,
-          models = std::move(models)](ApplicationState& state) {
+  return [this, the_case = std::move(the_case), unsaved = std::move(unsaved), files,
+          found](ApplicationState& state) {
     for (const pipeline::CaseView& view : the_case.views) state.views.push_back(view.name);
     state.files = files;
     state.calibrator = the_case.calibrator;
@@ -312,10 +301,8 @@ Controller::Change Controller::with_case(pipeline::Case the_case, Equipment& equ
     for (const guidance::ToolLine& line : the_case.tool_lines) state.tool_lines.push_back(line.tunnel);
     complete_landmarks(state);
     found(state);
-    state.has_models = !models.empty();
-    state.models = models;
-    state.model_files = the_case.models;
-    state.case_models = the_case.models;
+    state.has_models = !the_case.models.empty();
+    state.models = the_case.models;
   };
 }
 

@@ -36,19 +36,15 @@ std::optional<operation::Guidance> NewestGuidance::at(double now_s) const {
   return late;
 }
 
-std::shared_ptr<const pipeline::Result> result_with(Images images) {
-  auto result = std::make_shared<pipeline::Result>();
-  result->views = std::move(images);
-  return result;
+MeasuredImages measured_images(const operation::Operation& operation) {
+  return {operation.images(), operation.newest_result().has_value()};
 }
 
-Expected<Images> take(Equipment& equipment, const std::string& view,
-                      const operation::DatedArrival& view_image) {
+Expected<Images> images_of(const operation::Operation& operation) {
   return guarded([&] {
-    value_or_throw(equipment.operation->take(view, view_image.arrival, view_image.time_s));
-    const auto taken = equipment.operation->images();
+    const auto taken = operation.images();
     Images images;
-    for (const std::string& name : equipment.operation->plan().views) {
+    for (const std::string& name : operation.plan().views) {
       pipeline::ViewResult shown;
       shown.name = name;
       if (const auto file = taken.find(name); file != taken.end())
@@ -57,6 +53,19 @@ Expected<Images> take(Equipment& equipment, const std::string& view,
       images.push_back(std::move(shown));
     }
     return images;
+  });
+}
+
+std::shared_ptr<const pipeline::Result> result_with(Images images) {
+  auto result = std::make_shared<pipeline::Result>();
+  result->views = std::move(images);
+  return result;
+}
+
+Expected<Images> take(Equipment& equipment, const std::string& view,
+                      const operation::DatedArrival& view_image) {
+  return equipment.operation->take(view, view_image.arrival, view_image.time_s).and_then([&] {
+    return images_of(*equipment.operation);
   });
 }
 

@@ -54,6 +54,17 @@ struct Equipment {
 /// All views of the operation with the images received so far.
 using Images = std::vector<pipeline::ViewResult>;
 
+/// The images that an operation has taken, and whether it has measured them.
+struct MeasuredImages {
+  std::map<std::string, std::filesystem::path> files;  ///< by view
+  bool have_result = false;
+  bool operator==(const MeasuredImages&) const = default;
+};
+MeasuredImages measured_images(const operation::Operation& operation);
+
+/// All views of an operation with their images. Fails as `read_xray_image`.
+Expected<Images> images_of(const operation::Operation& operation);
+
 /// With the images alone.
 std::shared_ptr<const pipeline::Result> result_with(Images images);
 

@@ -50,6 +50,24 @@ std::vector<StatusIndicator> tracker_indicators(const operation::TrackerPlan& pl
   return indicators;
 }
 
+std::vector<StatusIndicator> recorded_indicators(const operation::TrackerPlan& plan,
+                                                 const SessionState& then) {
+  std::vector<StatusIndicator> indicators;
+  const auto add = [&](const QString& name, const std::string& marker) {
+    const auto looked_for = then.tracker_from.find(marker);
+    if (looked_for == then.tracker_from.end()) return;
+    const bool is_seen = looked_for->second.has_value();
+    indicators.push_back({name,
+                          is_seen ? Light::green : Light::off,
+                          is_seen ? live_tr("seen") : live_tr("not seen"),
+                          is_seen ? QString() : live_tr("the tracker did not see it at this moment"),
+                          {}});
+  };
+  for (const auto& [bone, marker] : plan.markers) add(QString::fromStdString(bone), marker);
+  add(live_tr("tool"), plan.tool);
+  return indicators;
+}
+
 StatusIndicator robot_indicator(const robot::RobotLinkStatus& status) {
   StatusIndicator indicator{live_tr("robot"),
                             Light::off,

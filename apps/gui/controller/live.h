@@ -4,6 +4,7 @@
 #include <QString>
 #include <vector>
 
+#include "gui/replay/timeline.h"
 #include "helicarm/devices/robot/robot_link.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/operation/live_tool.h"
@@ -30,6 +31,10 @@ inline constexpr double late_s = 1;
 std::vector<StatusIndicator> tracker_indicators(const operation::TrackerPlan& plan,
                                                 const std::vector<tracker::ToolState>& tools);
 StatusIndicator robot_indicator(const robot::RobotLinkStatus& status);
+/// The markers of bones and tool that the tracker has looked for, at a moment of a recorded operation:
+/// whether it saw them.
+std::vector<StatusIndicator> recorded_indicators(const operation::TrackerPlan& plan,
+                                                 const SessionState& then);
 /// At this time, monotonic seconds.
 StatusIndicator c_arm_indicator(const operation::CArmStatus& status, double now_s);
 

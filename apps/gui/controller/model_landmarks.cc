@@ -84,15 +84,6 @@ QString name_as_start(Json& model, const std::string& name, const std::string& f
       .arg(in_words(name), in_words(file));
 }
 
-QString not_saved_words(const std::string& name, std::size_t usable) {
-  return landmark_tr(
-             "The landmarks of %1 are not its start yet, since %2 of them are picked in two X-ray "
-             "images, of %3 at least; they are kept in unsaved_landmarks.json.")
-      .arg(in_words(name))
-      .arg(usable)
-      .arg(registration::least_landmarks);
-}
-
 bool is_end_or_target(const ApplicationState& state, const std::string& name) {
   return std::ranges::any_of(state.tunnels,
                              [&](const operation::OperationTunnel& tunnel) {
@@ -142,6 +133,15 @@ int views_with(const std::vector<pipeline::Pick>& picks, const std::string& poin
 std::size_t count_usable(const Points& landmarks, const std::vector<pipeline::Pick>& picks) {
   return std::size_t(std::ranges::count_if(
       landmarks, [&](const PointInModel& point) { return views_with(picks, point.name) >= least_views; }));
+}
+
+QString not_saved_words(const std::string& model, std::size_t usable) {
+  return landmark_tr(
+             "The landmarks of %1 are not its start yet, since %2 of them are picked in two X-ray "
+             "images, of %3 at least; they are kept in unsaved_landmarks.json.")
+      .arg(in_words(model))
+      .arg(usable)
+      .arg(registration::least_landmarks);
 }
 
 Expected<SavedLandmarks> save_landmarks(const fs::path& case_folder, const std::vector<CaseModel>& models,
@@ -209,7 +209,7 @@ QString why_no_landmark(const ApplicationState& state, std::size_t model, const 
   for (std::size_t i = 0; i < state.model_landmarks.size(); ++i)
     if (i != model && has_point(state.model_landmarks[i], name))
       return landmark_tr("%1 is a landmark of %2 already.")
-          .arg(in_words(name), in_words(i < state.models.size() ? state.models[i] : ""));
+          .arg(in_words(name), in_words(i < state.models.size() ? state.models[i].name : ""));
   if (!has_point(of_model(state.model_landmarks, model), name) && is_end_or_target(state, name))
     return landmark_tr("There is a point of this name already.");
   return {};
@@ -227,7 +227,7 @@ QString why_not_renamed(const ApplicationState& state, std::size_t model, const 
   for (std::size_t i = 0; i < state.model_landmarks.size(); ++i)
     if (i != model && has_point(state.model_landmarks[i], name))
       return landmark_tr("%1 is a landmark of %2 too: remove it here and add another one.")
-          .arg(in_words(name), in_words(i < state.models.size() ? state.models[i] : ""));
+          .arg(in_words(name), in_words(i < state.models.size() ? state.models[i].name : ""));
   return {};
 }
 
@@ -249,7 +249,7 @@ QString landmark_start_words(const ApplicationState& state, std::size_t model) {
       are_same(placed, of_model(state.case_landmarks, model)))
     return {};
   const std::size_t usable = count_usable(placed, state.picks);
-  const QString name = in_words(state.models[model]);
+  const QString name = in_words(state.models[model].name);
   if (usable >= registration::least_landmarks)
     return landmark_tr("%1 starts from its %2 landmarks that are picked in two X-ray images.")
         .arg(name)

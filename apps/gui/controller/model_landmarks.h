@@ -34,6 +34,9 @@ int views_with(const std::vector<pipeline::Pick>& picks, const std::string& poin
 std::size_t count_usable(const std::vector<pipeline::PointInModel>& landmarks,
                          const std::vector<pipeline::Pick>& picks);
 
+/// Why the landmarks of a model, of which so many are usable, are not saved.
+QString not_saved_words(const std::string& model, std::size_t usable);
+
 /// What `save_landmarks` did.
 struct SavedLandmarks {
   ModelLandmarks saved;                     ///< those of case.json now

@@ -29,7 +29,7 @@ class ControllerRehearsal : public ControllerFixture<QCoreApplication> {
   }
   bool unlock() {
     return attempt(
-        "the robot is unlocked", [&] { controller_->unlock("tester"); },
+        "the robot is unlocked", [&] { controller_->unlock("tester", controller_->live().robot); },
         [&] { return controller_->live().robot.phase == robot::LinkPhase::ready; });
   }
   bool acquire() {

@@ -131,13 +131,15 @@ void plan(StepCard& card, const ApplicationState& state) {
 }
 
 void navigate(StepCard& card, const ApplicationState& state) {
-  if (state.source == Source::files && !state.hand_eye_rms_mm) {  // a replay has a registration
+  if (state.source == Source::files && !state.hand_eye_rms_mm && !state.drill) {  // neither, of a replay
     card.why =
         state.is_replayed ? tr("no robot is registered at this moment") : tr("images from files: no robot");
     return;
   }
   if (state.drill) {
-    card.why = tr("guide the drill to a tunnel");
+    card.why = !state.is_replayed ? tr("guide the drill to a tunnel")
+               : state.is_guided  ? tr("the drill is guided at this moment")
+                                  : tr("no drill is guided at this moment");
   } else if (!state.hand_eye_rms_mm) {
     card.why = tr("unlock the robot, then register it");
     return;

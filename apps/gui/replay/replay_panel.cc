@@ -52,6 +52,30 @@ QPushButton* button(const QString& text, const QString& tip, QWidget* parent) {
 
 }  // namespace
 
+QString verdict_of(const Expected<operation::ReplayReport>& report) {
+  if (!report)
+    return ReplayPanel::tr("Cannot be replayed: %1").arg(QString::fromStdString(report.error().message));
+  QString words;
+  if (report->complete())
+    words = ReplayPanel::tr(
+                "Reproduced bit for bit: acquisitions %1, images %2, results %3, registrations of models %4, "
+                "hand-eye calibrations %5")
+                .arg(report->exposures)
+                .arg(report->images)
+                .arg(report->results)
+                .arg(report->registrations)
+                .arg(report->hand_eyes);
+  else if (report->differences.empty())
+    words = ReplayPanel::tr("The record has no end: the program was killed, or records were removed");
+  else
+    words = ReplayPanel::tr("These values differ on recomputation:");
+  for (const std::string& difference : report->differences)
+    words += "\n" + QString::fromStdString(difference);
+  for (const std::string& note : report->notes)
+    words += ReplayPanel::tr("\nNote: %1").arg(QString::fromStdString(note));
+  return words;
+}
+
 ReplayPanel::ReplayPanel(QWidget* parent) : QWidget(parent) {
   build();
   bind_keys();
@@ -173,6 +197,7 @@ void ReplayPanel::show_moment(int index) {
   time_->setText(clock_time(seconds_) + " / " + clock_time(timeline_->length_s()));
   if (index == moment_) return;
   moment_ = index;
+  state_ = state_at(*timeline_, std::size_t(index));
   const QSignalBlocker quiet(list_);
   list_->setCurrentRow(index);
   QString detail = timeline_->moments[std::size_t(index)].detail();
@@ -227,21 +252,8 @@ void ReplayPanel::verify() {
 void ReplayPanel::show_verdict(const Expected<operation::ReplayReport>& report) {
   progress_->hide();
   verify_->setEnabled(true);
-  const bool same = report && report->complete();
-  QString text = tr("Reproduced bit for bit: acquisitions %1, images %2, results %3, registrations %4");
-  if (!report) {
-    text = tr("Cannot be replayed: %1").arg(QString::fromStdString(report.error().message));
-  } else if (same) {
-    text = text.arg(report->exposures).arg(report->images).arg(report->results).arg(report->hand_eyes);
-  } else if (report->differences.empty()) {
-    text = tr("The record has no end: the program was killed, or records were removed");
-  } else {
-    text = tr("These values differ on recomputation:");
-    for (const std::string& difference : report->differences)
-      text += "\n" + QString::fromStdString(difference);
-  }
-  verdict_->setText(text);
-  Q_EMIT verified(same);
+  verdict_->setText(verdict_of(report));
+  Q_EMIT verified(report && report->complete());
 }
 
 }  // namespace helicarm::gui

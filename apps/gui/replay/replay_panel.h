@@ -21,6 +21,9 @@ class QSlider;
 
 namespace helicarm::gui {
 
+/// What a recomputation found, in sentences.
+QString verdict_of(const Expected<operation::ReplayReport>& report);
+
 /// Steps through an operation's record: J and comma back, L and period forward, K plays and pauses. The space
 /// bar stays reserved for stopping the robot.
 class ReplayPanel : public QWidget {
@@ -36,6 +39,8 @@ class ReplayPanel : public QWidget {
 
   const std::optional<Timeline>& timeline() const { return timeline_; }
   int moment() const { return moment_; }
+  /// Of the operation after that moment. Refuses as `state_at`, and (usage) while no session is open.
+  const Expected<SessionState>& state() const { return state_; }
   bool is_playing() const { return clock_.isActive(); }
   QString verdict() const;
 
@@ -60,6 +65,7 @@ class ReplayPanel : public QWidget {
 
   std::optional<Timeline> timeline_;
   int moment_ = -1;
+  Expected<SessionState> state_ = fail(Reason::usage, "no session is open");
   QTimer clock_;
   QElapsedTimer since_;
   double seconds_ = 0;

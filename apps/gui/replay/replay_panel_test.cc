@@ -75,6 +75,24 @@ TEST_F(Panel, VerificationReportsWhatItCannotReplay) {
   EXPECT_THAT(panel_->verdict().toStdString(), testing::HasSubstr("record"));
 }
 
+TEST(Verdicts, StateWhatIsEqualInAnEarlierFormAlone) {
+  operation::ReplayReport report;
+  report.finished = true;
+  EXPECT_FALSE(verdict_of(report).contains("Note"));
+  report.notes = {"record 7: the registration is as earlier versions recorded it"};
+  const std::string words = verdict_of(report).toStdString();
+  EXPECT_THAT(words, testing::StartsWith("Reproduced bit for bit"));
+  EXPECT_THAT(words, testing::HasSubstr("\nNote: record 7: the registration is as earlier"));
+}
+
+TEST_F(Panel, HoldsTheStateOfItsMoment) {
+  panel_->set_moment(0);
+  EXPECT_FALSE(panel_->state()->measured);
+  panel_->set_moment(int(session_kinds.size()) - 1);
+  EXPECT_TRUE(panel_->state()->measured);
+  EXPECT_EQ(ReplayPanel().state().error().reason, Reason::usage);
+}
+
 TEST_F(Panel, DamagedSessionKeepsTheOpenOne) {
   EXPECT_EQ(panel_->open(folder_ / "nowhere").error().reason, Reason::missing_file);
   EXPECT_EQ(panel_->timeline()->moments.size(), session_kinds.size());

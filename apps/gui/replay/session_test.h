@@ -18,7 +18,7 @@ inline constexpr std::array<std::string_view, 15> session_kinds{
 inline operation::PoseWindow window_with(double femur_x) {
   operation::PoseWindow window{10, 0.5, {}};
   window.samples["femur"] = {{9.8, 0, 9.8, {Eigen::Matrix3d::Identity(), {0, 0, 0}}},
-                             {10.2, 0, 10.2, {Eigen::Matrix3d::Identity(), {femur_x, 0, 0}}}};
+                             {10.4, 0, 10.4, {Eigen::Matrix3d::Identity(), {femur_x, 0, 0}}}};
   window.samples["tibia"] = {};
   return window;
 }

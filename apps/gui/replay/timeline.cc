@@ -165,10 +165,15 @@ struct Take {
   std::size_t number;
 
   void see(const PoseWindow& window) const {
-    for (const auto& [tool, samples] : window.samples)
-      if (!samples.empty()) state.tracker_from[tool] = samples.back().tracker_from_tool;
+    for (const auto& [marker, samples] : window.samples)
+      state.tracker_from[marker] =
+          is_seen_at_end(window, marker) ? std::optional(samples.back().tracker_from_tool) : std::nullopt;
   }
 
+  void end_guidance() const {
+    state.is_guided = false;
+    state.guidance.reset();
+  }
   void forget_models() const {
     state.models.reset();
     state.is_confirmed = false;
@@ -181,6 +186,7 @@ struct Take {
     state.measured = false;
     state.outcomes.clear();
     state.loops.clear();
+    end_guidance();
     forget_models();
   }
 
@@ -203,12 +209,16 @@ struct Take {
   void operator()(const record::Touched& touched) const { see(touched.window); }
   void operator()(const record::Guide& guide) const {
     state.tunnel = guide.tunnel;
+    state.is_guided = true;
+    state.guidance.reset();
     see(guide.window);
   }
   void operator()(const record::Guided& guided) const {
     state.tunnel = guided.tunnel;
+    state.guidance = guided.guidance;
     see(guided.window);
   }
+  void operator()(const record::GuidanceEnded&) const { end_guidance(); }
   void operator()(const record::Refused& refused) const {
     if (!refused.picture) forget_measurement();  // an earlier image was found to be delayed
   }
@@ -233,6 +243,7 @@ struct Take {
     state.loops[navigated.tunnel] = navigated.loop;
   }
   void operator()(const record::Outcome& outcome) const {
+    end_guidance();  // no record of earlier versions says so
     state.outcomes.insert_or_assign(
         outcome.tunnel, TunnelOutcome{outcome.tunnel, state.loops[outcome.tunnel], outcome.start, outcome.end,
                                       outcome.depth ? std::optional(guidance::Verification{
@@ -309,7 +320,7 @@ Expected<operation::ToolOverlay> overlay_of(const operation::LiveTool& tool, con
     const OperationPlan& plan = recorded_plan(timeline);
     const auto pose = [&](const std::string& marker) -> std::optional<geometry::RigidTransform> {
       const auto seen = state.tracker_from.find(marker);
-      return seen == state.tracker_from.end() ? std::nullopt : std::optional(seen->second);
+      return seen == state.tracker_from.end() ? std::nullopt : seen->second;
     };
     if (plan.tunnels.empty()) throw BadInput(Reason::bad_value, "the plan has no tunnel");
     const auto tunnel = std::ranges::find(plan.tunnels, state.tunnel, &operation::OperationTunnel::name);

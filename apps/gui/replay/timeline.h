@@ -42,16 +42,19 @@ struct SessionState {
   std::vector<std::string> exposures;  ///< views in order of acquisition
   /// The newest case with a result: images and case.json. A verification by registered models leaves theirs.
   std::optional<std::filesystem::path> case_folder;
-  bool measured = false;                                         ///< by the newest images
-  std::map<std::string, geometry::RigidTransform> tracker_from;  ///< the newest pose of each tool
-  std::map<std::string, std::vector<robot::Miss>> loops;         ///< the closed loop, by tunnel
-  std::map<std::string, operation::TunnelOutcome> outcomes;      ///< the check that follows it, by tunnel
-  std::map<std::string, std::size_t> exposed_at;                 ///< moment of each view's newest image taken
-  std::optional<std::size_t> registered_at;                      ///< moment of the latest registration
-  std::optional<double> hand_eye_rms_mm;                         ///< of it
-  std::string tunnel;                                            ///< target of the newest order or guidance
-  std::optional<operation::record::Registered> models;           ///< the registration of the plan's models
-  bool is_confirmed = false;                                     ///< by a person, that registration
+  bool measured = false;  ///< by the newest images
+  /// The newest pose of each marker; nothing where the tracker looked for it last and did not see it.
+  std::map<std::string, std::optional<geometry::RigidTransform>> tracker_from;
+  std::map<std::string, std::vector<robot::Miss>> loops;     ///< the closed loop, by tunnel
+  std::map<std::string, operation::TunnelOutcome> outcomes;  ///< the check that follows it, by tunnel
+  std::map<std::string, std::size_t> exposed_at;             ///< moment of each view's newest image taken
+  std::optional<std::size_t> registered_at;                  ///< moment of the latest registration
+  std::optional<double> hand_eye_rms_mm;                     ///< of it
+  std::string tunnel;                                        ///< target of the newest order or guidance
+  bool is_guided = false;                                    ///< a drill in the hand, to it
+  std::optional<operation::Guidance> guidance;               ///< its newest decision
+  std::optional<operation::record::Registered> models;       ///< the registration of the plan's models
+  bool is_confirmed = false;                                 ///< by a person, that registration
 };
 
 /// Reads session.log in a session's folder. An incomplete end is left out and reported in `torn`; refuses as
@@ -69,7 +72,8 @@ Expected<SessionState> state_at(const Timeline& timeline, std::size_t index);
 Expected<operation::LiveTool> tool_of(const Timeline& timeline, const SessionState& state,
                                       const pipeline::Result& result);
 
-/// The tool at the newest poses, relative to the bone of the state's tunnel. Refuses as `LiveTool::overlay`.
+/// The tool at the newest poses, relative to the bone of the state's tunnel. Refuses as `LiveTool::overlay`,
+/// so (no_pose) where the tool or that bone was not seen.
 Expected<operation::ToolOverlay> overlay_of(const operation::LiveTool& tool, const Timeline& timeline,
                                             const SessionState& state);
 

@@ -52,8 +52,9 @@ TEST_F(TimelineTest, StateAccumulatesOverTheMoments) {
   EXPECT_FALSE(begin.case_folder);
   const SessionState exposed = state_at(timeline, 4).value();
   EXPECT_THAT(exposed.exposures, testing::ElementsAre("AP", "LAT"));
-  EXPECT_EQ(exposed.tracker_from.at("femur").translation.x(), 2);
-  EXPECT_FALSE(exposed.tracker_from.contains("tibia"));
+  EXPECT_EQ(exposed.tracker_from.at("femur")->translation.x(), 2);
+  EXPECT_FALSE(exposed.tracker_from.at("tibia")) << "looked for, and not seen";
+  EXPECT_FALSE(exposed.tracker_from.contains("tool"));
   const SessionState begun = state_at(timeline, 5).value();
   EXPECT_FALSE(begun.case_folder) << "without a result";
   EXPECT_FALSE(begun.measured);
@@ -67,7 +68,7 @@ TEST_F(TimelineTest, StateAccumulatesOverTheMoments) {
   EXPECT_EQ(femur.loop[1].distance_mm, 0.25);
   EXPECT_DOUBLE_EQ(femur.start.distance_mm(), 0.5);
   EXPECT_DOUBLE_EQ(femur.end.predicted_mm(), 0.6);
-  EXPECT_EQ(end.tracker_from.at("femur").translation.x(), 3);
+  EXPECT_EQ(end.tracker_from.at("femur")->translation.x(), 3);
 }
 
 TEST_F(TimelineTest, ARegistrationOfModelsStandsUntilOtherImagesOrAnotherMeasurement) {
@@ -98,6 +99,33 @@ TEST_F(TimelineTest, ARegistrationOfModelsStandsUntilOtherImagesOrAnotherMeasure
   EXPECT_FALSE(after(5).models) << "another measurement";
   EXPECT_EQ(after(6).models->digest, "cc");
   EXPECT_FALSE(after(7).models) << "another image";
+}
+
+TEST_F(TimelineTest, AMarkerThatIsNotSeenAnyMoreHasNoPose) {
+  using namespace operation::record;
+  const auto session = operation::SessionLog::open(folder_ / "session.log").value();
+  const auto add = [&](const operation::Record& record) {
+    ASSERT_TRUE(session->append(std::string(operation::kind_of(record)), operation::content_of(record)));
+  };
+  operation::PoseWindow hidden = window_with(4), vanishes = window_with(5), of_others = window_with(6);
+  hidden.samples["femur"].clear();
+  vanishes.samples["femur"].resize(1);
+  of_others.samples.erase("femur");
+  add(Poses{Look::verify, window_with(3)});
+  add(Poses{Look::verify, hidden});
+  add(Poses{Look::verify, window_with(3)});
+  add(Poses{Look::verify, vanishes});
+  add(Poses{Look::verify, window_with(3)});
+  add(Poses{Look::verify, of_others});
+  const Timeline timeline = read();
+  const auto femur_after = [&](std::size_t number) {
+    return state_at(timeline, session_kinds.size() - 1 + number).value().tracker_from.at("femur");
+  };
+  EXPECT_TRUE(femur_after(1));
+  EXPECT_FALSE(femur_after(2));
+  EXPECT_TRUE(femur_after(3));
+  EXPECT_FALSE(femur_after(4));
+  EXPECT_TRUE(femur_after(6)) << "it was not looked for";
 }
 
 TEST_F(TimelineTest, TornLogIsReadUpToTheIncompleteRecord) {
@@ -155,9 +183,15 @@ TEST_F(TimelineTest, AHandHeldDrillReplaysWithItsTouchesAndGuidance) {
             "Drill at tibia, 1.25 mm and 3.0° off its axis: 1.2 mm off the axis");
   const SessionState state = state_at(timeline, last).value();
   EXPECT_EQ(state.tunnel, "tibia");
-  EXPECT_EQ(state.tracker_from.at("femur").translation.x(), 6);
+  ASSERT_TRUE(state.guidance);
+  EXPECT_EQ(state.guidance->why_not->reason, Reason::off_target);
+  EXPECT_FALSE(state_at(timeline, last - 1)->guidance) << "of none before";
+  EXPECT_TRUE(state_at(timeline, last - 1)->is_guided);
+  EXPECT_EQ(state.tracker_from.at("femur")->translation.x(), 6);
   add(GuidanceEnded{"tibia", GuidanceEndedBy::person});
   EXPECT_EQ(read().moments.back().summary, "Guidance to tibia ended: by the person");
+  EXPECT_FALSE(state_at(read(), last + 1)->is_guided);
+  EXPECT_FALSE(state_at(read(), last + 1)->guidance);
 }
 
 /// A measurement of a plan with a tunnel of picks, in the tibia, and one of a model, in the femur.

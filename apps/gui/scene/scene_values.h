@@ -79,7 +79,7 @@ ResultScene scene_of(const pipeline::Result& result, const phantom::Calibrator& 
 
 /// A model of the case at its registered pose, or at one tried by hand.
 struct ModelShape {
-  enum class State { registered, refused, by_hand, out_of_date };
+  enum class State { registered, refused, by_hand, not_registered, out_of_date };
 
   std::string name;
   State state = State::registered;

@@ -37,6 +37,8 @@ QString words_of(const ModelShape& shape) {
       return SceneView::tr("%1: refused").arg(name);
     case ModelShape::State::by_hand:
       return SceneView::tr("%1: moved by hand").arg(name);
+    case ModelShape::State::not_registered:
+      return SceneView::tr("%1: not registered").arg(name);
     case ModelShape::State::out_of_date:
       return SceneView::tr("%1: out of date").arg(name);
     case ModelShape::State::registered:

@@ -15,6 +15,8 @@ class HoldButton : public QPushButton {
   static constexpr int hold_ms = 1200;
 
   explicit HoldButton(const QString& text, QWidget* parent = nullptr);
+  /// By mouse or key, and not yet full.
+  bool is_held() const { return timer_.isActive(); }
 
  signals:
   void held();

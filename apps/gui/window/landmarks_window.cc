@@ -51,7 +51,7 @@ std::vector<Vector3d> proposals_of(const registration::Model& model, const phant
 LandmarksWindow::LandmarksWindow(Controller& controller, std::size_t model, QWidget* parent)
     : QDialog(parent), controller_(controller), model_(model) {
   const ApplicationState& state = controller.state();
-  files_ = state.case_models.at(model);
+  files_ = state.models.at(model);
   folder_ = state.folder;
   setObjectName("landmarks");
   setWindowTitle(tr("Landmarks in %1").arg(text(files_.name)));
@@ -298,8 +298,8 @@ void LandmarksWindow::propose() {
 
 void LandmarksWindow::show_state() {
   const ApplicationState& state = controller_.state();
-  const bool is_its_case = state.folder == folder_ && model_ < state.case_models.size() &&
-                           state.case_models[model_].name == files_.name;
+  const bool is_its_case = state.folder == folder_ && model_ < state.models.size() &&
+                           state.models[model_].name == files_.name;
   if (!is_its_case) {
     close();
     return;
@@ -369,6 +369,7 @@ void LandmarksWindow::say_next() {
     words << tr("Register the models (Alt+7): %1.").arg(start);
   else
     words << tr("Click %1 in two X-ray images on page Plan; %2.").arg(text(unpicked->name), start);
+  if (!controller_.takes_picks()) words << tr("During other work no landmark is changed.");
   says_->setText(words.join('\n'));
 }
 

@@ -6,7 +6,6 @@
 #include <QHBoxLayout>
 #include <QKeyEvent>
 #include <QMenu>
-#include <QProgressBar>
 #include <QPushButton>
 #include <QScrollArea>
 #include <QSplitter>
@@ -16,23 +15,27 @@
 
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
+#include "gui/controller/unsaved_changes.h"
 #include "gui/window/ask_files.h"
 #include "gui/window/landmarks_window.h"
 #include "gui/window/points_panel.h"
 #include "gui/window/register_page.h"
 #include "gui/window/style.h"
+#include "gui/window/work_bar.h"
 #include "gui/xray/text.h"
 
 namespace helicarm::gui {
 namespace {
 
 constexpr int live_ms = 20;
-constexpr int refusal_stays_ms = 5000;
+constexpr int reason_stays_ms = 5000;
 
 /// The first step that is not done; the plan is the last one of a case of files.
 Phase open_phase(const std::array<StepCard, phases.size()>& cards, const ApplicationState& state) {
   if (state.source == Source::images) return Phase::acquire;
   const bool registered = state.hand_eye_rms_mm.has_value() || state.drill;
+  if (state.is_guided) return Phase::navigate;
+  if (state.is_replayed && state.drill && !state.outcomes.empty()) return Phase::verify;
   if (can_register(state) && (!state.registration || awaits_confirmation(state))) return Phase::registration;
   for (const StepCard& card : cards) {
     if (card.phase == Phase::registration) continue;  // a step that may be left out
@@ -61,8 +64,11 @@ MainWindow::MainWindow(std::filesystem::path sessions, QWidget* parent)
     moved_on_ = false;
     show_phase(phase);
     log(why);
-    statusBar()->showMessage(why);
-    if (controller_.state().busy) refusal_stays_.setRemainingTime(refusal_stays_ms);
+    show_reason(why);
+  });
+  connect(&controller_, &Controller::models_stepped, this, [this] {
+    moved_on_ = true;
+    show_phase(Phase::registration);
   });
   connect(&controller_, &Controller::exported, this, &MainWindow::tell_of_the_export);
   connect(&controller_, &Controller::told, this, &MainWindow::tell);
@@ -84,7 +90,10 @@ void MainWindow::build() {
   auto* sides = new QSplitter(Qt::Horizontal);
   sides->setObjectName("sides");
   panels_ = new XrayPanels;
-  for (std::size_t i = 0; i < xrays_.size(); ++i) xrays_[i] = &panels_->xray(i);
+  for (std::size_t i = 0; i < xrays_.size(); ++i) {
+    xrays_[i] = &panels_->xray(i);
+    connect(xrays_[i], &XrayView::not_picked, this, &MainWindow::tell_why_not_picked);
+  }
   sides->addWidget(panels_);
   sides->setStretchFactor(0, 6);
   connect(panels_, &XrayPanels::picked, this, &MainWindow::place_pick);
@@ -173,7 +182,7 @@ void MainWindow::build_pages() {
   connect(rectify, &RectifyPage::layer_wanted, panels_, &XrayPanels::set_layer);
   connect(register_, &RegisterPage::slices_wanted, this, &MainWindow::open_ct_of);
   connect(register_, &RegisterPage::landmarks_wanted, this, [this](std::size_t model) {
-    if (model < controller_.state().case_models.size())
+    if (model < controller_.state().models.size())
       show_beside(new LandmarksWindow(controller_, model, this));
   });
   connect(register_, &RegisterPage::held_changed, this, &MainWindow::show_handles);
@@ -196,10 +205,9 @@ void MainWindow::build_status() {
   busy_ = new QWidget;
   auto* row = new QHBoxLayout(busy_);
   row->setContentsMargins(0, 0, 0, 0);
-  auto* progress = new QProgressBar;
-  progress->setRange(0, 0);
-  progress->setFixedSize(120, 18);
-  row->addWidget(progress);
+  work_ = new WorkBar;
+  work_->setFixedSize(120, 18);
+  row->addWidget(work_);
   auto* cancel = new QPushButton(tr("Ca&ncel"));
   cancel->setObjectName("cancel");
   cancel->setStyleSheet("padding: 1px 12px;");
@@ -231,7 +239,7 @@ void MainWindow::show_state() {
   recording_->setVisible(replays || state.source == Source::virtual_or || state.source == Source::devices);
   recording_->setToolTip(tr("Every step is recorded in %1").arg(text(state.folder.string())));
   show_work(state);
-  save_->setEnabled(state.has_unsaved_picks);
+  save_->setEnabled(unsaved_changes(state).any());
   show_edits();
   show_images();
   show_picks();
@@ -245,7 +253,8 @@ void MainWindow::show_state() {
 
 /// In the status line.
 void MainWindow::show_work(const ApplicationState& state) {
-  if (!refusal_stays_.hasExpired()) return;
+  work_->show_work(state.busy ? std::optional(state.doing) : std::nullopt);
+  if (!reason_stays_.hasExpired()) return;
   if (state.busy) return statusBar()->showMessage(text(state.doing));
   const auto stands = [&](const auto& refusal) {
     return sentence_of(refusal.second) == statusBar()->currentMessage();
@@ -314,6 +323,13 @@ void MainWindow::tell(const QString& words) {
   statusBar()->clearMessage();
   told_->setText(words);
   told_->setToolTip(words);
+  if (controller_.state().busy) show_reason(words);
+}
+
+void MainWindow::show_reason(const QString& why) {
+  const bool is_busy = controller_.state().busy.has_value();
+  if (is_busy) reason_stays_.setRemainingTime(reason_stays_ms);
+  statusBar()->showMessage(why, is_busy ? reason_stays_ms : 0);
 }
 
 void MainWindow::tell_of_the_export() {

@@ -33,6 +33,7 @@ class RegisterPage;
 class BonesWindow;
 struct CtPlan;
 class Tour;
+class WorkBar;
 struct TourStep;
 
 /// Steps, two X-ray images, the scene, the page of the step, and the live data; shows the controller's state.
@@ -161,11 +162,17 @@ class MainWindow : public QMainWindow {
   void log_steps(const StepCards& before);
   /// Stands in the status line until something else is to be told.
   void tell(const QString& words);
+  /// In the status line; during other work for some seconds, before its steps are told again.
+  void show_reason(const QString& why);
+  /// Where a point is asked for that is not picked during other work.
+  void tell_why_not_picked();
   void tell_of_the_export();
-  void ask_of_unsaved_picks();
+  QString words_of_unsaved() const;
+  void ask_of_unsaved_changes();
   void show_tre();
-  void show_moment(int index);
+  void show_moment();
   void show_recorded();
+  void add_moment(LiveState& live) const;
   /// Acts at once, or after a question if something would be lost.
   void leave_then(std::function<void()> act);
   void leave_for(const std::vector<std::filesystem::path>& paths);
@@ -227,10 +234,11 @@ class MainWindow : public QMainWindow {
   bool may_close_ = false;
   std::string wanted_view_;  ///< of the next pick
   QWidget* busy_ = nullptr;  ///< progress and Cancel
+  WorkBar* work_ = nullptr;
   QLabel* recording_ = nullptr;
   QLabel* told_ = nullptr;
-  QDeadlineTimer refusal_stays_;  ///< of what was asked for during other work: its steps do not replace it
-  StepCards cards_;               ///< without the devices
+  QDeadlineTimer reason_stays_;  ///< of `show_reason`: the work's steps do not replace it
+  StepCards cards_;              ///< without the devices
 
   LiveState live_;
   std::optional<TreCut> cut_;
@@ -240,6 +248,7 @@ class MainWindow : public QMainWindow {
   std::optional<std::size_t> recorded_at_;            ///< its registration
   std::shared_ptr<const pipeline::Result> recorded_of_;
   std::optional<operation::ToolOverlay> recorded_;                           ///< at the replayed moment
+  std::vector<StatusIndicator> recorded_markers_;                            ///< likewise
   std::shared_ptr<const pipeline::Result> shown_;                            ///< of the images
   std::shared_ptr<const pipeline::Result> present_, present_of_, in_scene_;  ///< `present_result`
   QString out_of_date_;                                                      ///< why the whole measurement is

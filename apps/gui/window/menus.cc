@@ -52,7 +52,7 @@ void MainWindow::build_menus() {
   recent_menu_ = file->addMenu(tr("&Recent"));
   build_recent();
   file->addSeparator();
-  save_ = file->addAction(tr("&Save the picks in the case"), QKeySequence::Save, &controller_,
+  save_ = file->addAction(tr("&Save picks and landmarks in the case"), QKeySequence::Save, &controller_,
                           &Controller::save_picks);
   file->addAction(tr("&Export report and results..."), QKeySequence(tr("Ctrl+E")), this,
                   &MainWindow::ask_and_export);
@@ -109,7 +109,8 @@ void MainWindow::build_menus() {
            "Enter: press; hold it on a yellow button\n"
            "Ctrl+N rehearsal, Ctrl+Shift+N case of X-ray images, Ctrl+O open, Ctrl+5 two or four images, "
            "Ctrl+E export, Ctrl+C copy, Ctrl+P screenshot, Ctrl+, settings\n"
-           "F5 measures again, Ctrl+S saves the picks, Ctrl+Z undoes a change, Ctrl+Shift+Z repeats it, "
+           "F5 measures again, Ctrl+S saves picks and landmarks, Ctrl+Z undoes a change, Ctrl+Shift+Z "
+           "repeats it, "
            "Delete "
            "removes the end "
            "chosen in the table\n\n"

@@ -29,6 +29,8 @@ std::vector<ModelShape> models_of(const ApplicationState& state) {
         shape->points.clear();
         shape->tunnels.clear();
       }
+      if (!state.registration && !is_moved(state, i) && !is_placed(state, i))
+        shape->state = ModelShape::State::not_registered;
       shapes.push_back(*std::move(shape));
     }
   }

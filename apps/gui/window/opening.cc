@@ -13,11 +13,13 @@
 
 #include "gui/controller/equipment.h"
 #include "gui/controller/stale.h"
+#include "gui/controller/unsaved_changes.h"
 #include "gui/window/ask_files.h"
 #include "gui/window/bones_window.h"
 #include "gui/window/main_window.h"
 #include "gui/window/run_window.h"
 #include "gui/window/sequence_window.h"
+#include "gui/xray/text.h"
 
 namespace helicarm::gui {
 namespace fs = std::filesystem;
@@ -200,8 +202,8 @@ BonesWindow* MainWindow::open_ct(const fs::path& file, CtPlan plan,
 
 void MainWindow::open_ct_of(std::size_t model) {
   const ApplicationState& state = controller_.state();
-  if (!state.registration || model >= state.model_files.size() || !state.model_files[model].volume) return;
-  const pipeline::CaseModel& files = state.model_files[model];
+  if (!state.registration || model >= state.models.size() || !state.models[model].volume) return;
+  const pipeline::CaseModel& files = state.models[model];
   ct_of_model_ = {open_ct(*files.volume, plan_in_ct(state, model), files), state.folder, model};
 }
 
@@ -230,21 +232,35 @@ void MainWindow::dropEvent(QDropEvent* event) {
   if (!paths.empty()) leave_for(paths);
 }
 
-void MainWindow::ask_of_unsaved_picks() {
+QString MainWindow::words_of_unsaved() const {
+  const ApplicationState& state = controller_.state();
+  const UnsavedChanges changes = unsaved_changes(state);
+  const QString files = changes.files().join(", ");
+  QStringList words{tr("Changes of %1:").arg(text(state.case_folder->string()))};
+  if (changes.can_be_saved())
+    words << tr("Not in case.json: %1. Not saved, they are kept beside it (%2) and restored when the case is "
+                "opened again.")
+                 .arg(changes.words(), files);
+  words << changes.not_yet;
+  if (!changes.can_be_saved()) words << tr("They are restored when the case is opened again.");
+  if (!controller_.takes_picks())
+    words << tr("Nothing is saved during other work (%1).").arg(text(state.doing));
+  return words.join("\n\n");
+}
+
+/// Save is offered where something can be saved; what cannot is kept as without it.
+void MainWindow::ask_of_unsaved_changes() {
   if (findChild<QMessageBox*>("unsavedQuestion") != nullptr) return;
-  const QString folder = QString::fromStdString(controller_.state().case_folder->string());
-  auto* question = new QMessageBox(
-      QMessageBox::Question, tr("Changes that are not in case.json"),
-      tr("The changed picks or landmarks of %1 are not in its case.json. Not saved, they are kept beside it "
-         "(unsaved_picks.json, unsaved_landmarks.json) and restored when the case is opened again.")
-          .arg(folder),
-      QMessageBox::Save | QMessageBox::Close | QMessageBox::Cancel, this);
+  const bool can_save = controller_.takes_picks() && unsaved_changes(controller_.state()).can_be_saved();
+  auto* question = new QMessageBox(QMessageBox::Question, tr("Changes that are not in case.json"),
+                                   words_of_unsaved(), QMessageBox::Close | QMessageBox::Cancel, this);
   question->setObjectName("unsavedQuestion");
   question->button(QMessageBox::Close)->setText(tr("&Keep beside the case"));
-  question->setDefaultButton(QMessageBox::Save);
+  if (can_save) question->addButton(QMessageBox::Save);
+  question->setDefaultButton(can_save ? QMessageBox::Save : QMessageBox::Close);
   connect(question, &QDialog::finished, this, [this](int answer) {
     if (answer == QMessageBox::Save) controller_.save_picks();
-    const bool failed = answer == QMessageBox::Save && controller_.state().has_unsaved_picks;
+    const bool failed = answer == QMessageBox::Save && unsaved_changes(controller_.state()).can_be_saved();
     if (answer == QMessageBox::Cancel || failed) return;
     may_close_ = true;
     close();
@@ -254,9 +270,9 @@ void MainWindow::ask_of_unsaved_picks() {
 
 void MainWindow::closeEvent(QCloseEvent* event) {
   const ApplicationState& state = controller_.state();
-  if (!may_close_ && state.has_unsaved_picks && state.case_folder && !state.picks_not_kept) {
+  if (!may_close_ && unsaved_changes(state).any() && !state.picks_not_kept) {
     event->ignore();
-    return ask_of_unsaved_picks();
+    return ask_of_unsaved_changes();
   }
   if (!may_close_ && !controller_.loss().isEmpty()) {
     event->ignore();

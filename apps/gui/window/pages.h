@@ -129,6 +129,7 @@ class PlanPage : public Page {
   void tell_next();
   QString next_words() const;
   void show_snap();
+  void show_unsaved(const ApplicationState& state);
   void take_as_clicked();
 
   QLabel *next_, *of_models_;
@@ -172,6 +173,7 @@ class NavigatePage : public Page {
   DrillTarget* target_;
   robot::LinkPhase phase_ = robot::LinkPhase::disconnected;
   std::optional<Failure> why_;
+  robot::RobotLinkStatus shown_;             ///< as the words say
   std::optional<operation::TunnelAim> aim_;  ///< of the tool, in tenths of a millimetre
 };
 

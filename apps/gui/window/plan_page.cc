@@ -6,8 +6,10 @@
 #include <QVBoxLayout>
 #include <algorithm>
 
+#include "gui/controller/model_landmarks.h"
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
+#include "gui/controller/unsaved_changes.h"
 #include "gui/window/page_parts.h"
 #include "gui/window/pages.h"
 #include "gui/window/plan_tables.h"
@@ -48,9 +50,6 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
   auto* clicks = new QHBoxLayout;
   snap_ = new QCheckBox;
   snap_->setObjectName("snap");
-  snap_->setToolTip(
-      tr("A click is refined to the centre of the ball near it; else it is taken as it is. A right "
-         "click on a pick in an X-ray image changes that pick alone."));
   connect(snap_, &QCheckBox::clicked, this, [this](bool on) {
     if (!chosen_)
       snaps_new_ = on;
@@ -235,29 +234,45 @@ void PlanPage::show_state(const ApplicationState& state) {
   no_tunnels_->setVisible(
       state.source == Source::files &&
       std::ranges::any_of(state.tunnels, [&](const auto& tunnel) { return is_unpicked(state, tunnel); }));
-  unsaved_->setVisible(state.has_unsaved_picks || state.picks_not_kept);
-  unsaved_->setText(
-      state.picks_not_kept
-          ? tr("The picks are not kept in the case: %1").arg(sentence_of(*state.picks_not_kept))
-          : tr("These picks are not in case.json yet: Ctrl+S saves them. They are kept until then."));
+  show_unsaved(state);
   clear_->setEnabled(!state.picks.empty() && controller_.takes_picks());
   show_snap();
   tell_next();
 }
 
+void PlanPage::show_unsaved(const ApplicationState& state) {
+  const UnsavedChanges changes = unsaved_changes(state);
+  QStringList lines;
+  if (state.picks_not_kept)
+    lines << tr("Changes are not kept in the case: %1").arg(sentence_of(*state.picks_not_kept));
+  else if (changes.can_be_saved())
+    lines
+        << tr("Not in case.json yet: %1. Ctrl+S saves them; they are kept until then.").arg(changes.words());
+  lines << changes.not_yet;
+  unsaved_->setVisible(!lines.isEmpty());
+  unsaved_->setText(lines.join('\n'));
+}
+
+/// Landmarks of a model are taken as they are clicked; one that a case snaps may be changed.
 void PlanPage::show_snap() {
   const ApplicationState& state = controller_.state();
+  const auto next = target();
   snap_->setText(chosen_ ? tr("Snap %1 to a &ball of 3 mm").arg(text(*chosen_))
                          : tr("Snap to a &ball of 3 mm"));
   const auto of_chosen = [&](const pipeline::Pick& pick) { return chosen_ && pick.name == *chosen_; };
   const bool has_picks = std::ranges::any_of(state.picks, of_chosen);
-  snap_->setChecked(has_picks ? std::ranges::any_of(state.picks,
-                                                    [&](const pipeline::Pick& pick) {
-                                                      return of_chosen(pick) &&
-                                                             pick.snap == pipeline::Snap::ball;
-                                                    })
-                              : snaps_new_);
-  snap_->setEnabled(!chosen_ || (has_picks && controller_.takes_picks()));
+  const bool snaps = std::ranges::any_of(state.picks, [&](const pipeline::Pick& pick) {
+    return of_chosen(pick) && pick.snap == pipeline::Snap::ball;
+  });
+  const bool is_of_model = next && is_landmark_of_model(state, next->point) && !snaps;
+  snap_->setChecked(has_picks ? snaps : snaps_new_ && !is_of_model);
+  snap_->setEnabled(!is_of_model && (!chosen_ || (has_picks && controller_.takes_picks())));
+  snap_->setToolTip(
+      is_of_model
+          ? tr("%1 is a landmark of a model, where no ball is: its clicks are taken as they are.")
+                .arg(text(next->point))
+          : tr("A click is refined to the centre of the ball near it; else it is taken as it is. A right "
+               "click on a pick in an X-ray image changes that pick alone."));
   take_->setEnabled(controller_.takes_picks() &&
                     std::ranges::any_of(state.failed_picks, [](const FailedPick& failed) {
                       return failed.pick.snap == pipeline::Snap::ball;

@@ -12,43 +12,14 @@
 #include "gui/controller/stale.h"
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
+#include "gui/window/registration_reasons.h"
 #include "helicarm/case_registration/registration_tables.h"
-#include "helicarm/localization/error_bound.h"
 #include "helicarm/report/markup.h"
 
 namespace helicarm::gui {
 namespace {
 
-using case_registration::CaseRegistration;
 using case_registration::RegisteredModel;
-
-/// Decision and error at the plan's points of every model; its reasons, warnings and notes, a line each; what
-/// would help where it is not accepted.
-QString reasons_of(const CaseRegistration& done) {
-  QStringList lines;
-  bool is_doubtful = false;
-  for (const RegisteredModel& model : done.models) {
-    const registration::Registration& found = model.registration;
-    std::vector<double> errors_mm;
-    for (const case_registration::RegisteredPoint& point : model.points)
-      errors_mm.push_back(localization::length_at_95(point.place.covariance_in_calibrator));
-    const auto decided = registration::word(found.decision);
-    QString line =
-        QString("%1: %2").arg(text(found.name), QString::fromUtf8(decided.data(), qsizetype(decided.size())));
-    if (!found.failure && !model.points.empty())
-      line += RegisterPage::tr(", its plan's points: %1").arg(largest_error_words(errors_mm));
-    lines << line;
-    is_doubtful = is_doubtful || found.decision != registration::Decision::accept;
-    if (found.failure) lines << sentence_of(*found.failure);
-    for (const auto* list : {&found.warnings, &found.notes})
-      for (const Warning& each : *list) lines << sentence_of(each);
-  }
-  if (is_doubtful)
-    lines << RegisterPage::tr(
-        "What would help: move the model by hand until its outline follows the bone, then register from "
-        "here; pick landmarks of it; add a view from another side.");
-  return lines.join("\n");
-}
 
 /// Those registered, without numbers of a pose that is not the displayed one; before the registration their
 /// names.
@@ -63,7 +34,8 @@ std::vector<RegisteredModel> listed_models(const ApplicationState& state) {
       }
     return models;
   }
-  for (const std::string& name : state.models) models.emplace_back().registration.name = name;
+  for (const pipeline::CaseModel& model : state.models)
+    models.emplace_back().registration.name = model.name;
   return models;
 }
 
@@ -270,8 +242,8 @@ void RegisterPage::show_state(const ApplicationState& state) {
   confirm_->setEnabled(can && awaits_confirmation(state) && !state.nudged);
   from_here_->setEnabled(can && has_poses_by_hand(state));
   const std::size_t chosen = std::size_t(std::max(0, model_->currentIndex()));
-  ct_->setEnabled(state.registration && chosen < state.model_files.size() &&
-                  state.model_files[chosen].volume);
+  ct_->setEnabled(state.registration && chosen < state.models.size() &&
+                  state.models[chosen].volume);
   says_->setText(with_landmark_words(words_of(state), state));
   std::vector<RegisteredModel> models = listed_models(state);
   models_->fill(table_of_models(state, models));
@@ -297,8 +269,9 @@ std::size_t RegisterPage::chosen_model() const {
 
 void RegisterPage::allow_landmarks(const ApplicationState& state) {
   const std::size_t model = chosen_model();
-  in_model_->setEnabled(model < state.case_models.size() &&
-                        (state.case_models[model].volume || state.case_models[model].surface));
+  const bool is_own_case = state.source == Source::files && !state.is_replayed;
+  in_model_->setEnabled(is_own_case && model < state.models.size() &&
+                        (state.models[model].volume || state.models[model].surface));
 }
 
 void RegisterPage::list_models(const ApplicationState& state) {
@@ -382,7 +355,7 @@ QString RegisterPage::words_of(const ApplicationState& state) const {
                  : tr("Recorded: at this moment no person had confirmed the outlines.\n");
   else if (state.is_confirmed)
     guides = tr("Confirmed: the tunnels of these models guide the tool (Alt+5).\n");
-  if (state.registration) return ended + guides + reasons_of(*state.registration);
+  if (state.registration) return ended + guides + reasons_of(state);
   if (state.is_replayed) return ended + tr("No model is registered at this moment of the record.");
   if (has_old_starts(state))
     return ended +

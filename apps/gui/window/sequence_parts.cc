@@ -176,13 +176,15 @@ ResultScene scene_of_frame(const FollowedSequence& followed, std::size_t number)
     const track::BodySequence& body = sequence.bodies[b];
     const auto& pose = body.smoothed[number].pose;
     if (!pose) continue;
-    for (std::size_t i = 0; i < body.markers.size(); ++i)
-      for (std::size_t k = i + 1; k < body.markers.size(); ++k)
-        scene.tunnels.push_back(
-            {i == 0 && k == 1 ? followed.given.bodies[b].name : std::string(),
-             {},
-             {pose->pose * body.markers[i].in_body.place, pose->pose * body.markers[k].in_body.place},
-             rod_mm});
+    std::vector<Eigen::Vector3d> located;
+    for (const track::PlacedMarker& marker : body.markers)
+      if (marker.in_body) located.push_back(pose->pose * marker.in_body->place);
+    for (std::size_t i = 0; i < located.size(); ++i)
+      for (std::size_t k = i + 1; k < located.size(); ++k)
+        scene.tunnels.push_back({i == 0 && k == 1 ? followed.given.bodies[b].name : std::string(),
+                                 {},
+                                 {located[i], located[k]},
+                                 rod_mm});
   }
   return scene;
 }

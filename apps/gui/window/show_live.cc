@@ -19,6 +19,7 @@ void MainWindow::show_live() {
   };
   const auto before = hidden(live_);
   live_ = controller_.live();
+  add_moment(live_);
   if (hidden(live_) != before) show_steps();
   if (live_.stale) controller_.drop_plan(*live_.stale);
   live_bar_->show_live(live_);

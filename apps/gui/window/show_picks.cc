@@ -97,6 +97,12 @@ void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
   plan_->placed(wanted->point);
 }
 
+void MainWindow::tell_why_not_picked() {
+  const ApplicationState& state = controller_.state();
+  if (phase_ != Phase::plan || !state.measured || !plan_->target() || controller_.takes_picks()) return;
+  tell(tr("No point is picked during other work (%1): click again after it.").arg(text(state.doing)));
+}
+
 void MainWindow::move_pick(std::size_t view, const QString& name, const QPointF& raw) {
   const std::string view_name = shown_->views[view].name;
   for (pipeline::Pick pick : controller_.state().picks) {
@@ -113,6 +119,7 @@ void MainWindow::ask_of_pick(std::size_t view, const QString& name, const QPoint
   const pipeline::Pick* pick = pick_of(controller_.state(), point, view_name);
   if (pick == nullptr) return;
   const bool snaps = pick->snap == pipeline::Snap::ball;
+  if (!snaps && is_landmark_of_model(controller_.state(), point)) return;
   auto* menu = new QMenu(this);
   menu->setObjectName("pickMenu");
   menu->setAttribute(Qt::WA_DeleteOnClose);

@@ -26,20 +26,20 @@ void MainWindow::open_session(const fs::path& session) {
 
 ApplicationState MainWindow::displayed_state() const {
   ApplicationState state = controller_.state();
-  if (!state.is_replayed || !replay_->timeline() || replay_->moment() < 0) return state;
-  const auto then = state_at(*replay_->timeline(), std::size_t(replay_->moment()));
-  if (!then || then->case_folder != state.folder || !state.measured) return state;
+  const auto& then = replay_->state();
+  if (!state.is_replayed || !then || then->case_folder != state.folder || !state.measured) return state;
   state.hand_eye_rms_mm = then->hand_eye_rms_mm;
   state.outcomes = then->outcomes;
+  state.is_guided = then->is_guided;
   return state;
 }
 
-void MainWindow::show_moment(int index) {
-  if (!replay_->timeline() || index < 0) return;
-  const auto then = state_at(*replay_->timeline(), std::size_t(index));
+void MainWindow::show_moment() {
+  const auto& then = replay_->state();
   if (!then) return say(then.error());
   const auto plan = plan_of(*replay_->timeline());
   if (!plan) return say(plan.error());
+  recorded_markers_ = recorded_indicators(plan->tracker, *then);
   if (then->case_folder)
     controller_.show_recorded({*then->case_folder, *plan, then->models, then->is_confirmed});
   else
@@ -50,12 +50,11 @@ void MainWindow::show_moment(int index) {
 
 void MainWindow::show_recorded() {
   recorded_.reset();
-  if (!replay_->timeline() || replay_->moment() < 0) return;
-  const auto then = state_at(*replay_->timeline(), std::size_t(replay_->moment()));
-  const bool is_shown = out_of_date_.isEmpty() && then && then->measured && then->case_folder &&
-                        controller_.state().folder == *then->case_folder && controller_.state().measured;
-  const auto plan = plan_of(*replay_->timeline());
-  if (!is_shown || !plan || !(then->registered_at || plan->drill)) return;
+  const auto& then = replay_->state();
+  const ApplicationState& state = controller_.state();
+  const bool is_shown = out_of_date_.isEmpty() && state.is_replayed && state.measured && then &&
+                        then->measured && then->case_folder == state.folder;
+  if (!is_shown || !(then->registered_at || state.drill)) return;
   if (!recorded_tool_ || recorded_at_ != then->registered_at || recorded_of_ != shown_) {
     const auto tool = tool_of(*replay_->timeline(), *then, *shown_);
     if (!tool) return say(tool.error());
@@ -64,6 +63,15 @@ void MainWindow::show_recorded() {
     recorded_of_ = shown_;
   }
   if (const auto overlay = overlay_of(*recorded_tool_, *replay_->timeline(), *then)) recorded_ = *overlay;
+}
+
+/// In place of devices.
+void MainWindow::add_moment(LiveState& live) const {
+  const auto& then = replay_->state();
+  if (!controller_.state().is_replayed || !then) return;
+  live.indicators = recorded_markers_;
+  live.tunnel = QString::fromStdString(then->tunnel);
+  live.drill = then->guidance;
 }
 
 }  // namespace helicarm::gui

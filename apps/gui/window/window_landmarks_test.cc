@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Landmarks placed in a model: in slices, on its surface, and by proposal.
 #include <QElapsedTimer>
+#include <QMessageBox>
+#include <QStatusBar>
 #include <QTableWidget>
 
 #include "gui/controller/case_with_model_test.h"
@@ -132,6 +134,62 @@ TEST_F(WindowLandmarks, AFileThatCannotBeReadIsNamedAndAnotherCaseClosesTheWindo
   EXPECT_FALSE(part<QPushButton>("proposeLandmarks")->isEnabled());
   window_->controller().open_images({});
   ASSERT_TRUE(wait("it is closed", [&] { return dialog() == nullptr; }));
+}
+
+TEST_F(WindowLandmarks, ClosingOffersToSaveWhatCanBeSavedAndSaysWhyNotTheRest) {
+  ASSERT_NO_FATAL_FAILURE(open());
+  press("proposeLandmarks");
+  press("closeLandmarks");
+  const std::string unsaved = find<QLabel>("unsavedPicks")->text().toStdString();
+  EXPECT_THAT(unsaved, HasSubstr("landmarks of bone are not its start yet, since 0 of them"));
+  EXPECT_THAT(unsaved, testing::Not(HasSubstr("the picks")));
+  const auto asked = [&] { return window_->findChild<QMessageBox*>("unsavedQuestion"); };
+  EXPECT_FALSE(window_->close());
+  ASSERT_NE(asked(), nullptr);
+  EXPECT_THAT(asked()->text().toStdString(), HasSubstr("since 0 of them are picked in two X-ray images"));
+  EXPECT_EQ(asked()->button(QMessageBox::Save), nullptr);
+  screenshot("unsaved-landmarks", asked());
+  QTest::mouseClick(asked()->button(QMessageBox::Cancel), Qt::LeftButton);
+  ASSERT_TRUE(wait("the question is answered", [&] { return asked() == nullptr; }));
+
+  window_->controller().pick(
+      {.name = "L1", .view = "AP", .uv_raw = {200, 200}, .snap = pipeline::Snap::none});
+  ASSERT_TRUE(wait_idle());
+  EXPECT_FALSE(window_->close());
+  EXPECT_THAT(asked()->text().toStdString(), HasSubstr("Not in case.json: the picks."));
+  QTest::mouseClick(asked()->button(QMessageBox::Save), Qt::LeftButton);
+  ASSERT_TRUE(wait("the window is closed", [&] { return !window_->isVisible(); }));
+  EXPECT_FALSE(fs::exists(folder_ / "case" / "unsaved_picks.json"));
+  EXPECT_TRUE(fs::exists(folder_ / "case" / "unsaved_landmarks.json"));
+}
+
+TEST_F(WindowLandmarks, TheirClicksSnapToNoBall) {
+  ASSERT_NO_FATAL_FAILURE(open());
+  const auto* snap = find<QCheckBox>("snap");
+  EXPECT_TRUE(snap->isEnabled() && snap->isChecked());
+  press("proposeLandmarks");
+  EXPECT_FALSE(snap->isEnabled() || snap->isChecked());
+  EXPECT_THAT(snap->toolTip().toStdString(), HasSubstr("L1 is a landmark of a model"));
+  window_->controller().undo();
+  EXPECT_TRUE(snap->isEnabled() && snap->isChecked());
+}
+
+TEST_F(WindowLandmarks, AClickDuringARegistrationSaysWhyItIsNoPick) {
+  ASSERT_NO_FATAL_FAILURE(open());
+  press("proposeLandmarks");
+  ASSERT_TRUE(wait("the image is shown", [&] { return !window_->xray(0).is_computing(); }));
+  window_->controller().register_models();
+  window_->strip().chosen(Phase::plan);
+  ASSERT_TRUE(state().busy);
+  QTest::mouseClick(&window_->xray(0), Qt::LeftButton, {}, window_->xray(0).rect().center());
+  emit window_->controller().changed();  // a step of the registration
+  EXPECT_THAT(window_->statusBar()->currentMessage().toStdString(),
+              HasSubstr("No point is picked during other work"));
+  EXPECT_THAT(says(), HasSubstr("During other work no landmark is changed"));
+  EXPECT_TRUE(state().picks.empty());
+  window_->controller().cancel();
+  ASSERT_TRUE(wait_idle());
+  EXPECT_THAT(says(), testing::Not(HasSubstr("During other work")));
 }
 
 /// A ball of 40 mm radius of about 60,000 triangles.

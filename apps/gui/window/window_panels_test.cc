@@ -87,6 +87,16 @@ TEST_F(WindowPanels, AModelIsDraggedInTheImageAndInTheScene) {
   EXPECT_FALSE(window_->scene().handle_place());
 }
 
+TEST_F(WindowPanels, UndoAndRedoOfARegistrationOpenItsPage) {
+  ASSERT_NO_FATAL_FAILURE(open_and_register());
+  for (const bool undoes : {true, false}) {
+    window_->strip().chosen(Phase::plan);
+    undoes ? window_->controller().undo() : window_->controller().redo();
+    EXPECT_EQ(bool(state().registration), !undoes);
+    EXPECT_TRUE(window_->strip().button(Phase::registration)->isChecked());
+  }
+}
+
 TEST_F(WindowPanels, EachObjectOfTheSceneIsHiddenAndMadeTransparent) {
   ASSERT_NO_FATAL_FAILURE(open_and_register());
   find<QDockWidget>("objectsDock")->show();

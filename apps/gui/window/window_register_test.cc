@@ -7,7 +7,9 @@
 #include "gui/window/model_marks.h"
 #include "gui/window/plan_tables.h"
 #include "gui/window/register_page.h"
+#include "gui/window/registration_reasons.h"
 #include "gui/window/window_test.h"
+#include "gui/window/work_bar.h"
 #include "gui/xray/mark_painter.h"
 
 namespace helicarm::gui {
@@ -146,7 +148,9 @@ TEST_F(Window, SeveralModelsArePlacedByHandBeforeTheFirstRegistration) {
   ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
   click("placeModels");
   ASSERT_TRUE(wait("the models are displayed", [&] { return state().at_starts && !state().busy; }));
-  EXPECT_EQ(models_of(state()).size(), 2u);  // the points have no start
+  ASSERT_EQ(models_of(state()).size(), 2u);  // the points have no start
+  for (const ModelShape& shape : models_of(state()))
+    EXPECT_EQ(shape.state, ModelShape::State::not_registered);
   auto* chosen = find<QComboBox>("nudgedModel");
   auto* shift = find<QDoubleSpinBox>("shiftX");
   shift->setValue(4);
@@ -158,6 +162,7 @@ TEST_F(Window, SeveralModelsArePlacedByHandBeforeTheFirstRegistration) {
   const auto* models = find<QTableWidget>("modelTable");
   for (const int model : {0, 1}) EXPECT_EQ(models->item(model, 1)->text(), "placed by hand");
   EXPECT_EQ(models->item(2, 1)->text(), "not registered");
+  for (const ModelShape& shape : models_of(state())) EXPECT_EQ(shape.state, ModelShape::State::by_hand);
   ASSERT_TRUE(wait("both outlines follow", [&] {
     return !outlines_of(state(), 0).at(0).dots.empty() &&
            state().nudged->outlines != state().at_starts->models[1].outlines;
@@ -260,11 +265,43 @@ TEST_F(Window, ACaseWithoutModelsHasNoRegisterStep) {
   EXPECT_FALSE(find<QTableWidget>("tunnelTable")->isVisible());
 }
 
+TEST(WorkBar, ShowsTheShareFromWhereOneIsStatedAndNeverLess) {
+  WorkBar bar;
+  const auto shown = [&](const std::optional<std::string>& doing) {
+    bar.show_work(doing);
+    return bar.maximum() == 0 ? -1 : bar.value();
+  };
+  EXPECT_EQ(shown("reading the models"), -1);
+  EXPECT_EQ(shown("femur: search, 40 %"), 40);
+  EXPECT_EQ(shown("femur: mirror image"), 40);
+  EXPECT_EQ(shown("femur: mirror image, 30 %"), 40);
+  EXPECT_EQ(shown("cancelling: femur: mirror image, 45 %"), 45);
+  EXPECT_EQ(shown({}), -1);
+  EXPECT_EQ(shown("measuring"), -1);
+  EXPECT_EQ(shown("femur: search, 1 %"), 1);
+}
+
 ApplicationState with_registration(const case_registration::RegisteredModel& model) {
   ApplicationState state;
   state.registration = std::make_shared<const case_registration::CaseRegistration>(
       case_registration::CaseRegistration{.failure = {}, .warnings = {}, .models = {model}, .loaded = {}});
   return state;
+}
+
+TEST(RegisteredModels, OneRefusedFromAPoseByHandIsOfferedASearchWithoutIt) {
+  case_registration::RegisteredModel model;
+  model.registration.name = "femur";
+  model.registration.failure = Failure{Reason::wrong_model, "femur: another bone", {}, {}};
+  ApplicationState state = with_registration(model);
+  state.models = {{.name = "femur"}};
+  EXPECT_FALSE(reasons_of(state).contains("Register models"));
+  state.starts_by_hand = {{"femur", {}}};
+  EXPECT_TRUE(reasons_of(state).contains("\"Register models\" forgets that pose and searches everywhere"));
+  state.models[0].landmarks = "points.csv";
+  EXPECT_TRUE(reasons_of(state).contains("\"Register models\" forgets that pose and begins where the case"));
+  model.registration.failure.reset();
+  state.registration = with_registration(model).registration;
+  EXPECT_FALSE(reasons_of(state).contains("Register models"));
 }
 
 TEST(RegisteredModels, RefusedOneHasNoTunnelsAndNoPointsInTheImages) {

@@ -192,7 +192,45 @@ TEST(DrillTargets, SayToDrillBetweenEntryAndEndAlone) {
   EXPECT_THAT(words_at(30.2), HasSubstr("stop"));
 }
 
-TEST_F(Window, ADrillInTheHandIsGuidedAndTheTunnelVerified) {
+class DrillInTheHand : public Window {
+ protected:
+  void expect_replay_of_the_drill() {
+    window_->open_paths({state().folder});
+    auto* replay = window_->findChild<ReplayPanel*>();
+    ASSERT_TRUE(replay->timeline());
+    const auto& moments = replay->timeline()->moments;
+    const auto outcome = std::ranges::find(moments, "outcome", &Moment::kind);
+    const auto guided = std::find_if(moments.begin(), outcome, [](const Moment& moment) {
+      const auto* record = std::get_if<operation::record::Guided>(&moment.record);
+      return record && record->guidance.aim;
+    });
+    ASSERT_NE(guided, outcome);
+    replay->set_moment(int(guided - moments.begin()));
+    ASSERT_TRUE(
+        wait("the recorded tool is shown", [&] { return !state().busy && window_->recorded().has_value(); }));
+    EXPECT_TRUE(window_->strip().button(Phase::navigate)->isChecked());
+    auto* target = find<DrillTarget>("drillTarget");
+    EXPECT_TRUE(wait("the recorded guidance is shown", [&] {
+      return target->words().contains("mm off axis");
+    })) << target->words().toStdString();
+    EXPECT_EQ(find<QComboBox>("tunnel")->currentText(), "femur");
+    for (const char* button :
+         {"unlock", "register", "planWay", "go", "withdraw", "guideDrill", "verifyDrilled"})
+      EXPECT_FALSE(find(button)->isVisible()) << button;
+    for (const QString& words : {find<QLabel>("robotSays")->text(), card(Phase::navigate).why})
+      EXPECT_FALSE(words.isEmpty() || words.contains("robot")) << words.toStdString();
+    EXPECT_THAT(window_->live_bar().words().toStdString(), HasSubstr("tool: seen"));
+    screenshot("drill-replayed");
+    replay->set_moment(int(moments.size()) - 1);
+    ASSERT_TRUE(wait("the outcomes are shown",
+                     [&] { return !state().busy && window_->strip().button(Phase::verify)->isChecked(); }));
+    EXPECT_THAT(find<QLabel>("depths")->text().toStdString(), HasSubstr("the drill's tip is"));
+    EXPECT_TRUE(wait("no guidance is shown", [&] { return target->words() == "not guided"; }));
+    screenshot("drill-replayed-outcome");
+  }
+};
+
+TEST_F(DrillInTheHand, IsGuidedAndTheTunnelVerified) {
   open_rehearsal({.by_hand = true});
   EXPECT_FALSE(find<HoldButton>("unlock")->isVisibleTo(find<QWidget>("pages")));
   shoot_both();
@@ -227,7 +265,14 @@ TEST_F(Window, ADrillInTheHandIsGuidedAndTheTunnelVerified) {
   screenshot("drill-verified");
   QTest::mouseClick(window_->strip().button(Phase::verify), Qt::LeftButton);
   EXPECT_THAT(find<QLabel>("depths")->text().toStdString(), HasSubstr("the drill's tip is"));
+  const auto* table = find<QTableWidget>("outcomeTable");
+  QStringList shown;
+  for (int column = 0; column < table->columnCount(); ++column)
+    if (!table->isColumnHidden(column)) shown << table->horizontalHeaderItem(column)->text();
+  EXPECT_TRUE(shown.contains("Beyond end, mm") && shown.contains("Error, mm"))
+      << shown.join('\n').toStdString();
   screenshot("drill-depth");
+  ASSERT_NO_FATAL_FAILURE(expect_replay_of_the_drill());
 }
 
 TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {

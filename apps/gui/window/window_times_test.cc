@@ -100,7 +100,7 @@ TEST_F(Window, KeepsItsMemoryOverManyOperations) {
   Controller& controller = window_->controller();
   int outcomes = 0;
   for (int round = 0; since.elapsed() < minutes * 60000; ++round) {
-    if (live().robot.phase != robot::LinkPhase::ready) controller.unlock("soak"), done();
+    if (live().robot.phase != robot::LinkPhase::ready) controller.unlock("soak", live().robot), done();
     if (state().tool_is_out) controller.withdraw(), done();
     if (round % 10 == 9) {
       shoot_both();

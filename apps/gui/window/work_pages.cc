@@ -2,6 +2,7 @@
 // Pages of the navigation and verification steps.
 #include <QDesktopServices>
 #include <QHBoxLayout>
+#include <QHeaderView>
 #include <QUrl>
 #include <QVBoxLayout>
 #include <algorithm>
@@ -22,7 +23,7 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent) : Page({}, c
   says_->setAlignment(Qt::AlignLeft | Qt::AlignTop);
   layout()->addWidget(says_);
   unlock_ = add_hold(tr("1  &Unlock the robot (only when no person is near it)"), "unlock",
-                     [this] { controller_.unlock("the person at the screen"); });
+                     [this] { controller_.unlock("the person at the screen", shown_); });
   register_ = add_hold(tr("2  &Register the robot (small moves, listed above)"), "register",
                        [this] { controller_.register_robot(); });
   tunnel_ = new QComboBox;
@@ -77,7 +78,9 @@ void NavigatePage::show_state(const ApplicationState& state) {
 }
 
 void NavigatePage::show_live(const LiveState& live) {
+  if (controller_.state().is_replayed) tunnel_->setCurrentText(live.tunnel);
   if (const auto& drill = controller_.state().drill) return target_->show_guidance(live.drill, *drill);
+  if (!is_held()) shown_ = live.robot;  // its words stay while a button is held
   const auto coarse = [](const std::optional<operation::TunnelAim>& aim) {
     return aim ? std::round(10 * aim->distance_mm) : -1;
   };
@@ -136,6 +139,10 @@ QString NavigatePage::what_lacks() const {
 
 QString NavigatePage::next_step() const {
   const ApplicationState& state = controller_.state();
+  if (state.is_replayed)
+    return tr(
+        "A moment of a recorded operation: what is recorded is shown, nothing else is done. The "
+        "outcomes are on Verify (Alt+6).");
   if (!is_operation(state))
     return state.registration ? tr("Images from files: no robot is connected. Export the tunnels (Alt+6), or "
                                    "connect the devices of a plan that names the models.")
@@ -182,18 +189,19 @@ void NavigatePage::allow() {
   withdraw_->setEnabled(ready && state.tool_is_out);
   for (QWidget* of_robot : std::initializer_list<QWidget*>{unlock_, register_, plan_, go_, withdraw_})
     of_robot->setVisible(!state.drill);
-  for (QWidget* of_hand : std::initializer_list<QWidget*>{target_, guide_, verify_, end_})
-    of_hand->setVisible(state.drill.has_value());
+  target_->setVisible(state.drill.has_value());
+  for (QWidget* of_hand : std::initializer_list<QWidget*>{guide_, verify_, end_})
+    of_hand->setVisible(state.drill && !state.is_replayed);
   const bool is_guided = state.drill && state.busy == Phase::navigate;
   guide_->setEnabled(free && placed);
   verify_->setEnabled(is_guided);
   end_->setEnabled(is_guided);
-  tunnel_->setEnabled(!is_guided);
+  tunnel_->setEnabled(!is_guided && !state.is_replayed);
 }
 
 bool NavigatePage::is_held() const {
   return std::ranges::any_of(std::initializer_list<const HoldButton*>{unlock_, register_, go_, withdraw_},
-                             &HoldButton::isDown);
+                             &HoldButton::is_held);
 }
 
 /// Not under the finger: a longer text would move the button that is held.
@@ -234,6 +242,8 @@ VerifyPage::VerifyPage(Controller& controller, QWidget* parent)
   connect(exported_, &QLabel::linkActivated, this,
           [](const QString& folder) { QDesktopServices::openUrl(QUrl::fromLocalFile(folder)); });
   table_ = add_table(report::verification_table({}), "outcomeTable");
+  const int depth = table_->columnCount() - 1;
+  table_->horizontalHeader()->moveSection(depth, 2);  // before what may not fit
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 

@@ -90,6 +90,8 @@ class XrayView : public QWidget {
  Q_SIGNALS:
   /// A click or Enter while picking: always raw pixels (docs/frames.md).
   void picked(QPointF raw_pixel);
+  /// The same while neither picking nor measuring.
+  void not_picked();
   /// A click or Enter while measuring.
   void measured(QPointF raw_pixel);
   /// A click of a measure is dragged, while measuring.

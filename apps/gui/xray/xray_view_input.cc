@@ -107,7 +107,9 @@ void XrayView::mouseReleaseEvent(QMouseEvent* event) {
   if (ended.button == Qt::RightButton && !ended.moved)
     if (const QString pick = movable_at(event->position()); !pick.isEmpty())
       Q_EMIT pick_menu_wanted(pick, event->globalPosition().toPoint());
-  if (ended.may_pick && !ended.moved) pick_at(at);
+  const bool is_click = ended.button == Qt::LeftButton && !ended.moved && raw_at(at);
+  if (ended.may_pick && is_click) pick_at(at);
+  if (is_click && !takes_clicks()) Q_EMIT not_picked();
   if (!ended.pick.isEmpty() && ended.moved)
     if (const auto raw = raw_at(at)) Q_EMIT pick_moved(ended.pick, *raw);
 }
@@ -190,6 +192,7 @@ void XrayView::keyPressEvent(QKeyEvent* event) {
     case Qt::Key_Enter:
       if (cursor_ && takes_clicks()) return pick_at(frame_.to_widget(*cursor_));
       if (measuring_) return Q_EMIT measure_finished();
+      if (cursor_) Q_EMIT not_picked();
       break;
     case Qt::Key_Escape:
       if (!cursor_) break;

@@ -138,6 +138,17 @@ TEST_F(XrayViewTest, DoubleClickWhilePickingIsOnePick) {
   EXPECT_EQ(spy.count(), 1);
 }
 
+TEST_F(XrayViewTest, AClickThatPicksNothingIsTold) {
+  QSignalSpy told(&view, &XrayView::not_picked);
+  QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
+  EXPECT_EQ(told.count(), 1);
+  drag({300, 300}, {350, 280}, Qt::LeftButton);
+  EXPECT_EQ(told.count(), 1);
+  view.set_picking(true);
+  QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
+  EXPECT_EQ(told.count(), 1);
+}
+
 TEST_F(XrayViewTest, LeftDragPansAndDoubleClickFits) {
   const QPointF before = *view.place_of({256, 256});
   drag({300, 300}, {350, 280}, Qt::LeftButton);

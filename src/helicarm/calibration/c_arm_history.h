@@ -22,6 +22,10 @@ struct PlateMap {
   double field_radius_px = 0;        ///< distance of its dots from their middle, at most
 };
 
+/// Columns of HistoryEntry::by_calibrator: 100 balls. The errors of more are taken as three, of the estimate
+/// itself.
+inline constexpr std::size_t most_ball_errors = 300;
+
 /// Intrinsics estimated from one image's fiducials without the prior: focal length, and principal point from
 /// the image's centre (u, v; as if not mirrored), mm on the detector.
 struct HistoryEntry {
@@ -33,6 +37,20 @@ struct HistoryEntry {
                         secondary_deg = {};  ///< positioner angles, if the image states them
   std::string date = {};  ///< of the acquisition if it was told, else of adding it: 2026-11-26
   std::optional<PlateMap> plate = {};
+  std::optional<double> nominal_focal_mm = {};  ///< source distance that the image or its case stated
+  std::string calibrator = {};                  ///< `CommonPrior::calibrator`; empty: exact
+  /// mm: the estimate's error by unit errors of the calibrator's coordinates, which are the same in all of
+  /// its images; a part of the covariance. No columns: none.
+  Eigen::Matrix3Xd by_calibrator = {};
+
+  /// Of the estimate, from the values that the image stated; of an entry that does not know them, from
+  /// `nominal_mm`.
+  Eigen::Vector3d deviation_from(const Eigen::Vector3d& nominal_mm) const {
+    return estimate_mm - stated_or(nominal_mm);
+  }
+  Eigen::Vector3d stated_or(const Eigen::Vector3d& nominal_mm) const {
+    return nominal_focal_mm ? Eigen::Vector3d(*nominal_focal_mm, 0, 0) : nominal_mm;
+  }
 };
 
 /// The day of a date like 2026-11-26; nothing of any other text.
@@ -61,25 +79,37 @@ struct CArmHistory {
   std::vector<RunIsocentre> runs = {};
 };
 
-/// Prior of the next views from a history: mean, and variation about it.
-struct LearnedIntrinsics {
-  Eigen::Vector3d mean_mm;
-  CArmPrior prior;
+/// Mean deviation of a C-arm's views from what each of them states, mm, and the variation about it.
+struct LearnedDeviation {
+  Eigen::Vector3d mm = Eigen::Vector3d::Zero();
+  CArmPrior prior = {};
 };
 
-/// Estimates the mean and the sag about it by expectation maximisation from the prior `unknown` about
-/// `nominal_mm`. The prior of the sag's variance has the weight of four acquisitions (Gelman et al., Bayesian
-/// Data Analysis, 2013, 5.4).
+/// Prior of the next views from a history.
+struct LearnedIntrinsics {
+  Eigen::Vector3d nominal_mm;  ///< as the first view states
+  LearnedDeviation deviation;
+  /// Of views of a calibrator that the history knows: for coordinates as in its file; their errors, which
+  /// these views share with the history, move it (`CArmPrior::by_ball_errors`). Else as `deviation`.
+  LearnedDeviation of_calibrator;
+
+  Eigen::Vector3d mean_mm() const { return nominal_mm + deviation.mm; }
+};
+
+/// Estimates the mean deviation and the sag about it by expectation maximisation from the prior `unknown`
+/// about the nominal values, `nominal_mm` where an entry does not know its own. The prior of the sag's
+/// variance has the weight of four acquisitions (Gelman et al., Bayesian Data Analysis, 2013, 5.4). Errors of
+/// a calibrator's coordinates are common to its entries. `calibrator`: of the next views.
 LearnedIntrinsics learn_intrinsics(std::span<const HistoryEntry> entries, const Eigen::Vector3d& nominal_mm,
-                                   const CArmPrior& unknown);
+                                   const CArmPrior& unknown, const std::string& calibrator = {});
 
 /// The entry of one view: calibrated alone, with the prior's information subtracted. Nothing if the view
 /// cannot be calibrated, or if pixel size or source distance are unknown.
 std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const std::string& image,
                                              const CommonPrior& unknown);
 
-/// `prior` with the history's mean in place of the nominal values.
-geometry::IntrinsicsPrior learned_prior(geometry::IntrinsicsPrior prior, const LearnedIntrinsics& knowledge,
+/// `prior` with its nominal values moved by the history's mean deviation.
+geometry::IntrinsicsPrior learned_prior(geometry::IntrinsicsPrior prior, const Eigen::Vector3d& deviation_mm,
                                         bool mirrored);
 
 /// Whether both are of one image size and one field of the intensifier.

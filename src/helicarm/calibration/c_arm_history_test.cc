@@ -53,13 +53,13 @@ TEST(HistoryEntryOf, EstimateIsConsistentWithTheTruthWithoutThePrior) {
 
 TEST(LearnIntrinsics, EmptyHistoryGivesTheNominalPrior) {
   const LearnedIntrinsics known = learn_intrinsics({}, nominal, unknown);
-  EXPECT_EQ(known.mean_mm, nominal);
-  EXPECT_EQ(known.prior.focal->common, unknown.focal->common);
+  EXPECT_EQ(known.mean_mm(), nominal);
+  EXPECT_EQ(known.deviation.prior.focal->common, unknown.focal->common);
 }
 
 TEST(LearnIntrinsics, SingularInformationChangesNothing) {
   const std::vector<HistoryEntry> entries{{"a", "AP", {950, 5, 5}, 1e-200 * Eigen::Matrix3d::Identity()}};
-  EXPECT_TRUE(learn_intrinsics(entries, nominal, unknown).mean_mm.isApprox(nominal, 1e-12));
+  EXPECT_TRUE(learn_intrinsics(entries, nominal, unknown).mean_mm().isApprox(nominal, 1e-12));
 }
 
 TEST(LearnIntrinsics, CovarianceOfTheNextAcquisitionIsConsistent) {
@@ -74,9 +74,11 @@ TEST(LearnIntrinsics, CovarianceOfTheNextAcquisitionIsConsistent) {
       entries.push_back(*history_entry_of(acquisition_with(scattered_about(mean, sag, random), false, random),
                                           "a", {unknown}));
     const LearnedIntrinsics known = learn_intrinsics(entries, nominal, unknown);
-    const Vector3d next = scattered_about(mean, sag, random) - known.mean_mm;
-    const double focal = std::hypot(known.prior.focal->common, known.prior.focal->of_view);
-    const double principal = std::hypot(known.prior.principal->common, known.prior.principal->of_view);
+    const Vector3d next = scattered_about(mean, sag, random) - known.mean_mm();
+    const double focal =
+        std::hypot(known.deviation.prior.focal->common, known.deviation.prior.focal->of_view);
+    const double principal =
+        std::hypot(known.deviation.prior.principal->common, known.deviation.prior.principal->of_view);
     distance2 +=
         (next.x() * next.x() / focal / focal + next.tail<2>().squaredNorm() / principal / principal) / trials;
     focal_sigma += focal / trials;
@@ -85,8 +87,8 @@ TEST(LearnIntrinsics, CovarianceOfTheNextAcquisitionIsConsistent) {
   EXPECT_LT(focal_sigma, 2.5);  // of 10 mm beforehand
 }
 
-TEST(LearnedPrior, TakesTheMeanAndReflectsItForAMirroredImage) {
-  const LearnedIntrinsics known{{905, 4, -2}, unknown};
+TEST(LearnedPrior, IsMovedByTheDeviationReflectedForAMirroredImage) {
+  const Vector3d known(5, 4, -2);
   const geometry::IntrinsicsPrior prior{900 * px_per_mm, Eigen::Vector2d(512, 512), px_per_mm};
   EXPECT_NEAR(*learned_prior(prior, known, false).focal_px, 905 * px_per_mm, 1e-9);
   EXPECT_NEAR(learned_prior(prior, known, false).principal_px->x(), 512 + 4 * px_per_mm, 1e-9);
@@ -113,6 +115,22 @@ TEST(CArmHistoryJson, KeepsAMapWithItsField) {
   EXPECT_EQ(read.plate->map.height, 384);
   EXPECT_EQ(read.plate->field_radius_px, 250);
   json["shots"][0].erase("field_radius_px");
+  EXPECT_EQ(history_from_json(json, "machine.json").error().reason, Reason::bad_value);
+}
+
+TEST(CArmHistoryJson, KeepsTheErrorsOfTheCalibrator) {
+  HistoryEntry entry{"a", "AP", {901, 2, 3}, Eigen::Matrix3d::Identity()};
+  entry.nominal_focal_mm = 900;
+  entry.calibrator = "digest";
+  entry.by_calibrator = 0.5 * Eigen::Matrix3d::Identity();
+  Json json = to_json(CArmHistory{{entry}});
+  const HistoryEntry read = history_from_json(json, "machine.json").value().entries.at(0);
+  EXPECT_EQ(read.nominal_focal_mm, 900);
+  EXPECT_EQ(read.calibrator, "digest");
+  EXPECT_EQ(read.by_calibrator, entry.by_calibrator);
+  json["shots"][0]["by_calibrator"][1][1] = 1.5;  // more than the covariance
+  EXPECT_EQ(history_from_json(json, "machine.json").error().reason, Reason::bad_value);
+  json["shots"][0].erase("by_calibrator");
   EXPECT_EQ(history_from_json(json, "machine.json").error().reason, Reason::bad_value);
 }
 

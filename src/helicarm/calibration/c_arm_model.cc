@@ -64,15 +64,34 @@ MatrixXd covariance_between(const CArmModel& model, std::span<const HistoryEntry
   return between;
 }
 
-void add_noise(MatrixXd& covariance, std::span<const HistoryEntry> entries) {
+/// Covariance between the errors of two acquisitions by their calibrator.
+Matrix3d shared_noise(const HistoryEntry& a, const HistoryEntry& b) {
+  if (a.calibrator.empty() || a.calibrator != b.calibrator ||
+      a.by_calibrator.cols() != b.by_calibrator.cols())
+    return Matrix3d::Zero();
+  return a.by_calibrator * b.by_calibrator.transpose();
+}
+
+MatrixXd noise_between(std::span<const HistoryEntry> a, std::span<const HistoryEntry> b) {
+  MatrixXd between(3 * Index(a.size()), 3 * Index(b.size()));
+  for (std::size_t i = 0; i < a.size(); ++i)
+    for (std::size_t j = 0; j < b.size(); ++j)
+      between.block<3, 3>(3 * Index(i), 3 * Index(j)) = shared_noise(a[i], b[j]);
+  return between;
+}
+
+/// Of the acquisitions' own errors.
+MatrixXd noise_among(std::span<const HistoryEntry> entries) {
+  MatrixXd noise = noise_between(entries, entries);
   for (std::size_t i = 0; i < entries.size(); ++i)
-    covariance.block<3, 3>(3 * Index(i), 3 * Index(i)) += noise_of(entries[i]);
+    noise.block<3, 3>(3 * Index(i), 3 * Index(i)) = noise_of(entries[i]);
+  return noise;
 }
 
 VectorXd deviations(const CArmModel& model, std::span<const HistoryEntry> entries) {
   VectorXd from_nominal(3 * Index(entries.size()));
   for (std::size_t i = 0; i < entries.size(); ++i)
-    from_nominal.segment<3>(3 * Index(i)) = entries[i].estimate_mm - model.nominal_mm;
+    from_nominal.segment<3>(3 * Index(i)) = entries[i].deviation_from(model.nominal_mm);
   return from_nominal;
 }
 
@@ -87,8 +106,8 @@ double log_prior(const CArmVariation& variation, double of_view) {
 }  // namespace
 
 double log_likelihood(const CArmModel& model) {
-  MatrixXd covariance = covariance_between(model, model.entries, model.entries, true);
-  add_noise(covariance, model.entries);
+  const MatrixXd covariance =
+      covariance_between(model, model.entries, model.entries, true) + noise_among(model.entries);
   const VectorXd residual = deviations(model, model.entries);
   const Eigen::LLT<MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
@@ -159,8 +178,7 @@ std::optional<CArmDrift> c_arm_drift(const CArmModel& model) {
   if (days.empty()) return {};
   const auto [first, last] = std::ranges::minmax(days);
   if (first == last) return {};
-  MatrixXd covariance = covariance_between(model, dated, dated, true);
-  add_noise(covariance, dated);
+  const MatrixXd covariance = covariance_between(model, dated, dated, true) + noise_among(dated);
   MatrixXd by_year(covariance.rows(), 3);
   for (std::size_t i = 0; i < days.size(); ++i)
     by_year.middleRows<3>(3 * Index(i)) =
@@ -172,19 +190,32 @@ std::optional<CArmDrift> c_arm_drift(const CArmModel& model) {
                    of_drift.diagonal().cwiseSqrt()};
 }
 
-IntrinsicsPrediction predict_intrinsics(const CArmModel& model, std::span<const HistoryEntry> at) {
+namespace {
+
+enum class Wanted { intrinsics, estimates };  // estimates: with the errors of the acquisitions
+
+IntrinsicsPrediction predicted_by(const CArmModel& model, std::span<const HistoryEntry> at, Wanted wanted) {
   IntrinsicsPrediction predicted;
-  predicted.mean_mm = model.nominal_mm.replicate(Index(at.size()), 1);
+  predicted.mean_mm.resize(3 * Index(at.size()));
+  for (std::size_t i = 0; i < at.size(); ++i)
+    predicted.mean_mm.segment<3>(3 * Index(i)) = at[i].stated_or(model.nominal_mm);
   predicted.covariance_mm2 = covariance_between(model, at, at, true);
+  if (wanted == Wanted::estimates) predicted.covariance_mm2 += noise_among(at);
   if (model.entries.empty()) return predicted;
-  MatrixXd known = covariance_between(model, model.entries, model.entries, true);
-  add_noise(known, model.entries);
-  const Eigen::LLT<MatrixXd> factor(known);
-  const MatrixXd between = covariance_between(model, at, model.entries, false);
+  const Eigen::LLT<MatrixXd> factor(covariance_between(model, model.entries, model.entries, true) +
+                                    noise_among(model.entries));
+  MatrixXd between = covariance_between(model, at, model.entries, false);
+  if (wanted == Wanted::estimates) between += noise_between(at, model.entries);
   const MatrixXd gain = factor.solve(between.transpose()).transpose();
   predicted.mean_mm += gain * deviations(model, model.entries);
   predicted.covariance_mm2 -= gain * between.transpose();
   return predicted;
+}
+
+}  // namespace
+
+IntrinsicsPrediction predict_intrinsics(const CArmModel& model, std::span<const HistoryEntry> at) {
+  return predicted_by(model, at, Wanted::intrinsics);
 }
 
 namespace {
@@ -225,17 +256,16 @@ CArmCheck check_c_arm(const CArmModel& model, std::span<const HistoryEntry> acqu
   CArmCheck check;
   if (acquired.empty()) return check;
   check_maps(check, model, acquired);
-  const IntrinsicsPrediction predicted = predict_intrinsics(model, acquired);
-  MatrixXd covariance = predicted.covariance_mm2;
-  add_noise(covariance, acquired);
-  const VectorXd difference =
-      deviations(model, acquired) + model.nominal_mm.replicate(Index(acquired.size()), 1) - predicted.mean_mm;
+  const auto [predicted, covariance] = predicted_by(model, acquired, Wanted::estimates);
+  VectorXd difference = -predicted;
+  for (std::size_t i = 0; i < acquired.size(); ++i)
+    difference.segment<3>(3 * Index(i)) += acquired[i].estimate_mm;
   check.chi2 = difference.dot(Eigen::LLT<MatrixXd>(covariance).solve(difference));
   check.limit = chi2_quantile(3 * double(acquired.size()), normal_at_999);
   for (std::size_t i = 0; i < acquired.size(); ++i) {
     const Index first = 3 * Index(i);
     check.acquisitions.push_back(
-        compared(acquired[i], predicted.mean_mm.segment<3>(first), covariance.block<3, 3>(first, first)));
+        compared(acquired[i], predicted.segment<3>(first), covariance.block<3, 3>(first, first)));
     AcquisitionCheck& one = check.acquisitions.back();
     one.is_changed = check.chi2 > check.limit && is_beyond(one, tolerances);
     check.changed |= one.is_changed;
@@ -250,8 +280,8 @@ std::vector<AcquisitionCheck> leave_one_out(const CArmModel& model) {
     CArmModel others = model;
     others.entries.erase(others.entries.begin() + std::ptrdiff_t(i));
     const HistoryEntry& left_out = model.entries[i];
-    const IntrinsicsPrediction predicted = predict_intrinsics(others, {&left_out, 1});
-    checks.push_back(compared(left_out, predicted.mean_mm, predicted.covariance_mm2 + noise_of(left_out)));
+    const auto [predicted, covariance] = predicted_by(others, {&left_out, 1}, Wanted::estimates);
+    checks.push_back(compared(left_out, predicted, covariance));
   }
   return checks;
 }

@@ -17,7 +17,8 @@ struct CArmVariation {
 
 /// Intrinsics of a C-arm as a Gaussian process over its position (Rasmussen and Williams 2006, 2.2, 5.4.1).
 struct CArmModel {
-  Eigen::Vector3d nominal_mm;           ///< focal length and principal point, as HistoryEntry::estimate_mm
+  /// Focal length and principal point, as HistoryEntry::estimate_mm, of entries that do not know their own.
+  Eigen::Vector3d nominal_mm;
   CArmPrior unknown;                    ///< before any acquisition
   std::vector<HistoryEntry> entries;    ///< the latest 150 of the history
   CArmVariation focal, principal;       ///< of greatest posterior density

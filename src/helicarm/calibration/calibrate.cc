@@ -135,6 +135,16 @@ Expected<CleanFit> clean_fit(const std::vector<ViewProblem>& problems, const Cal
   return std::move(offsets->clean);
 }
 
+/// The prior by the unit errors of the fit in place of those of the fiducials' coordinates.
+CalibrationOptions along(const Eigen::MatrixXd& directions, CalibrationOptions options) {
+  Eigen::Matrix3Xd& by_ball_errors = options.common.c_arm.by_ball_errors;
+  if (by_ball_errors.cols() == directions.rows())
+    by_ball_errors = (by_ball_errors * directions).eval();
+  else
+    by_ball_errors.resize(3, 0);
+  return options;
+}
+
 /// A failed joint fit has no view: reports the view whose start does not fit its own fiducials, if any.
 tl::unexpected<Failure> with_view(const std::vector<ViewFiducials>& views,
                                   const std::vector<ViewProblem>& problems, const Failure& failure,
@@ -173,18 +183,20 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
   std::vector<ViewProblem> problems;
   CalibrationResult result;
   const OffsetRoots roots = offset_roots(options.common);
+  const Eigen::MatrixXd directions = roots.directions();
   for (const ViewFiducials& view : views) {
     auto problem = problem_of(view, roots);
     if (!problem) return in_view(problem.error(), view.name);
     problems.push_back(*std::move(problem));
     result.fiducials.push_back(view.fiducials);
   }
-  const auto clean = clean_fit(problems, options, result.found_tolerance_mm);
+  const auto clean = clean_fit(problems, along(directions, options), result.found_tolerance_mm);
   if (!clean) return with_view(views, problems, clean.error(), options);
   const Refinement& fit = clean->fit;
   result.chi2 = fit.chi2;
   result.dof = fit.dof;
   result.joint_covariance = fit.covariance_of_steps();
+  result.by_ball_errors.resize(view_parameters * Eigen::Index(views.size()), directions.rows());
   for (std::size_t i = 0; i < views.size(); ++i) {
     const auto of_view = parameters_by_step(fit.views[i]);
     const auto at = view_parameters * Eigen::Index(i);
@@ -192,6 +204,10 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
     rows = (of_view * rows).eval();
     auto columns = result.joint_covariance.middleCols<view_parameters>(at);
     columns = (columns * of_view.transpose()).eval();
+    // A fit follows an error of the data by minus its covariance with that error.
+    const Eigen::Index known = std::min(directions.cols(), fit.offsets());
+    result.by_ball_errors.middleRows<view_parameters>(at) =
+        of_view * fit.steps_by_offsets(i).leftCols(known) * directions.leftCols(known).transpose();
   }
   for (const auto& [view, observation] : clean->removed) mark_rejected(result.fiducials[view], observation);
 

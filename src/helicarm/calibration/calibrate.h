@@ -48,6 +48,10 @@ struct CalibrationResult : Calibration {
   std::vector<std::vector<ImageResidual>> image_residuals;  ///< per view, of the used fiducials
   /// Of the fiducials' coordinates per axis, estimated where the residuals require more than the file's.
   double found_tolerance_mm = 0;
+  /// Of the views' parameters (11 a view), by unit errors of the fiducials' coordinates (`OffsetRoots`): the
+  /// estimate's error that they make, with its sign. Its square is a part of the joint covariance. No
+  /// columns: exact.
+  Eigen::MatrixXd by_ball_errors;
   double strain_sigma = 0;  ///< relative, of the calibrator's least observable strain; 0: not known
   double ball_rms_mm = 0;   ///< of the fiducials' estimated offsets from the file; 0: taken as exact
   /// Strain, offsets beyond the stated tolerance, or diameters are significant: a warning says which.

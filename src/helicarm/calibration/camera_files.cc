@@ -17,7 +17,7 @@ constexpr Range camera_numbers{-1e15, 1e15};
 
 /// One view of a file: the whole file, and the view's index in it.
 struct Camera {
-  SavedCalibration file;
+  const SavedCalibration* file;
   std::size_t index = 0;
 };
 
@@ -65,8 +65,8 @@ SavedCalibration from_file(const std::filesystem::path& path) {
 
 Camera camera_in(const CameraFile& camera_file, const SavedCalibration& file) {
   const auto found = std::ranges::find(file.views, camera_file.view, &CalibratedView::name);
-  if (found != file.views.end()) return {file, std::size_t(found - file.views.begin())};
-  if (file.views.size() == 1) return {file, 0};
+  if (found != file.views.end()) return {&file, std::size_t(found - file.views.begin())};
+  if (file.views.size() == 1) return {&file, 0};
   std::vector<std::string> names;
   for (const CalibratedView& view : file.views) names.push_back(view.name);
   throw BadInput(Reason::bad_value,
@@ -75,16 +75,16 @@ Camera camera_in(const CameraFile& camera_file, const SavedCalibration& file) {
 }
 
 /// Independent between files; joint among the views of one file. Empty if all have none.
-Eigen::MatrixXd covariance_of(const std::vector<Camera>& cameras, std::span<const CameraFile> files) {
+Eigen::MatrixXd covariance_of(const std::vector<Camera>& cameras) {
   const auto size = view_parameters * Eigen::Index(cameras.size());
   Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(size, size);
   const auto at = [](std::size_t index) { return view_parameters * Eigen::Index(index); };
   for (std::size_t i = 0; i < cameras.size(); ++i)
     for (std::size_t j = 0; j < cameras.size(); ++j)
-      if (files[i].path == files[j].path && cameras[i].file.joint_covariance.size() > 0)
+      if (cameras[i].file == cameras[j].file && cameras[i].file->joint_covariance.size() > 0)
         joint.block<view_parameters, view_parameters>(at(i), at(j)) =
-            cameras[i].file.joint_covariance.block<view_parameters, view_parameters>(at(cameras[i].index),
-                                                                                     at(cameras[j].index));
+            cameras[i].file->joint_covariance.block<view_parameters, view_parameters>(at(cameras[i].index),
+                                                                                      at(cameras[j].index));
   return joint.isZero(0) ? Eigen::MatrixXd() : joint;
 }
 
@@ -106,17 +106,20 @@ Expected<SavedCalibration> calibration_of_cameras(std::span<const CameraFile> fi
       if (std::ranges::count(files, camera_file.view, &CameraFile::view) > 1)
         throw BadInput(Reason::name_clash,
                        fmt::format("--calibration: two files for the view \"{}\"", camera_file.view));
-      if (!read.count(camera_file.path)) read.emplace(camera_file.path, from_file(camera_file.path));
-      cameras.push_back(camera_in(camera_file, read.at(camera_file.path)));
+      std::error_code ignored;
+      const std::filesystem::path same = std::filesystem::weakly_canonical(camera_file.path, ignored);
+      const auto [known, is_new] = read.try_emplace(ignored ? camera_file.path : same);
+      if (is_new) known->second = from_file(camera_file.path);
+      cameras.push_back(camera_in(camera_file, known->second));
       const auto& [file, index] = cameras.back();
-      joined.views.push_back(file.views[index]);
+      joined.views.push_back(file->views[index]);
       joined.views.back().name = camera_file.view;
-      joined.maps.push_back(file.maps[index]);
-      joined.fiducials.push_back(index < file.fiducials.size() ? file.fiducials[index]
-                                                               : std::vector<fiducials::Fiducial>{});
-      if (joined.balls.empty()) joined.balls = file.balls;
+      joined.maps.push_back(file->maps[index]);
+      joined.fiducials.push_back(index < file->fiducials.size() ? file->fiducials[index]
+                                                                : std::vector<fiducials::Fiducial>{});
+      if (joined.balls.empty()) joined.balls = file->balls;
     }
-    joined.joint_covariance = covariance_of(cameras, files);
+    joined.joint_covariance = covariance_of(cameras);
     return joined;
   });
 }

@@ -71,6 +71,12 @@ TEST_F(CameraFiles, KeepTheCovarianceAmongTheViewsOfOneFile) {
   EXPECT_EQ(cameras->joint_covariance(0, 11), 0);
 }
 
+TEST_F(CameraFiles, OneFileByTwoSpellingsIsOne) {
+  const auto cameras = read({{"AP", "joint.json"}, {"LAT", "./joint.json"}});
+  ASSERT_TRUE(cameras) << cameras.error().message;
+  EXPECT_EQ(cameras->joint_covariance(0, 11), 0.5);
+}
+
 TEST_F(CameraFiles, WithoutTheViewNameThoseTheyHave) {
   const auto cameras = read({{"OBL", "two.json"}});
   ASSERT_FALSE(cameras);

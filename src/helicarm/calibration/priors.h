@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -21,6 +22,9 @@ struct IntrinsicsVariation {
 struct CArmPrior {
   std::optional<IntrinsicsVariation> focal;
   std::optional<IntrinsicsVariation> principal;  ///< per axis
+  /// Of focal length and principal point (u, v), mm: how the nominal values, learnt with the same calibrator,
+  /// follow from unit errors of its fiducials' coordinates (`OffsetRoots::directions`). No columns: not.
+  Eigen::Matrix3Xd by_ball_errors = {};
 };
 
 /// Priors common to all views.
@@ -32,6 +36,9 @@ struct CommonPrior {
   /// `ball_covariance_mm2`.
   Eigen::MatrixXd joint_ball_covariance_mm2 = {};
   double scale_sigma = 0;  ///< of the calibrator's scale about the fiducials' mean, relative
+  /// Digest of the fiducials' coordinates and covariances: errors of one calibrator are the same in all its
+  /// images. Empty: exact.
+  std::string calibrator = {};
 };
 
 /// `view` with its intrinsics set to the prior where one exists; its projections change little. For a start
@@ -42,14 +49,17 @@ CentredView shrunk_to_prior(CentredView view, const geometry::IntrinsicsPrior& p
 /// and of the principal point along u and v.
 using CArmDeviation = Eigen::Vector3d;
 
-/// A view's priors as whitened rows of a least-squares problem in its step and the C-arm's deviation.
+/// A view's priors as whitened rows of a least-squares problem in its step, the C-arm's deviation and the
+/// fiducials' unit errors.
 struct PriorRows {
   Eigen::VectorXd residuals;
   Eigen::Matrix<double, Eigen::Dynamic, view_parameters> by_step;
   Eigen::Matrix<double, Eigen::Dynamic, 3> by_c_arm;
+  Eigen::MatrixXd by_ball_errors;  ///< columns as those of `CArmPrior::by_ball_errors`
 };
 
+/// `ball_errors`: in standard deviations, one for each column of `c_arm.by_ball_errors`.
 PriorRows prior_rows(const CentredView& view, const geometry::IntrinsicsPrior& prior, const CArmPrior& c_arm,
-                     const CArmDeviation& deviation);
+                     const CArmDeviation& deviation, const Eigen::VectorXd& ball_errors = {});
 
 }  // namespace helicarm::calibration

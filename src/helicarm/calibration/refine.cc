@@ -16,8 +16,8 @@ namespace {
 constexpr geometry::LeastSquaresOptions iteration{.max_iterations = 1000, .min_gain = 1e-10};
 
 /// Number of the fiducials' unit errors; 0: as in the file.
-Eigen::Index offset_count(const std::vector<ViewProblem>& problems) {
-  Eigen::Index count = 0;
+Eigen::Index offset_count(const std::vector<ViewProblem>& problems, const CommonPrior& common) {
+  Eigen::Index count = common.c_arm.by_ball_errors.cols();
   for (const ViewProblem& problem : problems)
     for (const Observation& observation : problem.observations)
       count = std::max(count, observation.first_offset + observation.offset_root.cols());
@@ -27,8 +27,9 @@ Eigen::Index offset_count(const std::vector<ViewProblem>& problems) {
 /// The rows of a view at given unknowns; false if a point is not in front of its source.
 bool evaluate_view(const ViewProblem& problem, const CommonPrior& common, const CentredView& view,
                    const Eigen::VectorXd& map_errors, const Eigen::VectorXd& units, ViewRows& rows) {
-  const PriorRows priors =
-      prior_rows(view, problem.prior, common.c_arm, units.tail<CArmDeviation::SizeAtCompileTime>());
+  const Eigen::Index of_prior = common.c_arm.by_ball_errors.cols();
+  const PriorRows priors = prior_rows(view, problem.prior, common.c_arm,
+                                      units.tail<CArmDeviation::SizeAtCompileTime>(), units.head(of_prior));
   const Eigen::Index modes = map_modes(problem);
   const auto count = 2 * Eigen::Index(problem.observations.size());
   const Eigen::Index all = count + priors.residuals.size();
@@ -56,6 +57,7 @@ bool evaluate_view(const ViewProblem& problem, const CommonPrior& common, const 
   rows.residuals.tail(all - count) = priors.residuals;
   rows.by_own.bottomLeftCorner(all - count, view_parameters) = priors.by_step;
   rows.by_common.bottomRightCorner(all - count, CArmDeviation::SizeAtCompileTime) = priors.by_c_arm;
+  rows.by_common.bottomLeftCorner(all - count, of_prior) = priors.by_ball_errors;
   return true;
 }
 
@@ -147,6 +149,10 @@ Eigen::MatrixXd Refinement::covariance_of_steps() const {
   return (steps + steps.transpose()) / 2;
 }
 
+Eigen::MatrixXd Refinement::steps_by_offsets(std::size_t view) const {
+  return covariance.response[view].topRows(view_parameters) * covariance.of_common.leftCols(offsets());
+}
+
 Eigen::MatrixXd Refinement::by_common_alone(std::size_t view, const Eigen::MatrixXd& by_own,
                                             const Eigen::MatrixXd& by_common) const {
   return by_common - by_own * covariance.response[view];
@@ -179,7 +185,7 @@ Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const Comm
     at.views.push_back(problem.start);
     at.map_errors.emplace_back(Eigen::VectorXd::Zero(2 * map_modes(problem)));
   }
-  at.common = Eigen::VectorXd::Zero(offset_count(problems) + CArmDeviation::SizeAtCompileTime);
+  at.common = Eigen::VectorXd::Zero(offset_count(problems, common) + CArmDeviation::SizeAtCompileTime);
   const auto linearise = [&](Refinement& state) { return linearised(problems, common, state); };
   auto fit = geometry::fit_least_squares(at, linearise, moved_by, iteration);
   if (!fit)

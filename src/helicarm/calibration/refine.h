@@ -54,6 +54,8 @@ struct Refinement {
   Eigen::Index offsets() const { return common.size() - CArmDeviation::SizeAtCompileTime; }
   /// Of the views' steps.
   Eigen::MatrixXd covariance_of_steps() const;
+  /// Minus the covariance of a view's step with the offsets' unit errors.
+  Eigen::MatrixXd steps_by_offsets(std::size_t view) const;
   /// Of rows of a view, `by_own` and `by_common`: their part that follows the common unknowns.
   Eigen::MatrixXd by_common_alone(std::size_t view, const Eigen::MatrixXd& by_own,
                                   const Eigen::MatrixXd& by_common) const;

@@ -54,6 +54,16 @@ std::vector<geometry::PointPair> pairs_of(const std::vector<fiducials::Fiducial>
   return pairs;
 }
 
+Eigen::MatrixXd OffsetRoots::directions() const {
+  const auto balls = Eigen::Index(of_ball.size());
+  const Eigen::Index errors = joint ? (balls > 0 ? of_ball.front().cols() : 0) : 3 * balls;
+  Eigen::MatrixXd roots = Eigen::MatrixXd::Zero(3 * balls, errors);
+  for (std::size_t ball = 0; ball < of_ball.size(); ++ball)
+    roots.block(3 * Eigen::Index(ball), first(ball), 3, of_ball[ball].cols()) = of_ball[ball];
+  for (Eigen::Index column = 0; column < errors; ++column) roots.col(column).normalize();
+  return roots;
+}
+
 OffsetRoots offset_roots(const CommonPrior& common) {
   OffsetRoots roots;
   roots.joint = common.joint_ball_covariance_mm2.size() > 0;
@@ -77,7 +87,7 @@ Expected<ViewProblem> problem_of(const ViewFiducials& view, const OffsetRoots& r
     observations.push_back({ball, f.centre_in_calibrator, f.uv, f.sigma_px});
     if (!roots.of_ball.empty()) {
       observations.back().offset_root = roots.of_ball[ball];
-      observations.back().first_offset = roots.joint ? 0 : 3 * Eigen::Index(ball);
+      observations.back().first_offset = roots.first(ball);
     }
     centre += f.centre_in_calibrator;
   }

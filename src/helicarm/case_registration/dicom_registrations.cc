@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/report/earlier_results.h"
+#include "helicarm/volume/read_volume.h"
 #include "helicarm/xray/spatial_registration.h"
 #include "helicarm/xray/uid.h"
 
@@ -33,7 +34,8 @@ Expected<std::optional<std::vector<std::filesystem::path>>> write_dicom_registra
     for (std::size_t i = 0; i < std::min(result.models.size(), the_case.models.size()); ++i) {
       const auto& volume = the_case.models[i].volume;
       if (!volume) continue;
-      const auto frame = value_or_throw(xray::ct_frame_of(*volume));
+      const auto slice = value_or_throw(volume::slice_of_series(*volume));
+      const auto frame = slice ? value_or_throw(xray::ct_frame_of(*slice)) : std::nullopt;
       is_any_series = is_any_series || frame.has_value();
       const registration::Registration& found = result.models[i].registration;
       if (!frame || found.failure) continue;

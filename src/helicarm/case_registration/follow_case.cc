@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <regex>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -13,6 +14,7 @@
 #include "helicarm/case_registration/start_poses.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/registration/follow.h"
+#include "helicarm/xray/digest.h"
 
 namespace helicarm::case_registration {
 
@@ -66,6 +68,34 @@ std::optional<PlannedError> largest_error(const std::optional<MarkupPlan>& plan,
         registration::point_covariance(result, result.world_from_model * point.in_model);
   }
   return case_registration::largest_error(points);
+}
+
+/// To the last bit.
+template <class Matrix>
+std::string numbers_of(const Matrix& matrix) {
+  std::string text;
+  for (const double value : matrix.reshaped()) text += fmt::format(" {}", value);
+  return text;
+}
+
+template <class Value>
+std::string digest_of(std::span<const Value> values) {
+  return xray::digest({reinterpret_cast<const char*>(values.data()), values.size_bytes()});
+}
+
+/// Of the model, its start and its plan.
+std::string identity_of(const FollowedModel& body) {
+  std::string text = body.model.name + numbers_of(body.model.centre);
+  text += numbers_of(body.model.density.model_from_voxel.matrix());
+  text += digest_of<float>(body.model.density.values);
+  if (body.model.surface) text += digest_of<Eigen::Vector3d>(body.model.surface->mesh.corners);
+  for (const geometry::RigidTransform& pose : body.start.poses) text += numbers_of(pose.matrix());
+  for (const registration::Landmark& landmark : body.start.used)
+    text += landmark.name + numbers_of(landmark.in_model) + numbers_of(landmark.in_world) +
+            numbers_of(landmark.covariance_in_world);
+  if (body.plan)
+    for (const PlanPoint& point : body.plan->points) text += point.name + numbers_of(point.in_model);
+  return text;
 }
 
 constexpr double degrees = 180 / EIGEN_PI;
@@ -170,10 +200,17 @@ void CaseFollower::take(const RegisteredFrame& frame) {
   is_begun_ = true;
 }
 
-std::vector<geometry::View> CaseFollower::cameras() const {
-  std::vector<geometry::View> cameras;
-  for (const registration::RegistrationView& view : loaded_.views) cameras.push_back(view.view);
-  return cameras;
+std::string CaseFollower::identity() const {
+  std::string text;
+  for (std::size_t i = 0; i < loaded_.views.size(); ++i) {
+    const registration::RegistrationView& view = loaded_.views[i];
+    text += "\n" + view.name + numbers_of(view.view.projection());
+    text += digest_of(view.usable.pixels());
+    if (loaded_.maps[i]) text += rectification::to_json(*loaded_.maps[i]).dump();
+  }
+  text += numbers_of(loaded_.camera_covariance);
+  for (const auto& body : models_) text += "\n" + identity_of(*body);
+  return text;
 }
 
 std::vector<Eigen::Vector3d> CaseFollower::centres() const {

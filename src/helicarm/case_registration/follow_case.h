@@ -52,8 +52,9 @@ class CaseFollower {
   /// Goes on from a frame of an earlier run, as if `next` had given it.
   void take(const RegisteredFrame& frame);
 
-  /// Of each view, world to rectified pixels.
-  std::vector<geometry::View> cameras() const;
+  /// A text that two followers share only if they register the same images alike: cameras, covariance, maps,
+  /// models, starts and plans, all by what their files hold.
+  std::string identity() const;
   const std::vector<Warning>& warnings() const { return warnings_; }
   /// Of each model, mm, in its own coordinates.
   std::vector<Eigen::Vector3d> centres() const;

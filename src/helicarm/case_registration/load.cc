@@ -323,10 +323,11 @@ Expected<LoadedModel> load_model(const pipeline::CaseModel& case_model,
       return loaded;
     }
     if (!case_model.volume) return loaded;
-    if (case_model.voxel_mm && !volume::is_tiff_stack(*case_model.volume))
+    if ((case_model.voxel_mm || case_model.tiff_offset_hu != 0) && !volume::is_tiff_stack(*case_model.volume))
       throw BadInput(Reason::bad_value,
-                     fmt::format("models: \"{}\": \"voxel_mm\" is for TIFF stacks only; {} states its own",
-                                 case_model.name, case_model.volume->filename().string()));
+                     fmt::format("models: \"{}\": \"{}\" is for TIFF stacks only; {} states its own",
+                                 case_model.name, case_model.voxel_mm ? "voxel_mm" : "tiff_offset_hu",
+                                 case_model.volume->filename().string()));
     const volume::Volume volume = volume_at(*case_model.volume, case_model, case_model.tiff_offset_hu);
     std::optional<volume::Volume> mask = mask_on(volume, case_model, case_model.mask, "mask");
     std::optional<volume::Volume> tunnel_mask =

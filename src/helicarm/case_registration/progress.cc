@@ -1,18 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <chrono>
+#include "helicarm/case_registration/progress.h"
+
+#include <charconv>
 #include <cmath>
 #include <memory>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "helicarm/case_registration/register_case.h"
-
 namespace helicarm::case_registration {
 
 pipeline::Progress Progress::of_views() const {
   pipeline::Progress progress{.view = interrupt};
   if (step) progress.stage = [this](std::string_view stage) { step("", stage); };
+  return progress;
+}
+
+Progress Progress::of_model(std::size_t number, std::size_t count) const {
+  Progress progress = *this;
+  progress.share = part_of(share, double(number) / double(count), double(number + 1) / double(count));
   return progress;
 }
 
@@ -41,6 +47,17 @@ Progress progress_in_words(std::function<void(const std::string&)> tell, std::fu
     tell(fmt::format("{}, {:.0f} %", present->words, std::floor(100 * share)));
   };
   return progress;
+}
+
+std::optional<double> share_in(std::string_view words) {
+  constexpr std::string_view unit = " %";
+  const std::size_t before = words.rfind(", ");
+  if (before == words.npos || !words.ends_with(unit)) return std::nullopt;
+  const std::string_view number = words.substr(before + 2, words.size() - unit.size() - before - 2);
+  int percent = 0;
+  const auto [end, problem] = std::from_chars(number.begin(), number.end(), percent);
+  if (problem != std::errc() || end != number.end() || percent < 0 || percent > 100) return std::nullopt;
+  return percent / 100.0;
 }
 
 }  // namespace helicarm::case_registration

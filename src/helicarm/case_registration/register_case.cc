@@ -41,11 +41,11 @@ Warning motion_note(const pipeline::CaseModel& case_model, double motion_sigma_m
           {{"motion_sigma_mm", motion_sigma_mm}}};
 }
 
-/// What the model's files say in two ways, or hold beyond what they state; an orientation that they do not
-/// state is a note.
+/// What the model's files say in two ways, or hold beyond what they state, or a size of the voxels that
+/// they do not state; an orientation that they do not state is a note.
 void add_warnings_of_files(const registration::Model& model, registration::Registration& registration) {
   for (const Warning& warning : model.warnings) {
-    const bool note = warning.reason == Reason::spacing_missing;
+    const bool note = warning.reason == Reason::spacing_missing && !warning.figures.contains("assumed");
     (note ? registration.notes : registration.warnings).push_back(warning);
     if (!note) registration.decision = std::max(registration.decision, registration::Decision::warn);
     if (registration.failure && registration.failure->reason == Reason::wrong_model &&
@@ -218,8 +218,9 @@ Expected<CaseRegistration> register_loaded(const pipeline::Case& the_case, Loade
                            result.loaded.warnings.end());
     const auto plans = read_plans(the_case);
     const auto measures = read_measures(the_case, plans);
-    const Registrar registrar(the_case, options, progress, result.loaded);
     for (std::size_t i = 0; i < the_case.models.size(); ++i) {
+      const Progress of_model = progress.of_model(i, the_case.models.size());
+      const Registrar registrar(the_case, options, of_model, result.loaded);
       RegisteredModel& model = result.models.emplace_back(registrar.registered(the_case.models[i], plans[i]));
       model.measures = measures_of(measures[i], located, the_case, result.loaded, model);
     }
@@ -234,8 +235,11 @@ Expected<CaseRegistration> register_given(std::vector<GivenModel> models, Loaded
     result.loaded = std::move(loaded);
     result.warnings = result.loaded.warnings;
     const pipeline::Case none;
-    const Registrar registrar(none, options, progress, result.loaded);
-    for (GivenModel& model : models) result.models.push_back(registrar.registered(std::move(model)));
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      const Progress of_model = progress.of_model(i, models.size());
+      result.models.push_back(
+          Registrar(none, options, of_model, result.loaded).registered(std::move(models[i])));
+    }
     return result;
   });
 }

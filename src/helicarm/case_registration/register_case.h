@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <chrono>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,8 +9,8 @@
 #include "helicarm/case_registration/bone_measures.h"
 #include "helicarm/case_registration/load.h"
 #include "helicarm/case_registration/plan.h"
+#include "helicarm/case_registration/progress.h"
 #include "helicarm/core/json.h"
-#include "helicarm/core/work_share.h"
 #include "helicarm/guidance/guide.h"
 #include "helicarm/guidance/tunnel.h"
 #include "helicarm/pipeline/result.h"
@@ -35,25 +33,6 @@ struct RegisterOptions {
   pipeline::RunOptions run = {};
   SearchRange search = {};
 };
-
-/// What a registration calls; an exception ends it.
-struct Progress {
-  /// With the model's name (empty: the views) and the step.
-  std::function<void(const std::string& model, std::string_view step)> step = {};
-  /// Often, from the threads that work.
-  std::function<void()> interrupt = {};
-  TellShare share = {};  ///< of a search: of the step that was told last
-
-  /// Of the views' calibration. Refers to this object.
-  pipeline::Progress of_views() const;
-};
-
-/// "femur: search"; the step alone where it is of the views.
-std::string words_of_step(const std::string& model, std::string_view step);
-
-/// Tells each step as "femur: search" and, not more often, with its share: "femur: search, 40 %".
-Progress progress_in_words(std::function<void(const std::string&)> tell, std::function<void()> interrupt,
-                           std::chrono::milliseconds between_shares = std::chrono::seconds(1));
 
 /// A point of a plan carried to the world, bones and tool.
 struct RegisteredPoint {

@@ -91,7 +91,8 @@ class StructureCheck : public nlohmann::json_sax<Json> {
                    const nlohmann::json::exception& error) override {
     constexpr int out_of_range = 406;
     if (error.id == out_of_range)
-      return refuse(Reason::not_finite, "a number is beyond the range of a double");
+      return refuse(Reason::not_finite, fmt::format("a number is beyond the range of a double at {}",
+                                                    place(std::min(position, text_.size()))));
     const std::size_t at = std::min(position, text_.size());
     for (std::size_t start = at > 10 ? at - 10 : 0; start < at; ++start)
       if (names_non_finite(text_.substr(start)))

@@ -25,6 +25,9 @@ ImportedMatrix parse_nrrd(const std::string& text, const std::string& origin, co
   std::optional<ImportedMatrix> result;
   std::optional<Eigen::Vector2i> size;
   constexpr std::string_view matrix_key = "Projection Matrix:=", size_key = "sizes:";
+  const auto refuse_second = [&](bool is_there, const char* name) {
+    if (is_there) throw BadInput(Reason::bad_value, fmt::format("{}: \"{}\" is given twice", origin, name));
+  };
   for (std::string line; std::getline(lines, line) && !trimmed(line).empty();) {
     const std::string_view view = line;
     const std::string name = line.substr(0, line.find(':'));
@@ -33,9 +36,12 @@ ImportedMatrix parse_nrrd(const std::string& text, const std::string& origin, co
       const std::string where = fmt::format("{}: {}", origin, name);
       refuse_lens_distortion(numbers_in(view.substr(name.size() + 2), where), where, options);
     }
-    if (view.starts_with(matrix_key))
+    if (view.starts_with(matrix_key)) {
+      refuse_second(result.has_value(), "Projection Matrix");
       result = imported(numbers_in(view.substr(matrix_key.size()), origin + ": Projection Matrix"), origin);
+    }
     if (view.starts_with(size_key)) {
+      refuse_second(size.has_value(), "sizes");
       auto sizes = numbers_in(view.substr(size_key.size()), origin + ": sizes");
       sizes.resize(std::min<std::size_t>(sizes.size(), 2));
       size = image_size_from(sizes, origin + ": sizes");
@@ -248,6 +254,10 @@ Cameras parse(const std::string& text, const std::string& origin, const ImportOp
 
 /// The translation in mm. A file without a unit is in mm, unless the source would lie too near.
 void to_mm(ImportedMatrix& camera, std::optional<double> mm_per_unit, const std::string& origin) {
+  if (camera.in_mm && mm_per_unit.value_or(1) != 1)
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("{}: its lengths are in mm, --unit states {:g} mm: leave it out", origin, *mm_per_unit));
   camera.view.camera_from_world.translation *= mm_per_unit.value_or(1);
   if (!camera.view.camera_from_world.translation.allFinite())
     throw BadInput(Reason::not_finite, fmt::format("{}: the translation is not finite in mm", origin));

@@ -20,7 +20,7 @@ struct ImportedMatrix {
   geometry::View view;
   std::optional<Eigen::Vector2i> image_size;  ///< width, height; if the file states them
   std::vector<Warning> warnings = {};         ///< what is unusual and can be right
-  bool in_mm = false;                         ///< by the definition of the format
+  bool in_mm = false;                         ///< by the format's definition or the file's own word
   std::string name = {};                      ///< of a camera of several; empty if the file has none
 };
 
@@ -28,9 +28,9 @@ struct ImportedMatrix {
 enum class RowKind { matrix, astra };
 
 struct ImportOptions {
-  std::optional<double> mm_per_unit =
-      {};                          ///< the file's unit of length: 10 for cm; nothing: as the file has it
-  std::optional<int> column = {};  ///< the camera of a file of several; from 1
+  /// The file's unit of length: 10 for cm; nothing: mm. Another than mm is refused where the file is in mm.
+  std::optional<double> mm_per_unit = {};
+  std::optional<int> column = {};                  ///< the camera of a file of several; from 1
   std::optional<Eigen::Vector2i> image_size = {};  ///< width, height; where the file does not state them
   std::optional<Eigen::Vector2d> pixel_mm = {};    ///< spacing of RTK's projection images: column, row
   /// Of the first pixel's centre on RTK's detector; nothing: the image's centre is at 0, 0.
@@ -38,7 +38,7 @@ struct ImportOptions {
   /// The images are free of distortion: a lens distortion that the file states is not refused.
   bool undistorted = false;
   std::optional<RowKind> rows = {};  ///< of a text with several rows of 12 numbers and no word on them
-  /// The file's images have their last row first: row = height - 1 - v.
+  /// The file's images have their last row first: row = height - 1 - v. Refused where the file denies it.
   bool rows_upwards = false;
 };
 

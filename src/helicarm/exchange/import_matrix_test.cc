@@ -138,6 +138,16 @@ TEST(ImportMatrix, SameMatrixAsTextJsonAndNrrd) {
   EXPECT_EQ(*nrrd->image_size, Eigen::Vector2i(1024, 760));
 }
 
+TEST(ImportMatrix, AFieldThatIsGivenTwiceIsRefused) {
+  const std::string matrix =
+      "Projection Matrix:=[-506.148 -0 -3532.97 376726; -384 -3532.97 -0 285811; -1 -0 -0 744.3]\n";
+  expect_matrix(import_text("NRRD0004\n" + matrix + "\n"));
+  EXPECT_EQ(reason_of("NRRD0004\n" + matrix + matrix + "\n"), Reason::bad_value);
+  EXPECT_EQ(reason_of("NRRD0004\nsizes: 4 4\nsizes: 8 8\n" + matrix + "\n"), Reason::bad_value);
+  EXPECT_EQ(import_text(maya_cam + "\ntranslation\n1\n2\n3\n", {.mm_per_unit = 10}).error().reason,
+            Reason::bad_value);
+}
+
 TEST(ImportMatrix, ByteOrderMarkPlusSignsAndAFourthRowAreRead) {
   expect_matrix(import_text("\xEF\xBB\xBF" + rows));
   expect_matrix(import_text(replaced(rows, "744.3", "+744.3")));
@@ -161,6 +171,7 @@ TEST(ImportMatrix, ProjectionThatIsNotOfItsKRAndTIsRefused) {
       "warnings": []})";
   EXPECT_TRUE(import_text(json)) << import_text(json).error().message;
   EXPECT_EQ(import_text(replaced(json, "358400", "368400")).error().reason, Reason::bad_value);
+  EXPECT_EQ(import_text(json, {.mm_per_unit = 10}).error().reason, Reason::bad_value);  // import's own output
 }
 
 TEST(ImportMatrix, MirroredCameraIsWarnedOf) {

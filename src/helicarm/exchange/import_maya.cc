@@ -34,6 +34,8 @@ std::vector<double> section(const std::string& text, const std::string& title, s
                    fmt::format("{}: {} numbers, must be {}", where, numbers.size(), count));
   if (numbers.size() > count)
     throw BadInput(Reason::bad_value, fmt::format("{}: a line has too many numbers", where));
+  while (std::getline(lines, line))
+    if (trimmed(line) == title) throw BadInput(Reason::bad_value, fmt::format("{}: is given twice", where));
   return numbers;
 }
 

@@ -144,13 +144,22 @@ RtkPixels pixels_of(std::string_view text, const std::string& origin, const Impo
 bool is_rtk_geometry(std::string_view text) { return text.find("<RTKThreeDCircularGeometry") != text.npos; }
 
 Cameras parse_rtk_geometry(std::string_view text, const std::string& origin, const ImportOptions& options) {
-  const Eigen::Matrix3d pixels = pixels_of(text, origin, options).pixels_from_mm();
+  // The projections are in the file's unit, the pixels in mm.
+  const double unit = options.mm_per_unit.value_or(1);
+  const Eigen::Matrix3d pixels =
+      pixels_of(text, origin, options).pixels_from_mm() * Eigen::Vector3d(unit, unit, 1).asDiagonal();
+  const bool in_mm = stated_pixels(text, origin).has_value();
   const auto image = stated_image(text, origin);
+  if (image && !image->rows_upwards && options.rows_upwards)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: its comment states that the first row is at the top, --rows-upwards "
+                               "that the last one is",
+                               origin));
   Cameras cameras;
   for (const RtkProjection& projection : projections_of(text, origin)) {
     const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = pixels * projection.matrix();
     ImportedMatrix& camera = cameras.emplace_back(imported({rows.data(), rows.data() + rows.size()}, origin));
-    camera.in_mm = true;
+    camera.in_mm = in_mm;
     if (!image) continue;
     camera.image_size = image->size;
     // Where the option states it too, it is done with the other options.

@@ -61,6 +61,31 @@ TEST(ImportRtk, OriginOfTheProjectionImagesIsUsed) {
   EXPECT_LT((camera->view.project({10, 20, 30}) - mm.cwiseQuotient(*options.pixel_mm)).norm(), 1e-8);
 }
 
+/// The pixels' spacing is in mm whatever the file's unit.
+TEST(ImportRtk, TheSameGeometryInCentimetresIsTheSameCamera) {
+  std::string in_cm = rtk_xml;
+  for (const auto& [mm, cm] : {std::pair{">1000<", ">100<"},
+                               {">1536<", ">153.6<"},
+                               {">3<", ">0.3<"},
+                               {">-2<", ">-0.2<"},
+                               {">-116<", ">-11.6<"},
+                               {">11.5<", ">1.15<"}})
+    in_cm = replaced(in_cm, mm, cm);
+  const std::size_t matrix = in_cm.find("<Matrix>"), end = in_cm.find("</Matrix>") + 9;
+  in_cm.erase(matrix, end - matrix);
+  EXPECT_EQ(import_text(in_cm, second).error().reason, Reason::usage);  // 100 mm from source to isocentre
+  for (const bool with_origin : {false, true}) {
+    ImportOptions options = second;
+    if (with_origin) options.origin_mm = {-190, -150};
+    const auto mm = import_text(rtk_xml, options);
+    options.mm_per_unit = 10;
+    const auto cm = import_text(in_cm, options);
+    ASSERT_TRUE(mm && cm) << cm.error().message;
+    EXPECT_LT((cm->view.projection() - mm->view.projection()).norm(), 1e-9 * mm->view.projection().norm());
+    EXPECT_NEAR(cm->view.intrinsics.fx, mm->view.intrinsics.fx, 1e-8);
+  }
+}
+
 TEST(ImportRtk, BrokenFilesAreNamed) {
   for (const auto& [text, reason] :
        {std::pair{replaced(rtk_xml, "-1254.4158", "-1254.4258"), Reason::bad_value},

@@ -50,9 +50,12 @@ Cameras from_leap(JsonReader reader) {
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector3d u = row_of(columns, i), v = row_of(rows, i);
     constexpr double rounding = 1e-4;
-    if (std::abs(u.norm() - 1) > rounding || std::abs(v.norm() - 1) > rounding)
-      throw BadInput(Reason::bad_value, fmt::format("{}: rowVectors and colVectors {} must be unit vectors",
-                                                    reader.where(), i + 1));
+    if (std::abs(u.norm() - 1) > rounding || std::abs(v.norm() - 1) > rounding ||
+        std::abs(u.dot(v)) > rounding)
+      throw BadInput(
+          Reason::bad_value,
+          fmt::format("{}: rowVectors and colVectors {} must be unit vectors, perpendicular to each other",
+                      reader.where(), i + 1));
     cameras.push_back(placed_camera({row_of(sources, i), row_of(centres, i), width * u, height * v}, size,
                                     fmt::format("{}: image {}", reader.where(), i + 1)));
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include "helicarm/core/json.h"
 #include "helicarm/exchange/import_text_test.h"
 #include "helicarm/exchange/run_geometry.h"
 #include "helicarm/geometry/rotation.h"
@@ -44,7 +45,7 @@ TEST_P(ImportedRuns, AreTheViewsThatWereWritten) {
   const RunGeometry run = rotation_run(GetParam());
   const ImportOptions sized{.image_size = run.size};
   expect_read_back(cameras_in(astra_vectors(run), sized), run, "astra");
-  expect_read_back(cameras_in(leap_modular(run)), run, "leap");
+  expect_read_back(cameras_in(*leap_modular(run)), run, "leap");
   expect_read_back(cameras_in(*tigre_geometry(run)), run, "tigre");
   expect_read_back(cameras_in(*diffdrr_cameras(run)), run, "diffdrr");
   expect_read_back(cameras_in(deepdrr_cameras(run)), run, "deepdrr");
@@ -63,10 +64,10 @@ TEST(ImportRun, NamesAndSizesAreThoseOfTheFile) {
   const RunGeometry run = rotation_run(false);
   EXPECT_EQ(cameras_in(matrices_csv(run))->at(1).name, "RUN/2");
   EXPECT_EQ(cameras_in(*diffdrr_cameras(run))->at(2).name, "RUN/3");
-  EXPECT_EQ(cameras_in(leap_modular(run))->at(0).image_size, run.size);
+  EXPECT_EQ(cameras_in(*leap_modular(run))->at(0).image_size, run.size);
   EXPECT_FALSE(cameras_in(matrices_csv(run))->at(0).image_size);
   EXPECT_EQ(cameras_in(matrices_csv(run), {.image_size = run.size})->at(0).image_size, run.size);
-  EXPECT_EQ(cameras_in(leap_modular(run), {.image_size = Eigen::Vector2i(640, 400)}).error().reason,
+  EXPECT_EQ(cameras_in(*leap_modular(run), {.image_size = Eigen::Vector2i(640, 400)}).error().reason,
             Reason::bad_size);
 }
 
@@ -119,9 +120,35 @@ TEST(ImportRun, RtksCommentStatesItsPixels) {
   EXPECT_EQ(cameras_in(text, options).error().reason, Reason::bad_value);
 }
 
+TEST(ImportRun, AFormatInMmTakesNoOtherUnit) {
+  const RunGeometry run = rotation_run(true);
+  for (const std::string& text : {*leap_modular(run), *tigre_geometry(run), *diffdrr_cameras(run),
+                                  deepdrr_cameras(run), *rtk_geometry(run)}) {
+    EXPECT_EQ(cameras_in(text, {.mm_per_unit = 10}).error().reason, Reason::bad_value) << text.substr(0, 60);
+    EXPECT_TRUE(cameras_in(text, {.mm_per_unit = 1})) << text.substr(0, 60);
+  }
+}
+
+TEST(ImportRun, RowsThatRtksCommentHasTheOtherWayAreRefused) {
+  const std::string text = *rtk_geometry(rotation_run(true));  // mirrored: the first row is at the top
+  EXPECT_EQ(cameras_in(text, {.rows_upwards = true}).error().reason, Reason::bad_value);
+}
+
+TEST(ImportRun, LeapsObliqueRowsAreRefused) {
+  RunGeometry run = rotation_run(false);
+  run.images.resize(1);
+  Json json = *parse_json(*leap_modular(run), "leap.json");
+  const auto vector = [&](const char* key) {
+    return Eigen::Vector3d(json[key][0].get<std::vector<double>>().data());
+  };
+  const Eigen::Vector3d oblique = (vector("rowVectors") + 0.01 * vector("colVectors")).normalized();
+  json["rowVectors"][0] = {oblique.x(), oblique.y(), oblique.z()};
+  EXPECT_EQ(cameras_in(to_text(json)).error().reason, Reason::bad_value);
+}
+
 TEST(ImportRun, BrokenFilesAreNamed) {
   const RunGeometry run = rotation_run(false);
-  const std::string leap = leap_modular(run), tigre = *tigre_geometry(run), npy = matrices_npy(run),
+  const std::string leap = *leap_modular(run), tigre = *tigre_geometry(run), npy = matrices_npy(run),
                     drr = *diffdrr_cameras(run), csv = matrices_csv(run),
                     pm = plastimatch_matrix(run.images[0].view, 0.4);
   for (const auto& [text, reason] :

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/exchange/run_geometry.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <vector>
@@ -51,7 +52,61 @@ Expected<void> check_not_skewed(const RunGeometry::Image& image, const char* pro
                                                image.name, program, image.view.intrinsics.skew));
 }
 
+double shape_of(const RunGeometry::Image& image) {
+  return std::abs(image.view.intrinsics.fx / image.view.intrinsics.fy);
+}
+
+/// Of each image: the factor of its columns, whose inverse is that of its rows, that gives the pixels of all
+/// images one shape.
+std::vector<double> stretches(const RunGeometry& run) {
+  std::vector<double> logs;
+  double mean = 0;
+  for (const RunGeometry::Image& image : run.images) {
+    logs.push_back(std::log(shape_of(image) / shape_of(run.images.front())));
+    mean += logs.back() / double(run.images.size());
+  }
+  for (double& each : logs) each = std::exp((mean - each) / 2);
+  return logs;
+}
+
+/// The cameras with pixels of one shape, each stretched about its image's middle.
+Expected<RunGeometry> with_one_shape(RunGeometry run, const char* program) {
+  if (const double error = one_shape_error_px(run); error > largest_one_shape_error_px)
+    return fail(Reason::unsupported,
+                fmt::format("{}'s geometry has one pixel size for all images; theirs differ, which would "
+                            "displace pixels by up to {:.2g} px, limit {:g} px: take a format in which each "
+                            "image has its own (ASTRA, plastimatch, matrices)",
+                            program, error, largest_one_shape_error_px));
+  const std::vector<double> factors = stretches(run);
+  const Eigen::Vector2d middle = (run.size - Eigen::Vector2i::Ones()).cast<double>() / 2;
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    geometry::Intrinsics& k = run.images[i].view.intrinsics;
+    k.fx *= factors[i];
+    k.skew *= factors[i];
+    k.u0 = middle.x() + factors[i] * (k.u0 - middle.x());
+    k.fy /= factors[i];
+    k.v0 = middle.y() + (k.v0 - middle.y()) / factors[i];
+  }
+  return run;
+}
+
+/// The same for a format without skew.
+Expected<RunGeometry> with_one_pixel(const RunGeometry& run, const char* program) {
+  for (const RunGeometry::Image& image : run.images)
+    if (auto square = check_not_skewed(image, program); !square)
+      return tl::unexpected<Failure>(std::move(square).error());
+  return with_one_shape(run, program);
+}
+
 }  // namespace
+
+double one_shape_error_px(const RunGeometry& run) {
+  const Eigen::Vector2d half = (run.size - Eigen::Vector2i::Ones()).cast<double>() / 2;
+  double largest = 0;
+  for (const double factor : stretches(run))
+    largest = std::max(largest, half.cwiseProduct(Eigen::Vector2d(factor - 1, 1 / factor - 1)).norm());
+  return largest;
+}
 
 PlacedDetector placed_detector(const geometry::View& view, const Eigen::Vector2i& size, double pixel_mm) {
   const geometry::Intrinsics& k = view.intrinsics;
@@ -85,8 +140,16 @@ geometry::View with_rows_reversed(const geometry::View& view, int height) {
           {half_turn * view.camera_from_world.rotation, half_turn * view.camera_from_world.translation}};
 }
 
-Expected<std::string> rtk_geometry(const RunGeometry& run) {
+Expected<std::string> rtk_geometry(const RunGeometry& given) {
   return guarded([&] {
+    const RunGeometry run = value_or_throw(with_one_shape(given, "RTK"));
+    for (const RunGeometry::Image& image : run.images)
+      if ((image.view.intrinsics.fx < 0) != (run.images.front().view.intrinsics.fx < 0))
+        throw BadInput(
+            Reason::unsupported,
+            fmt::format("{} is mirrored and {} is not, or the reverse: the rows of RTK's images all "
+                        "run upwards or none do",
+                        run.images.front().name, image.name));
     std::string text;
     for (const RunGeometry::Image& image : run.images) {
       const RtkView rtk = value_or_throw(rtk_view(image.view, run.size, run.pixel_mm));
@@ -130,7 +193,10 @@ std::string astra_vectors(const RunGeometry& run) {
   return text;
 }
 
-std::string leap_modular(const RunGeometry& run) {
+Expected<std::string> leap_modular(const RunGeometry& given) {
+  const auto one = with_one_pixel(given, "LEAP");
+  if (!one) return tl::unexpected<Failure>(one.error());
+  const RunGeometry& run = *one;
   Json json = {{"numAngles", run.images.size()}, {"numRows", run.size.y()}, {"numCols", run.size.x()}};
   json["pixelHeight"] = json["pixelWidth"] = nullptr;
   for (const char* key : {"sourcePositions", "moduleCenters", "rowVectors", "colVectors"})
@@ -147,13 +213,14 @@ std::string leap_modular(const RunGeometry& run) {
   return to_text(json) + "\n";
 }
 
-Expected<std::string> tigre_geometry(const RunGeometry& run) {
+Expected<std::string> tigre_geometry(const RunGeometry& given) {
+  const auto one = with_one_pixel(given, "TIGRE");
+  if (!one) return tl::unexpected<Failure>(one.error());
+  const RunGeometry& run = *one;
   Json json = {
       {"mode", "cone"}, {"nDetector", {run.size.y(), run.size.x()}}, {"dDetector", nullptr}, {"COR", 0}};
   for (const char* key : {"DSD", "DSO", "offDetector", "rotDetector", "angles"}) json[key] = Json::array();
   for (const RunGeometry::Image& image : run.images) {
-    if (auto square = check_not_skewed(image, "TIGRE"); !square)
-      return tl::unexpected<Failure>(std::move(square).error());
     const PlacedDetector d = placed_detector(image.view, run.size, run.pixel_mm);
     // Turned so that the source lies on x; the detector's columns run along y, its rows against z.
     Eigen::Matrix3d axes, detector;

@@ -38,14 +38,22 @@ Expected<geometry::View> view_of_detector(const PlacedDetector& detector, const 
 /// The view of the image whose rows are in the other order.
 geometry::View with_rows_reversed(const geometry::View& view, int height);
 
-/// RTK's ThreeDCircularProjectionGeometry with one Projection an image. Fails as `rtk_view`.
+/// RTK, TIGRE and LEAP have one pixel size for all images, but fx and fy of rectified images differ slightly:
+/// by how many px the size that fits all images best displaces a pixel at most.
+double one_shape_error_px(const RunGeometry& run);
+/// Above this these formats are refused (`unsupported`).
+inline constexpr double largest_one_shape_error_px = 0.5;
+
+/// RTK's ThreeDCircularProjectionGeometry with one Projection an image. Fails as `rtk_view`, and refuses
+/// (`unsupported`) a run of which some images are mirrored.
 Expected<std::string> rtk_geometry(const RunGeometry& run);
 
 /// ASTRA's cone_vec below a `#` line: a row of source, detector's middle, u and v (12 numbers) an image.
 std::string astra_vectors(const RunGeometry& run);
 
-/// LEAP's modular beam as JSON: the arguments of `set_modularbeam` by their names.
-std::string leap_modular(const RunGeometry& run);
+/// LEAP's modular beam as JSON: the arguments of `set_modularbeam` by their names. Refuses skewed pixels
+/// (`unsupported`).
+Expected<std::string> leap_modular(const RunGeometry& run);
 
 /// TIGRE's cone beam as JSON: DSD, DSO, offDetector, rotDetector and Euler angles ZYZ of each image, in the
 /// units and the order of its `geometry`; the volume's middle is the origin. Refuses skewed pixels

@@ -10,6 +10,7 @@
 
 #include "helicarm/core/json.h"
 #include "helicarm/core/random.h"
+#include "helicarm/exchange/import_text_test.h"
 
 namespace helicarm::exchange {
 namespace {
@@ -126,7 +127,7 @@ TEST(RunGeometry, DeepDrrProjectsAlike) {
 // LEAP's documentation of set_modularbeam: s and t of a point.
 TEST(RunGeometry, LeapProjectsAlike) {
   const RunGeometry run = example();
-  const Json leap = *parse_json(leap_modular(run), "leap.json");
+  const Json leap = *parse_json(*leap_modular(run), "leap.json");
   EXPECT_LT(apart_px(run,
                      [&](std::size_t i, const Vector3d& point) -> Vector2d {
                        const Vector3d y = vector_in(leap["sourcePositions"][i]),
@@ -176,6 +177,48 @@ TEST(RunGeometry, TigreProjectsAlike) {
             return at.head<2>();
           }),
       limit_px);
+}
+
+/// fx over fy of the images apart by `part`.
+RunGeometry with_unequal_shapes(double part) {
+  RunGeometry run = example();
+  run.images[0].view.intrinsics.fx *= 1 + part;
+  run.images.pop_back();
+  return run;
+}
+
+TEST(RunGeometry, OnePixelSizeIsTheBestForAllImages) {
+  EXPECT_EQ(one_shape_error_px(example()), 0);
+  const RunGeometry run = with_unequal_shapes(1e-3);
+  // Half of the difference to their mean, shared by columns and rows.
+  const double corner_px = 2.5e-4 * std::hypot(639, 479) / 2;
+  EXPECT_NEAR(one_shape_error_px(run), corner_px, 1e-3 * corner_px);
+  for (const std::string& text : {*tigre_geometry(run), *leap_modular(run), *rtk_geometry(run)}) {
+    const auto cameras = import_cameras(WrittenFile(text).path);
+    ASSERT_TRUE(cameras) << cameras.error().message;
+    for (std::size_t i = 0; i < run.images.size(); ++i) {
+      const geometry::View &given = run.images[i].view, &read = cameras->at(i).view;
+      const Vector3d ray = given.intrinsics.matrix().inverse() * Vector3d(639, 479, 1);
+      const Vector3d point = given.camera_from_world.inverse() * Vector3d(600 * ray);
+      EXPECT_LT((read.project(point) - Vector2d(639, 479)).norm(), 1.01 * corner_px) << i;
+      EXPECT_GT((read.project(point) - Vector2d(639, 479)).norm(), 0.9 * corner_px) << i;
+    }
+  }
+}
+
+TEST(RunGeometry, ImagesThatOnePixelSizeDisplacesAreRefused) {
+  const RunGeometry run = with_unequal_shapes(6e-3);
+  EXPECT_GT(one_shape_error_px(run), largest_one_shape_error_px);
+  for (const auto& text : {tigre_geometry(run), leap_modular(run), rtk_geometry(run)})
+    EXPECT_EQ(text.error().reason, Reason::unsupported);
+  EXPECT_EQ(rtk_geometry(example()).error().reason, Reason::unsupported);  // its last image is mirrored
+}
+
+TEST(RunGeometry, SkewIsRefusedWhereTheDetectorHasNone) {
+  RunGeometry run = example();
+  run.images[1].view.intrinsics.skew = 2;
+  EXPECT_EQ(leap_modular(run).error().reason, Reason::unsupported);
+  EXPECT_EQ(tigre_geometry(run).error().reason, Reason::unsupported);
 }
 
 // plastimatch's Proj_matrix::project.

@@ -21,20 +21,27 @@ Eigen::MatrixXd symmetric(const Eigen::MatrixXd& matrix) { return (matrix + matr
 
 struct Inverse {
   Eigen::MatrixXd matrix;
-  double log_determinant;  ///< of the inverse
-  double rcond;            ///< with the diagonal's units `unit`
+  Eigen::MatrixXd solution;  ///< of the information's equations
+  double log_determinant;    ///< of the inverse
+  double rcond;              ///< with the diagonal's units `unit`
 };
 
-/// Scaled by the diagonal of `unit`, so that unknowns of any size count alike.
-Inverse scaled_inverse(const Eigen::MatrixXd& information, const Eigen::VectorXd& unit) {
+/// Scaled by the diagonal of `unit`, so that unknowns of any size count alike. The equations of `right` are
+/// solved beside it: a product with the inverse has its errors.
+Inverse scaled_inverse(const Eigen::MatrixXd& information, const Eigen::VectorXd& unit,
+                       const Eigen::MatrixXd& right) {
   const Eigen::VectorXd root = unit.cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = root.asDiagonal() * information * root.asDiagonal();
-  const auto [solution, rcond] = solve_spd(scaled, Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
+  Eigen::MatrixXd sides(scaled.rows(), scaled.cols() + right.cols());
+  sides.leftCols(scaled.cols()).setIdentity();
+  sides.rightCols(right.cols()) = root.asDiagonal() * right;
+  const auto [solution, rcond] = solve_spd(scaled, sides);
   const double size = std::min(1.0, scaled.diagonal().cwiseAbs().maxCoeff());
-  const Eigen::MatrixXd matrix = root.asDiagonal() * symmetric(solution) * root.asDiagonal();
+  const Eigen::MatrixXd matrix =
+      root.asDiagonal() * symmetric(solution.leftCols(scaled.cols())) * root.asDiagonal();
   const double log_determinant =
       -2 * scaled.llt().matrixLLT().diagonal().array().log().sum() + 2 * root.array().log().sum();
-  return {matrix, log_determinant, rcond * size};
+  return {matrix, root.asDiagonal() * solution.rightCols(right.cols()), log_determinant, rcond * size};
 }
 
 }  // namespace
@@ -88,16 +95,17 @@ ArrowCovariance inverse(const ArrowEquations& equations) {
   covariance.rcond = 1;
   Eigen::MatrixXd reduced = equations.common;
   for (const ArrowEquations::Block& block : equations.blocks) {
-    const Inverse own = scaled_inverse(block.information, block.information.diagonal());
+    const Inverse own = scaled_inverse(block.information, block.information.diagonal(), block.with_common);
     covariance.own.push_back(own.matrix);
-    covariance.response.emplace_back(own.matrix * block.with_common);
+    covariance.response.push_back(own.solution);
     covariance.log_determinant += own.log_determinant;
     covariance.rcond = std::min(covariance.rcond, own.rcond);
     reduced -= block.with_common.transpose() * covariance.response.back();
   }
   covariance.of_common.resize(reduced.rows(), reduced.cols());
   if (reduced.rows() == 0) return covariance;
-  const Inverse common = scaled_inverse(symmetric(reduced), equations.common.diagonal());
+  const Inverse common =
+      scaled_inverse(symmetric(reduced), equations.common.diagonal(), Eigen::MatrixXd(reduced.rows(), 0));
   covariance.of_common = common.matrix;
   covariance.log_determinant += common.log_determinant;
   covariance.rcond = std::min(covariance.rcond, common.rcond);

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/geometry/small_matrix.h"
+#include "helicarm/measures/reference.h"
 
 namespace helicarm::measures {
 namespace {
@@ -59,16 +60,23 @@ Expected<Axis> axis_of(const KindInfo& info, std::span<const Landmark> landmarks
   return axis;
 }
 
+/// Of the plateau's width: in any plane that holds it.
 Projection projection_of(Kind kind, const Vector3d& axis) {
   return Projection(kind == Kind::tibia_ml ? axis.unitOrthogonal() : Vector3d(axis.normalized()));
 }
 
-Expected<Measure> projected(Kind kind, std::span<const Landmark> landmarks, const Projection& projection) {
+/// In the projection of these landmarks, taken as exact.
+struct Projected {
+  std::vector<Click> clicks;
+  Measure measure;
+};
+
+Projected projected(Kind kind, std::span<const Landmark> landmarks, const Axis& axis) {
+  const Projection projection = projection_of(kind, axis.of(landmarks));
   std::vector<Click> clicks;
   for (const Landmark& each : landmarks)
     if (each.name != axis_medial && each.name != axis_lateral)
-      clicks.push_back({each.name, projection.across * each.at,
-                        projection.across * each.covariance_mm2 * projection.across.transpose()});
+      clicks.push_back({each.name, projection.across * each.at, Eigen::Matrix2d::Zero()});
   const ObjectPlane mm{{1, 1, 0, 0}, 1};
   auto measure = measures::measure(kind, clicks, mm);
   if (!measure) {
@@ -79,10 +87,10 @@ Expected<Measure> projected(Kind kind, std::span<const Landmark> landmarks, cons
                              info_of(kind).word, length->second, least_length_mm),
                  {},
                  {{"length_mm", length->second}, {"limit_mm", least_length_mm}}};
-    return tl::unexpected<Failure>(std::move(failure));
+    throw BadInput(std::move(failure));
   }
   measure->depth_mm.reset();
-  return measure;
+  return {std::move(clicks), *std::move(measure)};
 }
 
 /// Square root of a covariance, by columns.
@@ -91,30 +99,40 @@ Eigen::Matrix3d root_of(const Eigen::Matrix3d& covariance) {
   return principal.vectors * principal.values.cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
-/// Adds what the error of the axis' ends contributes, by central differences over a standard deviation.
-Expected<void> add_axis_error(const Axis& axis, std::span<const Landmark> landmarks, Measure& measure) {
-  return guarded([&] {
-    for (const std::size_t end : {axis.from, axis.to}) {
-      const Eigen::Matrix3d root = root_of(landmarks[end].covariance_mm2);
-      for (int column = 0; column < 3; ++column) {
-        if (root.col(column).isZero(0)) continue;
-        const auto moved = [&](double sign) {
-          std::vector<Landmark> all(landmarks.begin(), landmarks.end());
-          all[end].at += sign * root.col(column);
-          return value_or_throw(
-              projected(measure.kind, landmarks, projection_of(measure.kind, axis.of(all))));
-        };
-        const Measure up = moved(1), down = moved(-1);
-        for (std::size_t i = 0; i < measure.positions.size(); ++i) {
-          const Eigen::VectorXd step = (up.positions[i].percent - down.positions[i].percent) / 2;
-          measure.positions[i].covariance += step * step.transpose();
-        }
-        for (std::size_t i = 0; i < measure.quantities.size(); ++i)
-          if (auto& sigma = measure.quantities[i].sigma)
-            sigma = std::hypot(*sigma, (up.quantities[i].value - down.quantities[i].value) / 2);
+/// Adds what the landmarks' errors contribute in three dimensions, also by the projection that they
+/// determine: central differences over a thousandth of a standard deviation.
+void add_errors(const Axis& axis, std::span<const Landmark> landmarks, Measure& measure) {
+  constexpr double part = 1e-3;
+  std::vector<Landmark> moved(landmarks.begin(), landmarks.end());
+  for (Landmark& each : moved) {
+    const Vector3d at = each.at;
+    const Eigen::Matrix3d root = root_of(each.covariance_mm2);
+    for (const auto& column : root.colwise()) {
+      if (column.isZero(0)) continue;
+      each.at = at + part * column;
+      const Measure up = projected(measure.kind, moved, axis).measure;
+      each.at = at - part * column;
+      const Measure down = projected(measure.kind, moved, axis).measure;
+      for (std::size_t i = 0; i < measure.positions.size(); ++i) {
+        const Eigen::VectorXd step = (up.positions[i].percent - down.positions[i].percent) / (2 * part);
+        measure.positions[i].covariance += step * step.transpose();
       }
+      for (std::size_t i = 0; i < measure.quantities.size(); ++i)
+        if (auto& sigma = measure.quantities[i].sigma)
+          sigma = std::hypot(*sigma, (up.quantities[i].value - down.quantities[i].value) / (2 * part));
     }
-  });
+    each.at = at;
+  }
+}
+
+/// Of the positions with all their errors.
+void warn_of_positions(const KindInfo& info, std::span<const Click> clicks, Measure& measure) {
+  const PercentAxes axes{info.kind, value_or_throw(assigned(info, clicks))};
+  PlanarPoints points;
+  for (const Click& click : clicks) points.push_back(click.uv);
+  for (std::size_t i = 0; i < measure.positions.size(); ++i)
+    measure.positions[i].warnings =
+        reference_warnings(axes, measure.positions[i], points, axes.clicks.further[i]);
 }
 
 }  // namespace
@@ -131,9 +149,10 @@ Expected<Measure> measure_in_space(Kind kind, std::span<const Landmark> landmark
       if (std::ranges::count(landmarks, each.name, &Landmark::name) > 1)
         throw BadInput(Reason::bad_value, fmt::format("{}: \"{}\" is given twice", info.word, each.name));
     const Axis axis = value_or_throw(axis_of(info, landmarks));
-    Measure measure = value_or_throw(projected(kind, landmarks, projection_of(kind, axis.of(landmarks))));
-    if (kind != Kind::tibia_ml) value_or_throw(add_axis_error(axis, landmarks, measure));
-    return measure;
+    auto [clicks, measure] = projected(kind, landmarks, axis);
+    add_errors(axis, landmarks, measure);
+    warn_of_positions(info, clicks, measure);
+    return std::move(measure);
   });
 }
 

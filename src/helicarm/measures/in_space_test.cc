@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/measures/in_space.h"
 
+#include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <gmock/gmock.h>
 
@@ -47,22 +49,60 @@ TEST(MeasureInSpace, QuadrantsAreThoseAlongTheCondylesAxisInAnyPose) {
   }
 }
 
-TEST(MeasureInSpace, CovarianceIsThatOfDrawnLandmarks) {
+Eigen::MatrixXd scatter_of(Kind kind, const std::vector<Landmark>& landmarks) {
   constexpr int trials = 4000;
   RandomStream random(5, 2);
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
+  const Eigen::Index n = Eigen::Index(info_of(kind).components.size());
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(n);
+  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(n, n);
   for (int i = 0; i < trials; ++i) {
-    std::vector<Landmark> drawn = femur();
-    for (Landmark& each : drawn) each.at += 0.5 * Vector3d(random.normal(), random.normal(), random.normal());
-    const Eigen::Vector2d percent = measure_in_space(Kind::femoral_quadrants, drawn)->positions[0].percent;
+    std::vector<Landmark> drawn = landmarks;
+    for (Landmark& each : drawn) {
+      each.at += 0.5 * Vector3d(random.normal(), random.normal(), random.normal());
+      each.covariance_mm2.setZero();  // the position alone is asked for
+    }
+    const Eigen::VectorXd percent = measure_in_space(kind, drawn)->positions[0].percent;
     sum += percent;
     squares += percent * percent.transpose();
   }
-  const Eigen::Matrix2d scatter = squares / trials - sum * sum.transpose() / trials / trials;
-  const Eigen::MatrixXd told = measure_in_space(Kind::femoral_quadrants, femur())->positions[0].covariance;
-  EXPECT_NEAR(told(0, 0) / scatter(0, 0), 1, 0.1);
-  EXPECT_NEAR(told(1, 1) / scatter(1, 1), 1, 0.1);
+  return squares / trials - sum * sum.transpose() / trials / trials;
+}
+
+/// The point lies far off the width, in no plane of the axes.
+const std::vector<Landmark> plateau{
+    {"medial", {-35, 3, 1}, half_mm}, {"lateral", {35, 3, 1}, half_mm}, {"TS", {-14, -40, 60}, half_mm}};
+
+TEST(MeasureInSpace, CovarianceIsThatOfDrawnLandmarks) {
+  for (const auto& [kind, landmarks] :
+       {std::pair(Kind::femoral_quadrants, femur()), std::pair(Kind::tibia_ml, plateau)}) {
+    const Eigen::MatrixXd scatter = scatter_of(kind, landmarks);
+    const Eigen::MatrixXd told = measure_in_space(kind, landmarks)->positions[0].covariance;
+    for (Eigen::Index i = 0; i < scatter.rows(); ++i) EXPECT_NEAR(told(i, i) / scatter(i, i), 1, 0.1) << i;
+  }
+}
+
+TEST(MeasureInSpace, ErrorsDoNotDependOnTheAxesOfTheCt) {
+  for (const auto& [kind, landmarks] :
+       {std::pair(Kind::femoral_quadrants, femur()), std::pair(Kind::tibia_ml, plateau)}) {
+    const Measure as_given = *measure_in_space(kind, landmarks);
+    for (const double seed : {0.4, 1.1, 2.5}) {
+      const Measure elsewhere = *measure_in_space(kind, turned(landmarks, seed));
+      EXPECT_TRUE(elsewhere.positions[0].covariance.isApprox(as_given.positions[0].covariance, 1e-6));
+      EXPECT_NEAR(*elsewhere.quantities[0].sigma, *as_given.quantities[0].sigma, 1e-6);
+    }
+  }
+}
+
+TEST(MeasureInSpace, PositionIsOutsideByItsWholeError) {
+  std::vector<Landmark> landmarks = femur();
+  landmarks.back().at.z() = 0.6;  // 2.4 % above Blumensaat's line
+  for (Landmark& each : landmarks) each.covariance_mm2.setZero();
+  const auto exact = measure_in_space(Kind::femoral_quadrants, landmarks);
+  EXPECT_EQ(exact->positions[0].warnings.size(), 1U);
+  landmarks[1].covariance_mm2 = 9 * Eigen::Matrix3d::Identity();  // turns the image by a tenth of its length
+  const Position position = measure_in_space(Kind::femoral_quadrants, landmarks)->positions[0];
+  EXPECT_GT(1.96 * std::sqrt(position.covariance(1, 1)), 2.4);
+  EXPECT_TRUE(position.warnings.empty());
 }
 
 TEST(MeasureInSpace, TheTibialPerCentAreAlongTheSagittalDiameter) {

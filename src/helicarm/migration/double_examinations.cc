@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 namespace helicarm::migration {
 namespace {
 
@@ -37,7 +39,32 @@ Precision precision_of(const std::string& name, const std::vector<const BodyMigr
   return precision;
 }
 
+/// Whether the markers of one are those of the other, or a part of them; names are free.
+bool are_same(const Exam& a, const Exam& b) {
+  const Exam &fewer = a.markers.size() <= b.markers.size() ? a : b, &more = &fewer == &a ? b : a;
+  return std::ranges::all_of(fewer.markers, [&](const Marker& marker) {
+    return std::ranges::any_of(more.markers, [&](const Marker& other) {
+      return (marker.place - other.place).lpNorm<Eigen::Infinity>() <= same_place_mm;
+    });
+  });
+}
+
 }  // namespace
+
+void require_new_exams(const ExamPair& pair, const std::vector<ExamPair>& earlier) {
+  for (const auto& [first, second] : earlier) {
+    const bool has_first = are_same(pair.first, first) || are_same(pair.second, first),
+               has_second = are_same(pair.first, second) || are_same(pair.second, second);
+    if (has_first && has_second)
+      throw BadInput(Reason::bad_value, fmt::format("the same pair as {} and {}: give each pair once",
+                                                    first.name, second.name));
+    if (has_first || has_second)
+      throw BadInput(Reason::bad_value,
+                     fmt::format("has the examination {} of the pair {} and {}: each pair needs two "
+                                 "examinations of its own, or the pairs are not independent",
+                                 (has_first ? first : second).name, first.name, second.name));
+  }
+}
 
 std::vector<Precision> precision_of(const std::vector<NamedMigration>& doubles) {
   std::vector<std::pair<std::string, std::vector<const BodyMigration*>>> of_name;

@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "helicarm/migration/migrate.h"
@@ -20,7 +21,7 @@ struct NamedMigration {
 struct ZeroMotion {
   double mean = 0;
   double sd = 0;            ///< about the mean, n - 1
-  double limit_95 = 0;      ///< of a single examination: the mean and t(n - 1) standard deviations about it
+  double limit_95 = 0;      ///< t(n - 1) standard deviations: of a patient's migration about zero, without bias
   double stated_sigma = 0;  ///< root mean square of the standard deviations that the migrations state
 };
 
@@ -32,7 +33,13 @@ struct Precision {
   double mtpm_mean_mm = 0, mtpm_largest_mm = 0;
 };
 
-/// Of each body that two double examinations or more have.
+using ExamPair = std::pair<Exam, Exam>;
+
+/// Throws bad_value for a pair with an examination of an earlier one, by its markers' places and in either
+/// order: their migrations are not independent, and the standard deviation about their mean is too small.
+void require_new_exams(const ExamPair& pair, const std::vector<ExamPair>& earlier);
+
+/// Of each body that two double examinations or more have; all migrate against the same reference.
 std::vector<Precision> precision_of(const std::vector<NamedMigration>& doubles);
 
 }  // namespace helicarm::migration

@@ -5,6 +5,7 @@
 #include <set>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "helicarm/core/csv.h"
 #include "helicarm/core/json.h"
@@ -110,6 +111,13 @@ void read_result(const fs::path& path, Exam& exam) {
   }
 }
 
+/// Whether the table has a column `frame`, as markers.csv of `helicarm track`; its other columns are then the
+/// unknown ones.
+bool has_frames(const fs::path& path) {
+  const auto table = read_csv(path, {"frame"}, {});
+  return table || table.error().reason == Reason::unknown_key;
+}
+
 /// The file of an examination in a folder.
 fs::path file_in(const fs::path& folder) {
   for (const char* name : {"markers.csv", "result.json"})
@@ -136,16 +144,16 @@ Expected<Exam> read_exam(const fs::path& path, std::optional<int> frame) {
     const fs::path file = fs::is_directory(path, ignored) ? file_in(path) : path;
     Exam exam;
     exam.name = (path.filename().empty() ? path.parent_path() : path).filename().string();
-    const bool is_tracked = file.filename() == "markers.csv";
+    const bool is_result = file.extension() == ".json", is_tracked = !is_result && has_frames(file);
     if (frame && !is_tracked)
       throw BadInput(Reason::usage, fmt::format("{}: has no frames: --frame is for markers.csv of `helicarm "
                                                 "track`",
                                                 exam.name));
-    if (file.extension() == ".json") {
+    if (is_result) {
       read_result(file, exam);
     } else if (is_tracked) {
       read_tracked(file, frame, exam);
-      if (fs::exists(file.parent_path() / "track.json", ignored))
+      if (file.filename() == "markers.csv" && fs::exists(file.parent_path() / "track.json", ignored))
         read_bodies(file.parent_path() / "track.json", exam);
     } else {
       read_points(file, exam);
@@ -156,13 +164,8 @@ Expected<Exam> read_exam(const fs::path& path, std::optional<int> frame) {
 
 std::vector<Marker> markers_of(const Exam& exam, const Segment& segment) {
   std::vector<Marker> markers;
-  for (const std::string& name : segment.markers) {
-    const Marker* marker = exam.find(name);
-    if (!marker)
-      throw BadInput(Reason::bad_value, fmt::format("segment \"{}\": {} has no marker \"{}\" with a place",
-                                                    segment.name, exam.name, name));
-    markers.push_back(*marker);
-  }
+  for (const std::string& name : segment.markers)
+    if (const Marker* marker = exam.find(name)) markers.push_back(*marker);
   return markers;
 }
 
@@ -171,20 +174,23 @@ std::vector<Marker> candidates_for(const Exam& exam, const std::string& segment)
   return named == exam.segments.end() ? exam.markers : markers_of(exam, *named);
 }
 
+Expected<Segment> segment_of(std::string name, std::vector<std::string> markers) {
+  if (name.empty() || markers.size() < 3 || std::ranges::any_of(markers, &std::string::empty))
+    return fail(Reason::bad_value, fmt::format("segment: \"{}={}\" is not NAME=M1,M2,M3 with three markers or "
+                                               "more",
+                                               name, fmt::join(markers, ",")));
+  return Segment{std::move(name), std::move(markers)};
+}
+
 Expected<Segment> segment_from(const std::string& text) {
   const std::size_t equals = text.find('=');
-  Segment segment{text.substr(0, equals), {}};
+  std::vector<std::string> markers;
   if (equals != text.npos)
     for (std::size_t at = equals + 1, end; at <= text.size(); at = end + 1) {
       end = std::min(text.find(',', at), text.size());
-      segment.markers.push_back(text.substr(at, end - at));
+      markers.push_back(text.substr(at, end - at));
     }
-  if (segment.name.empty() || segment.markers.size() < 3 ||
-      std::ranges::any_of(segment.markers, &std::string::empty))
-    return fail(Reason::bad_value, fmt::format("segment: \"{}\" is not NAME=M1,M2,M3 with three markers or "
-                                               "more",
-                                               text));
-  return segment;
+  return segment_of(text.substr(0, equals), std::move(markers));
 }
 
 }  // namespace helicarm::migration

@@ -21,9 +21,18 @@ constexpr double degrees = 180 / EIGEN_PI;
 constexpr double line_mm =
     0.5;  // of markers about their common line: below, the turn about it is not determined
 constexpr double small_segment_mm = 10;  // radiostereometry spreads a segment's markers over more
-constexpr double same_place_mm = 1e-3;   // a tenth of what radiostereometry resolves, above a file's rounding
+
+/// Markers that were asked for by name must have a place.
+void require_places(const Exam& exam, const std::vector<Segment>& segments) {
+  for (const Segment& segment : segments)
+    for (const std::string& marker : segment.markers)
+      if (!exam.find(marker))
+        throw BadInput(Reason::bad_value, fmt::format("segment \"{}\": {} has no marker \"{}\" with a place",
+                                                      segment.name, exam.name, marker));
+}
 
 std::vector<Segment> segments_of(const Exam& first, const MigrationOptions& options) {
+  require_places(first, options.segments);
   std::vector<Segment> segments = options.segments.empty() ? first.segments : options.segments;
   if (segments.size() < 2)
     throw BadInput(Reason::bad_value,
@@ -129,30 +138,51 @@ double farthest_mm(const std::vector<Eigen::Vector3d>& places) {
   return most;
 }
 
+/// A marker of the segment that either examination lacks is named.
+void warn_of_missing(const Segment& segment, const std::vector<std::string>& missing, const std::string& where,
+                     std::vector<Warning>& warnings) {
+  if (missing.empty()) return;
+  warnings.push_back({Reason::marker_lost,
+                      fmt::format("segment \"{}\": {} of {} markers have no {}: {}", segment.name,
+                                  missing.size(), segment.markers.size(), where, fmt::join(missing, ", ")),
+                      {},
+                      {}});
+}
+
+/// The segment's markers that the first examination located.
+std::vector<Marker> located_markers(const Exam& first, const Segment& segment, std::vector<std::string>& missing,
+                                    std::vector<Warning>& warnings) {
+  for (const std::string& marker : segment.markers)
+    if (!first.find(marker)) missing.push_back(marker);
+  std::vector<Marker> located = markers_of(first, segment);
+  if (located.size() < 3)
+    throw BadInput(Reason::too_few_fiducials,
+                   fmt::format("segment \"{}\": {} of its {} markers have a place in {}, three are needed",
+                               segment.name, located.size(), segment.markers.size(), first.name));
+  warn_of_missing(segment, missing, "place in " + first.name, warnings);
+  return located;
+}
+
 Matched matched_as_given(const Exam& first, const Exam& second, const Segment& segment, Matching matching,
                          std::vector<Warning>& warnings) {
-  const std::vector<Marker> of_first = markers_of(first, segment),
+  Matched matched;
+  const std::vector<Marker> of_first = located_markers(first, segment, matched.segment.missing, warnings),
                             of_second = candidates_for(second, segment.name);
   require_spread(segment.name, of_first);
   const std::string what = fmt::format("segment \"{}\"", segment.name);
   const Match match = value_or_throw(matching == Matching::name
                                          ? match_by_name(what, of_first, of_second)
                                          : match_by_geometry(what, of_first, of_second, largest_shift_mm));
-  Matched matched;
   matched.segment.name = segment.name;
   for (std::size_t n = 0; n < match.first.size(); ++n) {
     matched.first.push_back(of_first[match.first[n]]);
     matched.second.push_back(of_second[match.second[n]]);
   }
+  std::vector<std::string> alone;
   for (std::size_t i = 0; i < of_first.size(); ++i)
-    if (std::ranges::count(match.first, i) == 0) matched.segment.missing.push_back(of_first[i].name);
-  if (!matched.segment.missing.empty())
-    warnings.push_back(
-        {Reason::marker_lost,
-         fmt::format("{}: {} of {} markers have no partner in {}: {}", what, matched.segment.missing.size(),
-                     of_first.size(), second.name, fmt::join(matched.segment.missing, ", ")),
-         {},
-         {}});
+    if (std::ranges::count(match.first, i) == 0) alone.push_back(of_first[i].name);
+  warn_of_missing(segment, alone, "partner in " + second.name, warnings);
+  matched.segment.missing.insert(matched.segment.missing.end(), alone.begin(), alone.end());
   require_spread(segment.name, matched.first);
   matched.refit();
   require_rigid(matched, warnings);
@@ -262,19 +292,20 @@ std::optional<Warning> scale_between(const std::vector<Matched>& all, const std:
 /// The errors that the residuals show, where the examinations state none, or larger ones.
 void take_errors(Migration& migration, std::vector<Matched>& all) {
   bool is_stated = true;
-  double squares = 0, expected = 0;
+  double squares = 0, expected = 0, variance = 0;
   for (const Matched& each : all) {
     squares += each.segment.fit.squares_mm2;
     migration.freedom += 3.0 * double(each.first.size()) - 6;
     for (const auto* markers : {&each.first, &each.second})
       for (const Marker& marker : *markers) is_stated = is_stated && marker.covariance.has_value();
     expected += each.segment.fit.expected_squares_mm2;
+    variance += each.segment.fit.squares_variance_mm4;
   }
   if (is_stated) {
-    // Residuals that the stated errors do not explain (chi-square, 0.1 %) widen them.
-    const double excess = squares / expected;
-    const double factor =
-        excess * migration.freedom > chi2_quantile(migration.freedom, normal_at_999) ? excess : 1;
+    // Residuals that the stated errors do not explain (0.1 %) widen them. Errors differ: the squares are
+    // about chi-square with the degrees of freedom that mean and variance give (Satterthwaite 1946).
+    const double excess = squares / expected, freedom = 2 * expected * expected / variance;
+    const double factor = excess * freedom > chi2_quantile(freedom, normal_at_999) ? excess : 1;
     for (Matched& each : all) each.segment.fit.covariance *= factor;
     if (factor > 1)
       migration.warnings.push_back(

@@ -14,6 +14,8 @@ namespace helicarm::migration {
 /// Limits of the guideline (Valstar et al., Acta Orthop 2005; ISO 16087:2013).
 inline constexpr double condition_limit_per_m = 120;
 inline constexpr double mean_error_limit_mm = 0.35;
+/// A tenth of what radiostereometry resolves, above a file's rounding.
+inline constexpr double same_place_mm = 1e-3;
 
 enum class Matching { geometry, name };
 
@@ -28,7 +30,7 @@ struct MigrationOptions {
 struct MatchedSegment {
   std::string name;
   std::vector<std::string> first, second;  ///< markers that count, by their names in each
-  std::vector<std::string> missing;        ///< of the first, not found in the second
+  std::vector<std::string> missing;        ///< without a place in the first, or not found in the second
   std::vector<std::string> loose;          ///< moved in the segment, left out
   double condition_per_m = 0;              ///< Soderkvist and Wedin 1993
   std::optional<double> ray_gap_mm;        ///< largest crossing-line distance of its markers

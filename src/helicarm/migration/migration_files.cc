@@ -197,19 +197,16 @@ std::string precision_table(const std::vector<Precision>& precisions) {
       rows));
 }
 
-bool are_equal(const NamedMigration& a, const NamedMigration& b) {
-  return std::ranges::equal(
-      a.migration.bodies, b.migration.bodies, {},
-      [](const BodyMigration& body) { return body.motion.matrix(); },
-      [](const BodyMigration& body) { return body.motion.matrix(); });
-}
-
-/// A pair that is given twice would make the precision look better than it is.
-void require_new_pair(const NamedMigration& pair, const std::vector<NamedMigration>& earlier) {
-  for (const NamedMigration& other : earlier)
-    if (are_equal(pair, other))
-      throw BadInput(Reason::bad_value, fmt::format("the same pair as {} and {}: give each pair once",
-                                                    other.first, other.second));
+/// Of the migration, then of each double examination, which they name.
+std::vector<Warning> all_warnings(const MigrationAnswer& answer) {
+  std::vector<Warning> all = answer.migration.migration.warnings;
+  for (const NamedMigration& each : answer.doubles)
+    for (Warning warning : each.migration.warnings) {
+      warning.message =
+          fmt::format("double examination {} and {}: {}", each.first, each.second, warning.message);
+      all.push_back(std::move(warning));
+    }
+  return all;
 }
 
 }  // namespace
@@ -278,7 +275,7 @@ Json to_json(const MigrationAnswer& answer) {
                {"failure", nullptr},
                {"warnings", Json::array()},
                {"axes", json_rows(answer.axes)}};
-  for (const Warning& warning : answer.migration.migration.warnings)
+  for (const Warning& warning : all_warnings(answer))
     json["warnings"].push_back(pipeline::to_json(warning));
   json.update(json_of(answer.migration));
   json["double"] = Json::array();
@@ -317,7 +314,7 @@ std::string migration_report(const MigrationAnswer& answer) {
           {fmt::format("{}, {} – {}", each.migration.segments[body.segment].name, each.first, each.second),
            &body, &each.migration});
   std::string body =
-      cards + "</div>\n" + track::warnings_list(migration.warnings) +
+      cards + "</div>\n" + track::warnings_list(all_warnings(answer)) +
       migrations_table(fmt::format("Migration against {}, {} – {}", migration.segments.front().name,
                                    answer.migration.first, answer.migration.second),
                        rows) +

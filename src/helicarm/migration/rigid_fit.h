@@ -25,6 +25,7 @@ struct RigidFit {
   double mean_error_mm = 0;                  ///< mean error of rigid-body fitting: mean of the residuals
   double squares_mm2 = 0;                    ///< of the residuals
   double expected_squares_mm2 = 0;           ///< by the spreads
+  double squares_variance_mm4 = 0;           ///< of the squares, by the spreads of normal errors
 };
 
 /// Three pairs or more that are not on one line.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/ranges.h>
+
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/operation/models.h"
 #include "helicarm/pipeline/poses_json.h"
@@ -88,12 +90,20 @@ case_registration::CaseRegistration as_registered_earlier(case_registration::Cas
   return registration;
 }
 
-std::optional<case_registration::CaseRegistration> as_recorded(
-    case_registration::CaseRegistration registration, const std::string& digest) {
+std::optional<RecordedRegistration> as_recorded(case_registration::CaseRegistration registration,
+                                                const std::string& digest) {
   const auto is_recorded = [&] { return xray::digest(to_text(recorded(registration))) == digest; };
-  if (is_recorded()) return registration;
+  if (is_recorded()) return RecordedRegistration{std::move(registration)};
+  std::vector<std::string> unexplained;
+  for (const case_registration::RegisteredModel& model : registration.models)
+    if (model.registration.not_explained) unexplained.push_back(model.registration.name);
   registration = as_registered_earlier(std::move(registration));
-  return is_recorded() ? std::optional(std::move(registration)) : std::nullopt;
+  if (!is_recorded()) return std::nullopt;
+  return RecordedRegistration{
+      std::move(registration),
+      fmt::format("the registration is as earlier versions recorded it: without the part of {} that its pose "
+                  "leaves unexplained, and what follows from it; nothing else differs",
+                  fmt::join(unexplained, ", "))};
 }
 
 bool states_depth(const Json& result) {

@@ -25,10 +25,18 @@ Json in_keys_of(const Json& then, const Json& now);
 /// Earlier versions did not know which part of a model its pose leaves unexplained.
 case_registration::CaseRegistration as_registered_earlier(case_registration::CaseRegistration registration);
 
+/// A registration in the form in which it was recorded.
+struct RecordedRegistration {
+  case_registration::CaseRegistration registration;
+  /// In which form of earlier versions alone it equals the record, and that nothing else differs; nothing:
+  /// as it is registered now.
+  std::optional<std::string> note = {};
+};
+
 /// The registration, or what an earlier version made of it, whose record has this digest; nothing where the
 /// recorded one is another.
-std::optional<case_registration::CaseRegistration> as_recorded(
-    case_registration::CaseRegistration registration, const std::string& digest);
+std::optional<RecordedRegistration> as_recorded(case_registration::CaseRegistration registration,
+                                                const std::string& digest);
 
 /// Earlier versions did not state how deep a verified drill was.
 bool states_depth(const Json& result);

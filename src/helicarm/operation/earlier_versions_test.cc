@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/operation/earlier_versions.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "helicarm/operation/models.h"
+#include "helicarm/operation/replay.h"
+#include "helicarm/xray/digest.h"
 
 namespace helicarm::operation {
 namespace earlier_versions_test {
@@ -52,6 +55,34 @@ TEST(RegisteredEarlier, OtherFindingsRemain) {
   EXPECT_EQ(earlier(unexplained({not_explained}, breach)), recorded(with(Decision::refuse, {}, breach)));
   const auto refused = with(Decision::refuse, {}, planned_in_it);  // by no such part
   EXPECT_EQ(earlier(refused), recorded(refused));
+}
+
+std::string digest_of(const case_registration::CaseRegistration& made) {
+  return xray::digest(to_text(recorded(made)));
+}
+
+TEST(RegisteredEarlier, AnEqualOnlyInThatFormIsNoted) {
+  const auto present = unexplained({small, not_explained});
+  const auto earlier = as_recorded(present, digest_of(with(Decision::warn, {small})));
+  ASSERT_TRUE(earlier);
+  EXPECT_FALSE(earlier->registration.models[0].registration.not_explained);
+  ASSERT_TRUE(earlier->note);
+  EXPECT_THAT(*earlier->note, testing::HasSubstr("without the part of femur"));
+  EXPECT_THAT(*earlier->note, testing::HasSubstr("nothing else differs"));
+  const auto now = as_recorded(present, digest_of(present));
+  ASSERT_TRUE(now);
+  EXPECT_FALSE(now->note);
+  EXPECT_TRUE(now->registration.models[0].registration.not_explained);
+  EXPECT_FALSE(as_recorded(present, digest_of(with(Decision::accept, {}))));
+}
+
+TEST(ReplayReports, StateNotesBesideDifferences) {
+  ReplayReport report;
+  report.finished = true;
+  report.notes = {"record 7: as earlier versions recorded it"};
+  EXPECT_TRUE(report.complete());
+  EXPECT_EQ(to_json(report).at("notes"), Json(report.notes));
+  EXPECT_EQ(to_json(report).at("differences"), Json::array());
 }
 
 }  // namespace earlier_versions_test

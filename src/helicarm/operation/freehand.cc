@@ -25,11 +25,34 @@ constexpr double recent_poses_s = 0.5;
 /// length, 0.5 mm and more in one sample. A drill advanced by 2 mm/s is then 0.25 mm deeper than shown.
 constexpr double mean_s = 0.25;
 constexpr std::size_t median_samples = 5;  // as PlanWatch takes for a bone
+/// Fewer give neither a mean (as `exposure_pose`) nor a scatter.
+constexpr std::ptrdiff_t least_averaged = 3, least_recent = 5;
 
 const Samples& samples_of(const PoseWindow& window, const std::string& marker) {
   static const Samples none;
   const auto found = window.samples.find(marker);
   return found == window.samples.end() ? none : found->second;
+}
+
+std::ptrdiff_t count_of_last(const Samples& samples, double span_s) {
+  return std::ranges::count_if(samples, [&](const tracker::PoseSample& sample) {
+    return sample.time_s >= samples.back().time_s - span_s;
+  });
+}
+
+/// Both with at least one.
+std::optional<Failure> why_too_few(const Samples& tool, const Samples& bone) {
+  const auto averaged = count_of_last(tool, mean_s);
+  const auto of_tool = std::ssize(tool), of_bone = std::ssize(bone);
+  if (averaged >= least_averaged && of_tool >= least_recent && of_bone >= least_recent) return std::nullopt;
+  return Failure{
+      Reason::uncertain,
+      fmt::format(
+          "too few poses: of the tool {} in {:g} s and {} in {:g} s, of the bone {}, must be at least "
+          "{}, {} and {}",
+          averaged, mean_s, of_tool, recent_poses_s, of_bone, least_averaged, least_recent, least_recent),
+      {},
+      {{"averaged", averaged}, {"of_tool", of_tool}, {"of_bone", of_bone}}};
 }
 
 /// Pose of the tip in the bone, of each sample of the tool with the bone's sample nearest in time.
@@ -117,8 +140,7 @@ TunnelAim mean_aim(const LiveTool& live, const std::string& tunnel, const Sample
   if (tool.empty() || bone.empty())
     throw BadInput(Reason::no_pose, fmt::format("no recent pose of the {}", tool.empty() ? "tool" : "bone"));
   const auto tips = tips_in_bone(tool, bone, live.marker_from_tip());
-  const auto averaged = static_cast<std::size_t>(std::ranges::count_if(
-      tool, [&](const tracker::PoseSample& sample) { return sample.time_s >= tool.back().time_s - mean_s; }));
+  const auto averaged = static_cast<std::size_t>(count_of_last(tool, mean_s));
   const geometry::RigidTransform& tracker_from_bone = bone.back().tracker_from_tool;
   const geometry::RigidTransform tracker_from_marker =
       tracker_from_bone * mean_tip(std::span(tips).last(averaged)) * live.marker_from_tip().inverse();
@@ -134,7 +156,10 @@ Expected<TunnelAim> mean_aim(const LiveTool& live, const TrackerPlan& tracker, c
       value_or_throw(board.latest(marker, now_s));
       return board.between(marker, now_s - recent_poses_s, now_s);
     };
-    return mean_aim(live, tunnel.name, recent(tracker.tool), recent(tracker.marker_of(tunnel.bone)));
+    const Samples tool = recent(tracker.tool), bone = recent(tracker.marker_of(tunnel.bone));
+    TunnelAim aim = mean_aim(live, tunnel.name, tool, bone);
+    if (const auto few = why_too_few(tool, bone)) throw BadInput(*few);
+    return aim;
   });
 }
 
@@ -162,7 +187,7 @@ PoseWindow FreehandGuide::recent(const tracker::PoseBoard& board, double now_s) 
   return window;
 }
 
-Guidance FreehandGuide::at(const PoseWindow& recent, bool states_causes) const {
+Guidance FreehandGuide::at(const PoseWindow& recent, const GuidanceForm& form) const {
   Guidance guidance;
   const Samples &tool = samples_of(recent, tool_), &bone = samples_of(recent, bone_);
   for (const auto& [marker, samples] : {std::pair(tool_, &tool), {bone_, &bone}})
@@ -175,12 +200,13 @@ Guidance FreehandGuide::at(const PoseWindow& recent, bool states_causes) const {
   guidance.bone_moved =
       motion_since(tracker_from_bone_, std::span(bone).last(std::min(median_samples, bone.size())), ends);
   guidance.aim = mean_aim(live_, tunnel_.name, tool, bone);
-  if (!states_causes) guidance.aim->errors.reset();
-  guidance.why_not = why_not(guidance);
+  if (!form.states_causes) guidance.aim->errors.reset();
+  guidance.why_not = why_not(guidance, form.counts_poses ? why_too_few(tool, bone) : std::nullopt);
   return guidance;
 }
 
-std::optional<Failure> FreehandGuide::why_not(const Guidance& guidance) const {
+std::optional<Failure> FreehandGuide::why_not(const Guidance& guidance,
+                                              const std::optional<Failure>& few) const {
   if (!(*guidance.age_s <= oldest_s_))
     return Failure{Reason::stale_pose, fmt::format("the newest poses are {:.3g} s old, limit {:g} s",
                                                    *guidance.age_s, oldest_s_)};
@@ -188,6 +214,7 @@ std::optional<Failure> FreehandGuide::why_not(const Guidance& guidance) const {
                                          "touch its check points, if any, and begin again");
       !in_place)
     return in_place.error();
+  if (few) return few;
   const TunnelAim& aim = *guidance.aim;
   // What is not a number is not within a tolerance.
   if (!(2 * aim.distance_sigma_mm <= drill_.tolerance_mm && 2 * aim.angle_sigma_deg <= drill_.tolerance_deg))

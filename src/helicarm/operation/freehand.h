@@ -16,8 +16,8 @@ struct Guidance {
   std::optional<Motion> bone_moved;  ///< since guidance began, at the tunnel's end that moved more
   std::optional<double> age_s;       ///< of the older of the two poses
   /// Empty: within the tolerances. no_pose, stale_pose (older than the tracker's limit); plan_stale (the bone
-  /// or its marker moved by more than the plan's limits); uncertain (two standard deviations exceed a
-  /// tolerance); off_target (outside a tolerance, or beyond the tunnel's end).
+  /// or its marker moved by more than the plan's limits); uncertain (too few poses to average, or two
+  /// standard deviations exceed a tolerance); off_target (outside a tolerance, or beyond the tunnel's end).
   std::optional<Failure> why_not;
 
   /// "on_target", or the code of `why_not`.
@@ -31,10 +31,16 @@ Json to_json(const Guidance& guidance);
 TunnelAim mean_aim(const LiveTool& live, const std::string& tunnel,
                    const std::vector<tracker::PoseSample>& tool,
                    const std::vector<tracker::PoseSample>& bone);
-/// Likewise of a drill that is not guided. Refuses as `LiveTool::aim`, and no_pose where `now_s` is not yet
-/// that of the newest pose, or half a second later.
+/// Likewise of a drill that is not guided. Refuses as `LiveTool::aim`, uncertain on too few poses, and
+/// no_pose where `now_s` is not yet that of the newest pose, or half a second later.
 Expected<TunnelAim> mean_aim(const LiveTool& live, const TrackerPlan& tracker, const OperationTunnel& tunnel,
                              const tracker::PoseBoard& board, double now_s);
+
+/// What earlier versions left out of a decision.
+struct GuidanceForm {
+  bool states_causes = true;  ///< of its errors (`AimErrors`)
+  bool counts_poses = true;   ///< uncertain on too few
+};
 
 /// Guides a hand-held drill to one tunnel. Guidance follows the bone: a motion within the plan's limits only
 /// moves the target.
@@ -48,8 +54,8 @@ class FreehandGuide {
   const OperationTunnel& tunnel() const { return tunnel_; }
   /// Samples of tool and bone in the half second before `now_s`.
   PoseWindow recent(const tracker::PoseBoard& board, double now_s) const;
-  /// At the end of the window. Earlier versions did not state the causes of its errors (`AimErrors`).
-  Guidance at(const PoseWindow& recent, bool states_causes = true) const;
+  /// At the end of the window.
+  Guidance at(const PoseWindow& recent, const GuidanceForm& form = {}) const;
 
  private:
   FreehandGuide(const OperationPlan& plan, LiveTool live, OperationTunnel tunnel,
@@ -63,7 +69,8 @@ class FreehandGuide {
         tracker_from_bone_(tracker_from_bone),
         oldest_s_(oldest_s) {}
 
-  std::optional<Failure> why_not(const Guidance& guidance) const;
+  /// `few`: why there are too few poses.
+  std::optional<Failure> why_not(const Guidance& guidance, const std::optional<Failure>& few) const;
 
   HandDrill drill_;
   PlanLimits limits_;

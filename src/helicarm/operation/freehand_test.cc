@@ -157,7 +157,7 @@ TEST(FreehandGuide, UncertainDecisionSaysWhatItsErrorsComeFrom) {
   EXPECT_THAT(now.why_not->message,
               testing::AllOf(testing::HasSubstr("tolerances 1 mm and 2 degrees; by the X-ray images"),
                              testing::HasSubstr("the scatter of its poses")));
-  const Guidance earlier = guide().at(shaken, false);  // as earlier versions recorded it
+  const Guidance earlier = guide().at(shaken, {.states_causes = false});  // as earlier versions recorded it
   EXPECT_FALSE(earlier.aim->errors);
   EXPECT_TRUE(earlier.why_not->message.ends_with("tolerances 1 mm and 2 degrees"));
 }
@@ -168,6 +168,33 @@ TEST(FreehandGuide, SteadyMotionIsNotScatter) {
   EXPECT_NEAR(moving.aim->depth_sigma_mm, still.aim->depth_sigma_mm, 1e-6);
   EXPECT_NEAR(moving.aim->depth_mm, 14 - 3.5, 1e-6);  // the mean of the last eight of 15
   EXPECT_EQ(moving.decision(), "on_target");
+}
+
+/// The last samples of a marker alone.
+PoseWindow with_last(const std::string& marker, std::ptrdiff_t count) {
+  PoseWindow window = at_rest(femur_from_tip(0.3, 25, 0.01));
+  auto& samples = window.samples.at(marker);
+  samples.erase(samples.begin(), samples.end() - count);
+  return window;
+}
+
+TEST(FreehandGuide, FewPosesAreUncertain) {
+  for (const char* marker : {"tool", "femur"}) {
+    for (const std::ptrdiff_t count : {1, 2, 4}) {
+      const Guidance now = guide().at(with_last(marker, count));
+      EXPECT_EQ(now.decision(), "uncertain") << count << " of " << marker;
+      EXPECT_THAT(now.why_not->message, testing::HasSubstr("too few poses"));
+      EXPECT_EQ(guide().at(with_last(marker, count), {.counts_poses = false}).decision(), "on_target");
+    }
+    EXPECT_EQ(guide().at(with_last(marker, 5)).decision(), "on_target") << marker;
+  }
+}
+
+TEST(FreehandGuide, FewPosesInTheMeanAreUncertain) {
+  PoseWindow window = at_rest(femur_from_tip(0.3, 25, 0.01));
+  auto& tool = window.samples.at("tool");
+  tool.erase(tool.end() - 8, tool.end() - 1);  // one is left in the last quarter of a second
+  EXPECT_EQ(guide().at(window).decision(), "uncertain");
 }
 
 TEST(FreehandGuide, RecordedSamplesGiveTheSameDecision) {
@@ -212,8 +239,13 @@ class MeanAim : public testing::Test {
 };
 
 TEST_F(MeanAim, IsThatOfTheRecentPoses) {
-  see_tool(end_s - 0.1), see_femur(end_s - 0.1);
+  for (const double ago_s : {0.2, 0.16, 0.12, 0.08, 0.04}) see_tool(end_s - ago_s), see_femur(end_s - ago_s);
   EXPECT_NEAR(aim().value().distance_mm, 0.3, 1e-6);
+}
+
+TEST_F(MeanAim, OfOnePoseIsUncertain) {
+  see_tool(end_s - 0.1), see_femur(end_s - 0.1);
+  EXPECT_EQ(aim().error().reason, Reason::uncertain);
 }
 
 TEST_F(MeanAim, MarkerSeenOnlyAfterItsTimeHasNoPose) {

@@ -69,6 +69,11 @@ Expected<PlannedOrder> GuidanceGate::planned(const std::string& tunnel) const {
   return found->second;
 }
 
+bool GuidanceGate::is_planned(const robot::RobotOrder& order) const {
+  const auto found = planned_.find(order.name);
+  return found != planned_.end() && found->second.order == to_text(robot::to_json(order));
+}
+
 bool GuidanceGate::is_stale(const std::string& tunnel) const {
   const auto found = planned_.find(tunnel);
   return found != planned_.end() && found->second.stale;
@@ -84,7 +89,7 @@ Expected<void> GuidanceGate::may_move(const robot::RobotOrder& order, const Oper
   return guarded([&] {
     value_or_throw(check_registered(tunnel));
     const PlannedOrder plan = value_or_throw(planned(order.name));
-    if (plan.order != to_text(robot::to_json(order)))
+    if (!is_planned(order))
       throw BadInput(
           Reason::plan_stale,
           order.name + ": is not the last plan to this tunnel: confirm the last one or plan again");

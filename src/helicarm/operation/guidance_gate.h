@@ -42,6 +42,8 @@ class GuidanceGate {
   void plan(const std::string& tunnel, PlannedOrder planned);
   /// Refuses (usage) an order to a tunnel that was not planned.
   Expected<PlannedOrder> planned(const std::string& tunnel) const;
+  /// Whether this order is the last plan to its tunnel.
+  bool is_planned(const robot::RobotOrder& order) const;
   bool is_stale(const std::string& tunnel) const;
   /// A plan once found stale stays stale.
   void found_stale(const std::string& tunnel, const Failure& why);

@@ -48,9 +48,8 @@ Expected<void> Operation::guide(const std::string& name, std::optional<double> o
     value_or_throw(gate_.check_registered(tunnel));
     notify_(Step::navigate, name);
     const PoseWindow window = look(record::Look::guide);
-    if (tunnel.of_model)
-      value_or_throw(check_error_at_tip(plan_, tunnel, *result_,
-                                        value_or_throw(poses_now(window, plan_.tracker)), tool()));
+    value_or_throw(check_error_at_tip(plan_, tunnel, *result_,
+                                      value_or_throw(poses_now(window, plan_.tracker)), tool()));
     record(record::Guide{name, oldest_pose_s, window});
     gate_.guide(value_or_throw(FreehandGuide::begin(plan_, value_or_throw(live_tool()), name,
                                                     value_or_throw(poses_now(window, plan_.tracker)),

@@ -114,26 +114,27 @@ double error_95_mm(const guidance::PropagatedPoint& end, const guidance::Tracker
   return localization::length_at_95(at_tip(end.point, end.total_covariance(noise), tool).covariance);
 }
 
-/// With the error that each cause alone would give.
+/// With the error that each cause alone would give. A tunnel is located by the X-ray images, or by the
+/// registration of its model to them.
 Failure too_uncertain(const OperationPlan& plan, const OperationTunnel& tunnel, const std::string& name,
                       guidance::PropagatedPoint end, const TrackedTool& tool) {
   const guidance::TrackerNoise noise = plan.tracker.noise();
   const TrackedTool exact{tool.marker_from_tip, tracker::PoseCovariance::Zero()};
-  const double all = error_95_mm(end, noise, tool), by_registration = error_95_mm(end, {}, exact);
+  const double all = error_95_mm(end, noise, tool), by_images = error_95_mm(end, {}, exact);
   end.covariance.setZero();
   const double by_tracker = error_95_mm(end, noise, exact), by_tool = error_95_mm(end, {}, tool);
-  return {
-      Reason::uncertain,
-      fmt::format("{}: the 95 % error of \"{}\" at the tool's tip is {:.3g} mm, over the limit of {:g} mm; "
-                  "by the registration alone {:.3g} mm, the tracker {:.3g} mm, the {} calibration {:.3g} mm",
-                  tunnel.name, name, all, plan.max_error_mm, by_registration, by_tracker,
-                  plan.drill ? "drill's" : "hand-eye", by_tool),
-      {},
-      {{"error_95_mm", all},
-       {"limit_mm", plan.max_error_mm},
-       {"registration_95_mm", by_registration},
-       {"tracker_95_mm", by_tracker},
-       {"tool_95_mm", by_tool}}};
+  return {Reason::uncertain,
+          fmt::format(
+              "{}: the 95 % error of \"{}\" at the tool's tip is {:.3g} mm, over the limit of {:g} mm; "
+              "by the {} alone {:.3g} mm, the tracker {:.3g} mm, the {} calibration {:.3g} mm",
+              tunnel.name, name, all, plan.max_error_mm, tunnel.of_model ? "registration" : "X-ray images",
+              by_images, by_tracker, plan.drill ? "drill's" : "hand-eye", by_tool),
+          {},
+          {{"error_95_mm", all},
+           {"limit_mm", plan.max_error_mm},
+           {tunnel.of_model ? "registration_95_mm" : "images_95_mm", by_images},
+           {"tracker_95_mm", by_tracker},
+           {"tool_95_mm", by_tool}}};
 }
 
 }  // namespace

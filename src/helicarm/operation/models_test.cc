@@ -61,5 +61,28 @@ TEST(ErrorAtTip, RefusalNamesTheWorseEndItsErrorTheLimitAndTheCauses) {
   EXPECT_GT(figure("tool_95_mm"), 0);
 }
 
+TEST(ErrorAtTip, OfAPickedTunnelIsLimitedToo) {
+  OperationPlan picked = plan();
+  picked.tunnels[0].of_model.reset();
+  const auto located = [](double sigma_mm) {
+    pipeline::Result result;
+    for (const char* name : {"ACL-1", "ACL-2"}) {
+      pipeline::PointResult point{
+          name, localization::PointSource::pick, "femur", {}, guidance::PointInFrames{}, 0, {}};
+      point.place->in_bones["femur"].propagated = {
+          {30, 5, 20}, sigma_mm * sigma_mm * Eigen::Matrix3d::Identity(), {}, {}};
+      result.points.push_back(point);
+    }
+    return result;
+  };
+  const TrackedTool tool = tracked_tool(*picked.drill);
+  EXPECT_TRUE(check_error_at_tip(picked, picked.tunnels[0], located(0.3), poses(), tool));
+  const auto refused = check_error_at_tip(picked, picked.tunnels[0], located(1.2), poses(), tool);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::uncertain);
+  EXPECT_THAT(refused.error().message, HasSubstr("by the X-ray images alone"));
+  EXPECT_GT(refused.error().figures.at("images_95_mm"), 2);
+}
+
 }  // namespace models_test
 }  // namespace helicarm::operation

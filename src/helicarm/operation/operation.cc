@@ -234,8 +234,9 @@ Expected<void> Operation::register_robot(const Confirm& confirm, const Again& ag
       pairs.push_back(*pair);
       notify_(Step::register_robot, fmt::format("pose {} of {}", pairs.size(), tour.size()));
     }
-    hand_eye_ = value_or_throw(tracker::calibrate_hand_eye(pairs));
-    record(record::HandEye{pairs, *hand_eye_});
+    const tracker::HandEye found = value_or_throw(tracker::calibrate_hand_eye(pairs));
+    record(record::HandEye{pairs, found});
+    hand_eye_ = found;
   });
 }
 
@@ -257,7 +258,7 @@ Expected<robot::RobotOrder> Operation::plan_order(const std::string& name) {
     notify_(Step::plan, name);
     const PoseWindow window = look(record::Look::plan);
     const guidance::Poses now = value_or_throw(poses_now(window, plan_.tracker));
-    if (tunnel.of_model) value_or_throw(check_error_at_tip(plan_, tunnel, *result_, now, tool()));
+    value_or_throw(check_error_at_tip(plan_, tunnel, *result_, now, tool()));
     const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
     PlanBasis basis = basis_of(tunnel, window, present);
     const TunnelInBone ends = value_or_throw(tunnel_in_bone(*result_, tunnel));

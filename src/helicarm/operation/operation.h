@@ -122,6 +122,8 @@ class Operation {
       const std::vector<ModelStart>& starts = {}, const std::function<void()>& check = [] {});
   /// The last registration of the present images, also a refused one.
   const std::optional<case_registration::CaseRegistration>& registration() const { return registration_; }
+  /// By `confirm_registration`, that registration.
+  bool is_confirmed() const { return gate_.is_confirmed(); }
   /// After a person has compared the outlines with the bones in the images. Refuses (usage) without a
   /// registration, and as the registration was refused.
   Expected<void> confirm_registration();
@@ -139,7 +141,8 @@ class Operation {
 
   /// The order that moves the tool to the tunnel, with its preview, also written as preview-TUNNEL-VIEW.png
   /// into the session's folder. Nothing moves. Refuses (usage) a bone whose check points were not touched
-  /// since the last order, and (plan_stale) a robot whose base or tool moved since registration.
+  /// since the last order, (plan_stale) a robot whose base or tool moved since registration, and (uncertain)
+  /// an end whose 95 % error at the tool's tip exceeds the plan's limit.
   Expected<robot::RobotOrder> plan_order(const std::string& tunnel);
   /// Whether this order may be carried out at the newest poses; poll it while the confirmation is open.
   /// Refuses as `PlanWatch::holds`, and (plan_stale) an order that is not the last plan to its tunnel. A plan
@@ -148,6 +151,8 @@ class Operation {
   /// Performs the same check from any thread, without a record. Refuses (usage) an order that was not
   /// planned.
   Expected<PlanWatch> plan_watch(const robot::RobotOrder& order) const;
+  /// Whether this order is the last plan to its tunnel.
+  bool is_planned(const robot::RobotOrder& order) const { return gate_.is_planned(order); }
   Expected<PathPreview> preview(const robot::RobotOrder& order) const;
 
   /// Follows the tool from any thread. Refuses (usage) before measurement and registration.
@@ -161,7 +166,9 @@ class Operation {
   /// After an order to this tunnel was refused or stopped: asks `again`, records that a new plan follows and
   /// unlocks the robot. Nothing moves before that plan is made and confirmed as the first one. Refuses with
   /// `why` itself if that is neither of poses (plan_stale, no_pose, stale_pose, pose_spread) nor late
-  /// (`is_late`) on a link that answers again within 2 s, after `most_replans`, and without consent.
+  /// (`is_late`) on a link that answers again within 2 s, after `most_replans`, and without consent. Refuses,
+  /// before `again` and after it, a robot that has stopped by itself (robot_stopped), a lost link
+  /// (not_connected), and any other stop since it asked, whatever `why` is; the record holds them.
   Expected<void> plan_again(const std::string& order, const Failure& why, const Again& again);
 
   /// Retreats along the tool's axis to the stand-off distance, then moves to the tool's initial pose
@@ -250,6 +257,10 @@ class Operation {
   PlanBasis basis_of(const OperationTunnel& tunnel, const PoseWindow& window,
                      const robot::RobotState& present) const;
   bool answers_again() const;
+  /// Records why no new plan follows, and throws it.
+  [[noreturn]] void halt(const std::string& order, const Failure& why);
+  /// As `halt`, after a stop of the robot itself or with a lost link.
+  void halt_if_no_plan_helps(const std::string& order, const robot::RobotLinkStatus& now);
 
   OperationPlan plan_;
   std::filesystem::path folder_;

@@ -55,10 +55,6 @@ void read_markers(JsonReader& reader, const std::vector<guidance::Bone>& bones, 
   JsonReader names = reader.object("markers");
   read(names);
   names.finish();
-  std::set<std::string> once{tracker.tool};
-  for (const auto& [bone, marker] : tracker.markers)
-    if (!once.insert(marker).second)
-      names.refuse(Reason::name_clash, bone.c_str(), fmt::format("\"{}\" is another body's marker", marker));
 }
 
 Json json_of_markers(const TrackerPlan& tracker) {
@@ -112,8 +108,38 @@ void complete(const JsonReader& reader, OperationTunnel& tunnel, const Operation
   tunnel.enter_at = line.enter_at;
 }
 
+namespace {
+
+/// A marker is on one body.
+void check_markers(const JsonReader& reader, const TrackerPlan& tracker) {
+  std::map<std::string, std::string> body_of;
+  const auto take = [&](const std::string& marker, const std::string& body) {
+    const auto [known, is_new] = body_of.emplace(marker, body);
+    if (!is_new)
+      reader.refuse(Reason::name_clash, "tracker",
+                    fmt::format("\"{}\" is the marker of {} and of {}", marker, known->second, body));
+  };
+  for (const auto& [bone, marker] : tracker.markers) take(marker, bone);
+  take(tracker.tool, "the tool");
+  for (const tracker::Facet& facet : tracker.facets) take(facet.name, "the calibrator");
+  if (tracker.pointer) take(tracker.pointer->name, "the pointer");
+}
+
+/// What no robot can carry out is refused before the first X-ray image.
+void check_robot(const JsonReader& reader, const RobotPlan& robot) {
+  value_or_throw(robot::robot_model(robot.model));
+  const robot::ApproachOptions& approach = robot.approach;
+  if (!(approach.stand_off_mm > approach.gap_mm))
+    reader.refuse(Reason::bad_value, "robot",
+                  fmt::format("\"stand_off_mm\" is {:g}, must be greater than \"gap_mm\", {:g}",
+                              approach.stand_off_mm, approach.gap_mm));
+}
+
+}  // namespace
+
 void check_plan(const JsonReader& reader, const OperationPlan& plan) {
-  if (!plan.drill) value_or_throw(robot::robot_model(plan.robot.model));
+  check_markers(reader, plan.tracker);
+  if (!plan.drill) check_robot(reader, plan.robot);
   if (!plan.drill && tracker::is_recording(plan.tracker.address))
     reader.refuse(Reason::bad_value, "tracker",
                   "\"address\" names a recording, which must not guide a robot: give a server's address");

@@ -130,7 +130,8 @@ tracker::TrackerAddress tracker_address(const OperationPlan& plan);
 /// Of the plan's measurements, with its limit.
 case_registration::RegisterOptions measuring_options(const OperationPlan& plan);
 
-/// Strict; fails as JsonReader and `picks_of`, and with name_clash for two tunnels or facets of one name.
+/// Strict; fails as JsonReader and `picks_of`, and with name_clash for two tunnels of one name and for two
+/// bodies with one marker.
 /// `folder`: of the models' files; that of `origin` unless given.
 Expected<OperationPlan> plan_from(const Json& json, const std::string& origin,
                                   const std::filesystem::path& folder = {});

@@ -18,6 +18,21 @@ bool is_of_the_plans_poses(const Failure& why) {
   return why.reason == Reason::plan_stale || is_of_a_reading(why);
 }
 
+/// Its own one, also where it is over: whoever is asked about another reason is not shown it.
+std::optional<Failure> stop_of_robot(const robot::RobotLinkStatus& now) {
+  if (!now.state) return std::nullopt;
+  if (const auto stopped = robot::why_stopped(*now.state)) return stopped;
+  const bool was_stopped = now.why && now.why->reason == Reason::robot_stopped;
+  return was_stopped ? now.why : std::nullopt;
+}
+
+/// What no new plan removes, also behind an earlier reason.
+std::optional<Failure> why_no_plan_helps(const robot::RobotLinkStatus& now) {
+  if (!now.state || now.phase == robot::LinkPhase::disconnected || now.phase == robot::LinkPhase::idle)
+    return Failure{Reason::not_connected, "the connection to the robot was lost"};
+  return stop_of_robot(now);
+}
+
 }  // namespace
 
 bool is_of_a_reading(const Failure& why) {
@@ -43,14 +58,29 @@ bool Operation::answers_again() const {
   return false;
 }
 
+void Operation::halt(const std::string& order, const Failure& why) {
+  record(record::Halted{order, std::string(code(why.reason)), why.message, why.figures});
+  throw BadInput(why);
+}
+
+void Operation::halt_if_no_plan_helps(const std::string& order, const robot::RobotLinkStatus& now) {
+  if (const auto why = why_no_plan_helps(now)) halt(order, *why);
+}
+
 Expected<void> Operation::plan_again(const std::string& order, const Failure& why, const Again& again) {
   return guarded([&] {
     int& replans = replans_[order];
-    const bool may = replans < most_replans && (is_of_the_plans_poses(why) || is_late(why));
-    if (!may || !(answers_again() || is_of_the_plans_poses(why)) || !again(why)) throw BadInput(why);
+    if (replans >= most_replans || !(is_of_the_plans_poses(why) || is_late(why))) throw BadInput(why);
+    const bool may_ask = answers_again() || is_of_the_plans_poses(why);
+    const robot::RobotLinkStatus shown = robot().status();
+    if (!may_ask && !stop_of_robot(shown)) throw BadInput(why);
+    halt_if_no_plan_helps(order, shown);
+    if (!again(why)) throw BadInput(why);
     answers_again();  // a person may have taken minutes; the unlock needs a fresh state
+    halt_if_no_plan_helps(order, robot().status());
     record(record::Replanned{order, ++replans, std::string(code(why.reason)), who_});
-    value_or_throw(robot().unlock(who_));
+    const auto unlocked = robot().unlock(who_, shown);
+    if (!unlocked) halt(order, unlocked.error());
   });
 }
 

@@ -66,7 +66,8 @@ void describe_tracker(Codec& codec, Tracker& tracker, const std::vector<guidance
   codec.custom(
       "markers", false, {{"type", "object"}},
       "`{\"L4\": \"name\", ..., \"tool\": \"name\"}`: the names of the bones' and the tool's markers in the "
-      "tracker's messages; of `/1` the keys `femur`, `tibia` and `tool` beside this one",
+      "tracker's messages; no name is also that of another body, a facet or the pointer; of `/1` the keys "
+      "`femur`, `tibia` and `tool` beside this one",
       [&](JsonReader& reader) {
         if constexpr (!std::is_const_v<Tracker>) read_markers(reader, bones, tracker);
       },
@@ -115,7 +116,7 @@ void describe_robot(Codec& codec, Robot& robot) {
   codec.integer("script_port", robot.script_port, 1, most_port, "of its programs");
   describe_pose(codec, "flange_from_tcp", robot.tool.flange_from_tcp, written_pose,
                 "pose of the tool, with its origin at the tip and z pointing out of it, mm");
-  codec.number("payload_kg", robot.tool.payload_kg, {0, 20}, "its mass");
+  codec.number("payload_kg", robot.tool.payload_kg, {0, robot::RobotLimits{}.heaviest_kg}, "its mass");
   codec.required_object("approach", robot.approach, "to a tunnel",
                         [](auto& inner, auto& approach) { describe_approach(inner, approach); });
 }

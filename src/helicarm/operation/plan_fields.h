@@ -76,7 +76,8 @@ inline constexpr std::array<Field<OperationPlan>, 17> plan_fields{
          .label = "Stand-off",
          .unit = "mm",
          .range = {1, 500},
-         .help = "Distance before the tunnel's start at which the tip reaches its axis"}),
+         .help =
+             "Distance before the tunnel's start at which the tip reaches its axis; greater than the gap"}),
     bound<&OperationPlan::robot, &RobotPlan::approach, &robot::ApproachOptions::gap_mm>(
         {.name = "gap_mm",
          .label = "Gap before the tunnel",

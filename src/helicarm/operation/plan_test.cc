@@ -94,6 +94,50 @@ TEST(Plan, OptionsOfEarlierPlansAreTheUsualOnes) {
   EXPECT_FALSE(read->measuring.run.history);
 }
 
+TEST(Plan, AMarkerIsOnOneBodyOnly) {
+  const auto refused = [](const std::function<void(OperationPlan&)>& change) {
+    OperationPlan contradictory = plan();
+    contradictory.tracker.pointer = Pointer{"pointer", {0, 0, 100}};
+    EXPECT_TRUE(plan_from(to_json(contradictory), "plan.json"));
+    change(contradictory);
+    const auto read = plan_from(to_json(contradictory), "plan.json");
+    return read ? Reason::usage : read.error().reason;
+  };
+  EXPECT_EQ(refused([](OperationPlan& p) { p.tracker.markers["tibia"] = "femur"; }), Reason::name_clash);
+  EXPECT_EQ(refused([](OperationPlan& p) { p.tracker.tool = "tibia"; }), Reason::name_clash);
+  EXPECT_EQ(refused([](OperationPlan& p) { p.tracker.facets[0].name = "femur"; }), Reason::name_clash);
+  EXPECT_EQ(refused([](OperationPlan& p) { p.tracker.facets[0].name = "tool"; }), Reason::name_clash);
+  EXPECT_EQ(refused([](OperationPlan& p) { p.tracker.pointer->name = "femur"; }), Reason::name_clash);
+  EXPECT_EQ(refused([](OperationPlan& p) { p.tracker.pointer->name = "tool"; }), Reason::name_clash);
+  EXPECT_EQ(refused([](OperationPlan& p) { p.tracker.pointer->name = "calibrator/1"; }), Reason::name_clash);
+}
+
+TEST(Plan, AMarkerOfAPlanOfVersion1IsOnOneBodyOnly) {
+  Json json = to_json(plan());
+  json["format"] = "helicarm-plan/1";
+  json["tracker"].erase("markers");
+  json["tracker"].update({{"femur", "F"}, {"tibia", "T"}, {"tool", "D"}});
+  EXPECT_TRUE(plan_from(json, "plan.json"));
+  json["tracker"]["tibia"] = "F";
+  const auto refused = plan_from(json, "plan.json");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::name_clash);
+  EXPECT_THAT(refused.error().message, testing::HasSubstr("\"F\" is the marker of femur and of tibia"));
+}
+
+TEST(Plan, WhatTheRobotCannotCarryOutIsRefused) {
+  OperationPlan approach = plan();
+  approach.robot.approach.stand_off_mm = approach.robot.approach.gap_mm = 20;
+  const auto refused = plan_from(to_json(approach), "plan.json");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::bad_value);
+  EXPECT_THAT(refused.error().message,
+              testing::AllOf(testing::HasSubstr("stand_off_mm"), testing::HasSubstr("gap_mm")));
+  OperationPlan heavy = plan();
+  heavy.robot.tool.payload_kg = 5.1;
+  EXPECT_EQ(plan_from(to_json(heavy), "plan.json").error().reason, Reason::bad_value);
+}
+
 TEST(Plan, HandHeldDrillTakesThePlaceOfTheRobot) {
   OperationPlan freehand = plan();
   freehand.drill = HandDrill{{1, -140, 3}, {2, -20, 5}, 0.15, 1.5, 3};
@@ -250,7 +294,7 @@ TEST_F(PlanOfBones, OtherKeysOfTheTrackerAreNoMarkers) {
 
 TEST_F(PlanOfBones, OneMarkerOfTwoBonesIsRefused) {
   json_["tracker"]["markers"]["L5"] = "a";
-  EXPECT_THAT(refusal(), testing::HasSubstr("\"a\" is another body's marker"));
+  EXPECT_THAT(refusal(), testing::HasSubstr("\"a\" is the marker of L4 and of L5"));
 }
 
 TEST(Plan, FacetThatIsNotARigidMotionIsRefused) {

@@ -79,6 +79,9 @@ class Replay {
   void differ(const std::string& origin, const std::string& difference) {
     report.differences.push_back(origin + ": " + difference);
   }
+  void note(const std::string& origin, const std::string& note) {
+    report.notes.push_back(origin + ": " + note);
+  }
   void compare(const Json& then, const Json& now, const std::string& origin, const char* what) {
     if (then != now)
       differ(origin, fmt::format("the {} differs from the recorded value on recomputation{}", what,
@@ -173,6 +176,10 @@ class Replay {
     });
     if (!derived) return differ(origin, fmt::format("{}: {}", name, derived.error().message));
     earlier_ = is_of_earlier_version(recorded);
+    if (earlier_)
+      note(origin, fmt::format("{} is of helicarm-case/1: it and its result are compared by the keys they "
+                               "hold, numbers to 1e-9",
+                               name));
     derived_ = earlier_ ? as_read_earlier(*derived) : *derived;
     const Json now_written = pipeline::to_json(*derived);
     compare(case_in_present_form(recorded, now_written, plan_), now_written, origin, "case");
@@ -255,8 +262,11 @@ class Replay {
     auto now = register_models(plan_, *measured_, *measurement_, {}, record.starts);
     if (!now) return differ(origin, now.error().message);
     registered_digest_ = record.digest;
-    registration_ = as_recorded(*now, record.digest);
-    if (registration_) return;
+    if (auto as_then = as_recorded(*now, record.digest)) {
+      registration_ = std::move(as_then->registration);
+      if (as_then->note) note(origin, *as_then->note);
+      return;
+    }
     registration_ = *std::move(now);
     differ(origin, "the registration differs from the recorded one on recomputation");
   }
@@ -289,9 +299,17 @@ class Replay {
     ++report.decisions;
     if (!guide_) return differ(origin, "a decision before guidance began");
     if (!result_) return differ(origin, "a decision on images that had been replaced");
-    const bool states_causes = !then.guidance.aim || then.guidance.aim->errors;
-    const record::Guided now{then.tunnel, then.window, guide_->at(then.window, states_causes)};
-    compare(content_of(then), content_of(now), origin, "decision");
+    GuidanceForm form{.states_causes = !then.guidance.aim || then.guidance.aim->errors};
+    const auto now = [&] {
+      return content_of(record::Guided{then.tunnel, then.window, guide_->at(then.window, form)});
+    };
+    const Json recorded = content_of(then), at_present = now();
+    form.counts_poses = false;
+    if (recorded != at_present && recorded == now())
+      note(origin,
+           "the decision is as earlier versions made it: on too few poses for a mean and its scatter");
+    else
+      compare(recorded, at_present, origin, "decision");
     decision_ = then.guidance.decision();
   }
 

@@ -38,10 +38,14 @@ struct ReplayReport {
   std::size_t outcomes = 0;
   std::size_t files = 0;                 ///< compared with their recorded digests
   std::vector<std::string> differences;  ///< what differs from the record, or from what it implies
+  std::vector<std::string> notes;        ///< what is equal in the form of an earlier version alone
 
   /// Whether the record has its end and nothing differs.
   bool complete() const { return finished && !torn && differences.empty(); }
 };
+
+/// The report as the program and the Python package state it.
+Json to_json(const ReplayReport& report);
 
 /// Whether the operation took the recorded image, as its poses say: what was measured by earlier images
 /// ended. A refused one, without the pose of a tunnel's bone, changes nothing.

@@ -143,6 +143,12 @@ Expected<SeenPose> see_tool(const PoseWindow& window, const TrackerPlan& plan, c
       .map_error([&](const Failure& failure) { return named(failure, tool); });
 }
 
+bool is_seen_at_end(const PoseWindow& window, const std::string& marker) {
+  const auto samples = window.samples.find(marker);
+  return samples != window.samples.end() && !samples->second.empty() &&
+         window.middle_s + window.half_s - samples->second.back().time_s <= longest_gap_s;
+}
+
 Expected<SeenPose> see_calibrator(const PoseWindow& window, const TrackerPlan& plan) {
   std::vector<tracker::FacetPose> seen;
   std::optional<Failure> why_not;

@@ -40,6 +40,9 @@ struct SeenPose {
 /// Refuses as `exposure_pose`: not visible, visible only in part of the window, moved.
 Expected<SeenPose> see_tool(const PoseWindow& window, const TrackerPlan& plan, const std::string& tool);
 
+/// Whether a marker was seen until the window's end, but for the gap that `see_tool` allows.
+bool is_seen_at_end(const PoseWindow& window, const std::string& marker);
+
 /// From the visible facets. Refuses as `fuse_facets`, and if a facet moved.
 Expected<SeenPose> see_calibrator(const PoseWindow& window, const TrackerPlan& plan);
 

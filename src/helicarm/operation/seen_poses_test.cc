@@ -51,6 +51,15 @@ TEST(SeenPoses, ToolCovarianceIncludesSystematicError) {
   EXPECT_GT(seen.covariance(0, 0), 0.1 * 0.1);
 }
 
+TEST(SeenPoses, AMarkerThatVanishesIsNotSeenAtTheEnd) {
+  PoseWindow seen = window();
+  EXPECT_TRUE(is_seen_at_end(seen, "femur"));
+  EXPECT_FALSE(is_seen_at_end(seen, "tibia"));
+  EXPECT_FALSE(is_seen_at_end(seen, "unknown"));
+  seen.samples["femur"].resize(25);  // the last one 0.3 s before the end
+  EXPECT_FALSE(is_seen_at_end(seen, "femur"));
+}
+
 TEST(SeenPoses, CalibratorPoseIsFusedFromItsFacets) {
   const SeenPose seen = see_calibrator(window(), plan()).value();
   EXPECT_LT((seen.tracker_from_marker.translation - at_rest.translation).norm(), 0.15);

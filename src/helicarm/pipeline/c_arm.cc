@@ -67,7 +67,10 @@ Expected<calibration::CArmModel> model_of_record(const calibration::CArmHistory&
         Reason::too_few_views,
         fmt::format("{}: holds no acquisition beside these; add cases with `helicarm c-arm add`", origin));
   std::vector<double> focal_mm;
-  for (const calibration::HistoryEntry& entry : record.entries) focal_mm.push_back(entry.estimate_mm.x());
+  for (const calibration::HistoryEntry& entry : record.entries)
+    if (entry.nominal_focal_mm) focal_mm.push_back(*entry.nominal_focal_mm);
+  if (focal_mm.empty())
+    for (const calibration::HistoryEntry& entry : record.entries) focal_mm.push_back(entry.estimate_mm.x());
   calibration::CArmModel model =
       calibration::c_arm_model(record.entries, {median(std::move(focal_mm)), 0, 0}, unknown_c_arm());
   model.runs = record.runs;

@@ -19,7 +19,8 @@ using LabelledViews = std::vector<LabelledView>;
 
 /// The prior of these views from a C-arm history, without entries of these images.
 Expected<calibration::LearnedIntrinsics> prior_from_history(const LabelledViews& views,
-                                                            const calibration::CArmHistory& history) {
+                                                            const calibration::CArmHistory& history,
+                                                            const std::string& calibrator) {
   const geometry::IntrinsicsPrior nominal = fiducials_of(views.front()).prior;
   for (const LabelledView& view : views)
     if (!fiducials_of(view).prior.focal_px)
@@ -34,7 +35,8 @@ Expected<calibration::LearnedIntrinsics> prior_from_history(const LabelledViews&
                            return view.xray_image->acquisition.instance_key == entry.image;
                          });
                        });
-  return calibration::learn_intrinsics(earlier, {*nominal.focal_px / nominal.unit_px, 0, 0}, unknown_c_arm());
+  return calibration::learn_intrinsics(earlier, {*nominal.focal_px / nominal.unit_px, 0, 0}, unknown_c_arm(),
+                                       calibrator);
 }
 
 /// What each view says of the C-arm alone, for a history; views that determine nothing alone are left out.
@@ -55,10 +57,10 @@ std::vector<calibration::HistoryEntry> entries_of(const LabelledViews& views,
 }
 
 /// Entries of these views for the C-arm history; none if their residuals are inconsistent with the noise
-/// model.
+/// model or with the calibrator's file.
 std::vector<calibration::HistoryEntry> new_entries(const CaseCalibration& calibration,
                                                    const calibration::CommonPrior& common) {
-  if (calibration.variance_scale != 1 ||
+  if (calibration.variance_scale != 1 || calibration.contradicts_calibrator ||
       std::ranges::any_of(calibration.images, [](const LabelledView& view) {
         return view.rectification.source == rectification::MapSource::record;  // it told this itself
       }))
@@ -122,16 +124,16 @@ Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& the
   std::optional<calibration::LearnedIntrinsics> history;
   std::optional<Warning> change;
   if (options.history) {
-    const auto prior = prior_from_history(views, *options.history);
+    const auto prior = prior_from_history(views, *options.history, calibration_options.common.calibrator);
     if (!prior) return tl::unexpected<Failure>(prior.error());
     change = contradiction_of(views, fiducials, *options.history, calibration_options.common);
     if (!change) history = *prior;
   }
   if (history) {
-    calibration_options.common.c_arm = history->prior;
+    calibration_options.common.c_arm = history->of_calibrator.prior;
     for (std::size_t i = 0; i < views.size(); ++i)
-      fiducials[i].prior =
-          calibration::learned_prior(fiducials[i].prior, *history, views[i].fiducials.mirrored);
+      fiducials[i].prior = calibration::learned_prior(fiducials[i].prior, history->of_calibrator.mm,
+                                                      views[i].fiducials.mirrored);
   }
   return (options.method == rectification::Method::paper
               ? calibration::calibrate_paper(fiducials, calibration_options)

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "helicarm/pipeline/case_description.h"
@@ -60,6 +61,15 @@ TEST(CaseModel, ACaseWithModelsAndLinesIsWrittenAsItIsRead) {
   EXPECT_EQ(to_json(*again), written);
   EXPECT_EQ(again->models[0].landmarks, "/case/points.csv");
   EXPECT_EQ(again->model_tunnels[0].line, "ACL");
+}
+
+TEST(CaseModel, TheVoxelsOfATiffStackAreNoneOfASurface) {
+  for (const char* key : {R"("voxel_mm": [1, 1, 1])", R"("tiff_offset_hu": -1024)"}) {
+    const auto read =
+        registration_case(fmt::format(R"(, "models": [{{"name": "femur", "surface": "f.stl", {}}}])", key));
+    ASSERT_FALSE(read);
+    EXPECT_NE(read.error().message.find("needs a \"volume\""), std::string::npos) << read.error().message;
+  }
 }
 
 TEST(CaseModel, TheLabelOfAMaskIsReadAndWritten) {

@@ -157,6 +157,8 @@ void describe_model(Codec& codec, Model& model, const std::filesystem::path& fol
     if (model.window_hu && !(model.window_hu->x() < model.window_hu->y()))
       refuse("window_hu", "must be two increasing numbers");
     if (model.window_hu && !model.volume) refuse("window_hu", "needs a \"volume\"");
+    if (model.voxel_mm && !model.volume) refuse("voxel_mm", "needs a \"volume\"");
+    if (model.tiff_offset_hu != 0 && !model.volume) refuse("tiff_offset_hu", "needs a \"volume\"");
     if (!model.volume && !model.surface && !model.landmarks)
       refuse("volume", "is missing: a model needs a volume, a surface or landmarks");
   });

@@ -182,11 +182,14 @@ template <class Output>
 void describe_machine(Output& output, const std::optional<calibration::LearnedIntrinsics>& history) {
   const calibration::IntrinsicsVariation none{};
   output.value(
-      "focal_mm", [&] { return history->mean_mm.x(); }, "distance of source and receiver");
+      "focal_mm", [&] { return history->mean_mm().x(); },
+      "distance of source and receiver, in the first view");
   output.value(
-      "principal_mm", [&]() -> Eigen::Vector2d { return history->mean_mm.tail<2>(); }, "principal point");
-  describe_variation(output, "focal_sigma", history ? *history->prior.focal : none, "standard deviations");
-  describe_variation(output, "principal_sigma", history ? *history->prior.principal : none, "likewise");
+      "principal_mm", [&]() -> Eigen::Vector2d { return history->mean_mm().tail<2>(); }, "principal point");
+  describe_variation(output, "focal_sigma", history ? *history->deviation.prior.focal : none,
+                     "standard deviations");
+  describe_variation(output, "principal_sigma", history ? *history->deviation.prior.principal : none,
+                     "likewise");
 }
 
 template <class Output>

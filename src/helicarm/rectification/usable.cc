@@ -13,8 +13,9 @@ constexpr double least_range = 0.01;    // of block means, relative to the grey 
 constexpr double most_saturated = 0.9;  // of the field
 
 /// Means of 16 x 16 pixel blocks: averages noise, keeps structure.
+constexpr int side = 16;  // of a block
+
 std::vector<float> block_means(const image::Image<float>& image) {
-  constexpr int side = 16;
   std::vector<float> means;
   for (int v = 0; v + side <= image.height(); v += side)
     for (int u = 0; u + side <= image.width(); u += side) {
@@ -42,8 +43,9 @@ double saturated_share(const xray::XrayImage& xray_image) {
 Expected<void> check_usable(const xray::XrayImage& xray_image) {
   std::vector<float> means = block_means(xray_image.pixels);
   if (means.size() < 9)
-    return fail(Reason::bad_size, fmt::format("{} x {} pixels are too few for a calibrator",
-                                              xray_image.pixels.width(), xray_image.pixels.height()));
+    return fail(Reason::bad_size,
+                fmt::format("{} x {} pixels are too few for a calibrator, at least {} x {} are needed",
+                            xray_image.pixels.width(), xray_image.pixels.height(), 3 * side, 3 * side));
   std::sort(means.begin(), means.end());
   const double share = saturated_share(xray_image);
   if (share > most_saturated && means.back() > xray_image.lowest)

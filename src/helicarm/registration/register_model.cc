@@ -183,6 +183,7 @@ struct Search {
 };
 
 constexpr double share_of_poses = 0.5;  // of a search anywhere: the poses from which it begins
+constexpr double share_of_search = 0.8, share_of_first = 0.6;  // the mirror image, wider searches follow
 
 /// All positions in these orientations, and some poses besides.
 struct Everywhere {
@@ -242,6 +243,11 @@ Warning cameras_without_covariance(const std::string& name) {
 
 namespace {
 
+RegistrationOptions with_part(RegistrationOptions options, double begin, double end) {
+  options.search.share = part_of(std::move(options.search.share), begin, end);
+  return options;
+}
+
 /// Which poses are searched: those about some, or all.
 using Searched = std::variant<Poses, Everywhere>;
 
@@ -257,9 +263,9 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
   RegistrationProblem scene(model, views, options.threads);
   const auto* from = std::get_if<Poses>(&searched);
   step(from ? "search" : "search anywhere");
-  const auto [stages, found] = from
-                                   ? searched_about(scene, *from, options.search)
-                                   : searched_anywhere(scene, std::get<Everywhere>(searched), options.search);
+  const SearchOptions of_search = with_part(options, 0, share_of_search).search;
+  const auto [stages, found] = from ? searched_about(scene, *from, of_search)
+                                    : searched_anywhere(scene, std::get<Everywhere>(searched), of_search);
   const Estimate& best = found.solutions.front();
   Registration result;
   result.name = model.name;
@@ -302,7 +308,8 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
     result.notes.push_back(depth_from_scale(views.front(), by_size, result));
   if (options.search.candidates > 0) {
     step("mirror image");
-    result.mirrored_ratio = mirrored_cost_ratio(scene, best, stages, options.search, same_mm);
+    result.mirrored_ratio =
+        mirrored_cost_ratio(scene, best, stages, with_part(options, share_of_search, 1).search, same_mm);
   }
   if (cameras.isZero(0)) result.warnings.push_back(cameras_without_covariance(model.name));
   decide(model, starts, options, result);
@@ -314,13 +321,16 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
 /// about the poses that they found, or near to other orientations.
 Registration registered_anywhere(const Model& model, const std::vector<RegistrationView>& views,
                                  const Poses& starts, const RegistrationOptions& options) {
-  Registration found = registered(model, views, starts, options, Everywhere{Orientations::first}, true);
+  Registration found = registered(model, views, starts, with_part(options, 0, share_of_first),
+                                  Everywhere{Orientations::first}, true);
   if (views.size() < 2 || options.search.candidates == 0 || !may_have_missed(found)) return found;
   Poses about{found.world_from_model};
   for (const Alternative& other : found.alternatives) about.push_back(other.world_from_model);
   // What was found goes with the other orientations: a pose almost as good stays known.
+  RegistrationOptions rest = with_part(options, share_of_first, 1);
   for (const Searched& searched : {Searched(about), Searched(Everywhere{Orientations::between, about})}) {
-    Registration again = registered(model, views, starts, options, searched, true);
+    Registration again = registered(model, views, starts, with_part(rest, 0, 0.5), searched, true);
+    rest = with_part(rest, 0.5, 1);
     again.seconds += found.seconds;
     if (is_confirmed(model, again)) return again;
     found.seconds = again.seconds;
@@ -332,11 +342,12 @@ Registration registered_or_refused(const Model& model, const std::vector<Registr
                                    const std::vector<RigidTransform>& starts,
                                    const RegistrationOptions& options) {
   if (starts.empty()) return registered_anywhere(model, views, starts, options);
-  Registration result = registered(model, views, starts, options, starts, false);
-  if (views.size() < 2 || options.search.candidates == 0 || !options.search.anywhere_after_refusal ||
-      !may_have_missed(result))
-    return result;
-  Registration wider = registered_anywhere(model, views, starts, options);
+  const bool may_widen =
+      views.size() > 1 && options.search.candidates > 0 && options.search.anywhere_after_refusal;
+  Registration result =
+      registered(model, views, starts, with_part(options, 0, may_widen ? share_of_first : 1), starts, false);
+  if (!may_widen || !may_have_missed(result)) return result;
+  Registration wider = registered_anywhere(model, views, starts, with_part(options, share_of_first, 1));
   wider.seconds += result.seconds;
   if (wider.failure) {
     result.seconds = wider.seconds;
@@ -367,6 +378,7 @@ Registration registered_part(const Model& part, const std::vector<RegistrationVi
 Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
                             const std::vector<RigidTransform>& starts, const RegistrationOptions& options) {
   Registration result = registered_or_refused(model, views, starts, options);
+  if (options.search.share) options.search.share(1);
   const auto begun = std::chrono::steady_clock::now();
   RegisterPart register_part;
   if (options.names_causes && options.search.candidates > 0)

@@ -22,7 +22,7 @@ struct SearchOptions {
   double turn_deg = 15;
   int candidates = 600;                  ///< scored at the first level; 0: the starts alone are refined
   std::function<void()> interrupt = {};  ///< called often, from any thread: its exception ends the search
-  TellShare share = {};                  ///< of a search
+  TellShare share = {};                  ///< of a search, or of the whole registration
   /// After a refusal in two views or more every orientation and position is searched (`poses_anywhere`).
   bool anywhere_after_refusal = true;
 };

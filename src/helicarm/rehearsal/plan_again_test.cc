@@ -6,6 +6,7 @@
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/operation/replay.h"
+#include "helicarm/operation/session_log.h"
 #include "helicarm/rehearsal/rehearse.h"
 #include "helicarm/virtual_devices/any_ports_test.h"
 
@@ -29,7 +30,7 @@ class PlanAgain : public testing::Test {
         operation::Operation::begin(plan_, folder_.path() / "session", devices_->board(), robot()).value();
     ASSERT_TRUE(robot().wait_connected(20s));
     wait_for_tool();
-    ASSERT_TRUE(robot().unlock("tester"));
+    ASSERT_TRUE(robot().unlock("tester", robot().status()));
   }
   robot::RobotLink& robot() { return devices_->robot(); }
   robot::Joints joints() { return virtual_or_->robot().truth().state.joints; }
@@ -48,6 +49,22 @@ class PlanAgain : public testing::Test {
   Expected<std::string> hides_at_the_second(const robot::RobotOrder& order) {
     if (++confirmed_ == 2) hide_tool(true);
     return robot().confirm(order);
+  }
+
+  void protect() {
+    const auto stops = robot().status().stops;
+    virtual_or_->robot().set(RobotFault::protective_stop);
+    for (int i = 0; i < 2000 && robot().status().stops == stops; ++i) std::this_thread::sleep_for(10ms);
+  }
+  /// Also by the record.
+  void expect_still_protected() {
+    EXPECT_EQ(virtual_or_->robot().truth().state.safety_mode, robot::SafetyMode::protective_stop);
+    EXPECT_EQ(robot().status().phase, robot::LinkPhase::stopped);
+    operation_.reset();
+    const auto records = operation::read_session(folder_.path() / "session" / "session.log").value().records;
+    EXPECT_EQ(records.back().kind, "halted");
+    EXPECT_EQ(records.back().content.at("why"), "robot_stopped");
+    EXPECT_TRUE(std::ranges::none_of(records, [](const auto& record) { return record.kind == "replanned"; }));
   }
 
   void expect_end_by(RobotFault fault) {
@@ -152,6 +169,52 @@ TEST_F(PlanAgain, NumberOfPlansIsLimited) {
 TEST_F(PlanAgain, EmergencyStopEndsIt) { expect_end_by(RobotFault::emergency_stop); }
 
 TEST_F(PlanAgain, CutCableEndsIt) { expect_end_by(RobotFault::cut_cable); }
+
+TEST_F(PlanAgain, LostLinkBehindAStalePlanEndsItWithoutAQuestion) {
+  virtual_or_->robot().set(RobotFault::cut_cable);
+  for (int i = 0; i < 2000 && robot().status().state; ++i) std::this_thread::sleep_for(10ms);
+  const auto again =
+      operation_->plan_again("femur", {Reason::plan_stale, "femur moved"}, [&](const Failure&) {
+        ADD_FAILURE() << "asked";
+        return true;
+      });
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().reason, Reason::not_connected);
+}
+
+TEST_F(PlanAgain, ProtectiveStopBehindAnotherReasonEndsItWithoutAQuestion) {
+  protect();
+  const auto again =
+      operation_->plan_again("femur", {Reason::plan_stale, "femur moved"}, [&](const Failure&) {
+        ADD_FAILURE() << "asked";
+        return true;
+      });
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().reason, Reason::robot_stopped) << again.error().message;
+  expect_still_protected();
+}
+
+TEST_F(PlanAgain, ProtectiveStopWhileThePersonIsAskedIsNotReleased) {
+  const auto again =
+      operation_->plan_again("femur", {Reason::plan_stale, "femur moved"}, [&](const Failure&) {
+        ++asked_;
+        protect();
+        return true;
+      });
+  EXPECT_EQ(asked_, 1);
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().reason, Reason::robot_stopped) << again.error().message;
+  expect_still_protected();
+}
+
+TEST_F(PlanAgain, StopWhileThePersonIsAskedLocksTheRobot) {
+  const auto again = operation_->plan_again("femur", {Reason::no_pose, "femur: hidden"}, [&](const Failure&) {
+    robot().stop();
+    return true;
+  });
+  EXPECT_FALSE(again);
+  EXPECT_EQ(robot().status().phase, robot::LinkPhase::stopped);
+}
 
 TEST(IsLate, JumpOfTheRobotsClockIsNone) {
   EXPECT_TRUE(operation::is_late({Reason::stale_state, "no robot state received"}));

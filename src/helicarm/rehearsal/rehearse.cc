@@ -249,7 +249,7 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
       return robot.confirm(order);
     };
     value_or_throw(robot.wait_connected(patience));
-    value_or_throw(robot.unlock("the rehearsal"));
+    value_or_throw(robot.unlock("the rehearsal", robot.status()));
     Rehearsal done{seed, {}};
     const auto again = [&](const Failure& why) {
       return options.plans_again && operation::is_late(why) && ++done.replans > 0;

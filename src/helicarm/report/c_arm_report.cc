@@ -88,7 +88,9 @@ std::vector<Chart> charts_of(const CArmModel& model) {
       below.points.push_back({*at[i].primary_deg, predicted.mean_mm[k] - width});
     }
     for (const calibration::HistoryEntry& entry : model.entries)
-      if (entry.primary_deg) seen.points.push_back({*entry.primary_deg, entry.estimate_mm[axis]});
+      if (entry.primary_deg)
+        seen.points.push_back(
+            {*entry.primary_deg, model.nominal_mm[axis] + entry.deviation_from(model.nominal_mm)[axis]});
     Chart chart{intrinsic_titles[std::size_t(axis)], "primary angle, degrees", "mm"};
     chart.series = {std::move(middle), std::move(above), std::move(below), std::move(seen)};
     chart.note = "at a secondary angle of 0 degrees";
@@ -211,6 +213,11 @@ std::string c_arm_report_pdf(const CArmFindings& findings) {
   return pdf.bytes();
 }
 
+void forget_c_arm_report(const std::filesystem::path& folder) {
+  forget_files(folder,
+               {"report.html", "report.pdf", "c_arm.csv", "c_arm_maps.csv", "c_arm_runs.csv", "c_arm.svg"});
+}
+
 Expected<void> write_c_arm_report(const CArmFindings& findings, const std::filesystem::path& folder) {
   std::map<std::string, std::string> files{{"c_arm.csv", c_arm_csv(findings.left_out)},
                                            {"report.pdf", c_arm_report_pdf(findings)},
@@ -219,8 +226,7 @@ Expected<void> write_c_arm_report(const CArmFindings& findings, const std::files
     files["c_arm.svg"] = chart_svg(charts);
   if (findings.maps > 0) files["c_arm_maps.csv"] = c_arm_map_csv(findings.left_out_maps);
   if (!findings.model.runs.empty()) files["c_arm_runs.csv"] = c_arm_run_csv(findings.model.runs);
-  forget_files(folder,
-               {"report.html", "report.pdf", "c_arm.csv", "c_arm_maps.csv", "c_arm_runs.csv", "c_arm.svg"});
+  forget_c_arm_report(folder);
   return guarded([&] {
     for (const auto& [name, content] : files) value_or_throw(write_file(folder / name, content));
   });

@@ -24,6 +24,9 @@ std::string c_arm_report_html(const CArmFindings& findings);
 /// The same as PDF, with lines for date and signature.
 std::string c_arm_report_pdf(const CArmFindings& findings);
 
+/// Removes the files of an earlier report from `folder`.
+void forget_c_arm_report(const std::filesystem::path& folder);
+
 /// Writes report.html, report.pdf, c_arm.csv, c_arm.svg and, of distortion maps and runs, c_arm_maps.csv and
 /// c_arm_runs.csv into `folder`, without files of an earlier report.
 Expected<void> write_c_arm_report(const CArmFindings& findings, const std::filesystem::path& folder);

@@ -151,7 +151,7 @@ Files files_of(const pipeline::Result& result, std::span<const Export> kinds) {
   const exchange::RunGeometry run = run_geometry(calibrated);
   if (wanted(Export::tigre)) add("views_tigre.json", value_or_throw(exchange::tigre_geometry(run)));
   if (wanted(Export::astra)) add("views_astra.txt", exchange::astra_vectors(run));
-  if (wanted(Export::leap)) add("views_leap.json", exchange::leap_modular(run));
+  if (wanted(Export::leap)) add("views_leap.json", value_or_throw(exchange::leap_modular(run)));
   if (wanted(Export::diffdrr)) add("views_diffdrr.json", value_or_throw(exchange::diffdrr_cameras(run)));
   if (wanted(Export::deepdrr)) add("views_deepdrr.json", exchange::deepdrr_cameras(run));
   if (wanted(Export::ompl)) add("views_matrices.ompl", exchange::ompl_matrices(run));
@@ -280,6 +280,20 @@ Expected<std::map<std::size_t, xray::ObjectSpacing>> spacings_at(const pipeline:
     }
     return spacings;
   });
+}
+
+std::string one_pixel_size_note(const pipeline::Result& result, std::span<const Export> kinds) {
+  constexpr double least_px = 0.01;
+  const auto has_one_size = [](Export kind) { return kind == Export::tigre || kind == Export::leap; };
+  if (std::ranges::none_of(kinds, has_one_size)) return {};
+  std::vector<const pipeline::ViewResult*> calibrated;
+  for (const pipeline::ViewResult& view : result.views)
+    if (view.calibrated && view.xray_image) calibrated.push_back(&view);
+  if (calibrated.empty()) return {};
+  const double error = exchange::one_shape_error_px(run_geometry(calibrated));
+  if (error < least_px) return {};
+  return fmt::format(
+      "TIGRE's and LEAP's files have one pixel size for all views: pixels lie up to {:.2f} px off", error);
 }
 
 void forget_exports(const std::filesystem::path& folder) {

@@ -69,13 +69,18 @@ struct SpacingObject {
 Expected<std::map<std::size_t, xray::ObjectSpacing>> spacings_at(const pipeline::Result& result,
                                                                  const SpacingObject& object);
 
+/// A sentence on how far pixels lie off in the files of TIGRE and LEAP, which have one pixel size for all
+/// views; empty without these files, and below 0.01 px.
+std::string one_pixel_size_note(const pipeline::Result& result, std::span<const Export> kinds);
+
 /// Removes the files of an earlier export, recognised by name and content.
 void forget_exports(const std::filesystem::path& folder);
 
 /// Writes the available parts of a result into `folder`, which then holds no file of an earlier export, and
 /// returns the files' paths; all files or none. Refuses with the result's own failure, `point_at_infinity`
 /// for a view without DLT coefficients, `name_clash` if two views would share a file, `cannot_write`; where
-/// not all formats are written, also what RTK cannot represent (`unsupported`, `behind_source`). `object`:
+/// not all formats are written, also what RTK, TIGRE or LEAP cannot represent (`unsupported`,
+/// `behind_source`). `object`:
 /// the rectified images have the Pixel Spacing of its depth; refuses as `spacings_at`.
 Expected<std::vector<std::filesystem::path>> write_exports(const pipeline::Result& result,
                                                            const std::filesystem::path& folder,

@@ -256,6 +256,10 @@ TEST_F(Exports, GeometryForReconstructionIsOfAllViewsOnRequest) {
                                           "views_deepdrr.json", "views_diffdrr.json", "views_leap.json",
                                           "views_matrices.npy", "views_matrices.ompl", "views_tigre.json"));
   EXPECT_EQ(parse_json(text("views_tigre.json"), "tigre")->at("DSO").size(), 2u);
+  EXPECT_THAT(one_pixel_size_note(result_, requested_export), testing::HasSubstr("up to 0.24 px off"));
+  EXPECT_EQ(one_pixel_size_note(result_, every_export), "");
+  for (pipeline::ViewResult& view : result_.views) view.calibrated->view.intrinsics.fx = 4000;
+  EXPECT_EQ(one_pixel_size_note(result_, requested_export), "");
   forget_exports(folder_);
   EXPECT_TRUE(fs::is_empty(folder_));
 }

@@ -71,6 +71,7 @@ void estimate_from(FrameEstimate& estimate, const Frame& frame, xray::XrayImage 
     estimate.pixel_mm = map.rectified_pixel_mm;
   if (!map.is_identity()) estimate.map = map;
   estimate.plate = calibration::plate_map_of(rectified.front().rectification);
+  estimate.map_of_record = rectified.front().rectification.source == rectification::MapSource::record;
   const pipeline::LabelledView labelled =
       expected ? labelled_near(std::move(rectified.front()), *expected, one, options)
                : passed(pipeline::label_views(std::move(rectified), one, options)).front();

@@ -25,6 +25,7 @@ struct FrameEstimate {
   std::string image;                                             ///< digest of the pixels
   std::optional<rectification::DistortionMap> map;               ///< unless it is the identity
   std::optional<calibration::PlateMap> plate;                    ///< by its own plate
+  bool map_of_record = false;                                    ///< rectified by the C-arm's record
   calibration::ViewFiducials fiducials;  ///< labelled by the evidence of this image; outliers are `rejected`
   std::optional<calibration::CalibratedView> alone;
   bool mirrored_without_statement = false;  ///< `pipeline::is_mirrored_without_statement`

@@ -133,15 +133,16 @@ double noise_factor(const std::vector<FrameEstimate>& estimates) {
   return dof < enough_dof ? std::max(1.0, factor) : std::max(least, factor);
 }
 
-/// One run tells of its own noise and calibrator many times over: more of its frames would crowd out other
-/// days.
+/// One run tells of its own noise many times over: more of its frames would crowd out other days. What the
+/// record rectified tells it nothing.
 std::vector<calibration::HistoryEntry> acquisitions_of(const std::vector<FrameEstimate>& estimates,
                                                        const SweepCase& the_case,
                                                        const std::vector<SweepFrame>& frames) {
   constexpr std::size_t most = 40;
   std::vector<std::size_t> told;
   for (std::size_t i = 0; i < estimates.size(); ++i)
-    if (!frames[i].failure && estimates[i].variance_scale == 1) told.push_back(i);
+    if (!frames[i].failure && estimates[i].variance_scale == 1 && !estimates[i].map_of_record)
+      told.push_back(i);
   std::vector<calibration::HistoryEntry> entries;
   const calibration::CommonPrior common = pipeline::common_prior(the_case.base.calibrator);
   const std::size_t count = std::min(most, told.size());

@@ -20,6 +20,8 @@ pipeline::CaseView numbered(const pipeline::CaseView& view, int number) {
   return value_or_throw(pipeline::at_number(view, number));
 }
 
+constexpr int most_number = 999999;
+
 /// Numbers of the files that exist.
 std::vector<int> numbers_of_files(const pipeline::CaseView& view) {
   std::vector<int> numbers;
@@ -30,9 +32,10 @@ std::vector<int> numbers_of_files(const pipeline::CaseView& view) {
     const std::string name = entry.path().filename().string();
     if (name.size() <= prefix || name.compare(0, prefix, pattern, 0, prefix) != 0) continue;
     const std::size_t last = std::min(name.find_first_not_of("0123456789", prefix), name.size());
-    if (last == prefix || last - prefix > 6) continue;
+    constexpr std::size_t most_digits = 9;
+    if (last == prefix || last - prefix > most_digits) continue;
     const int number = std::stoi(name.substr(prefix, last - prefix));
-    if (numbered(view, number).image.filename() == name) numbers.push_back(number);
+    if (number <= most_number && numbered(view, number).image.filename() == name) numbers.push_back(number);
   }
   if (numbers.empty())
     throw BadInput(Reason::missing_file, fmt::format("{}: no file \"{}\" in {}", view.name, pattern,

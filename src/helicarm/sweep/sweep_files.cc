@@ -35,7 +35,7 @@ Expected<std::string> always(const exchange::RunGeometry& run) {
 constexpr std::array<std::pair<const char*, Writer>, 7> geometry_files{
     {{"rtk.xml", exchange::rtk_geometry},
      {"tigre.json", exchange::tigre_geometry},
-     {"leap.json", always<exchange::leap_modular>},
+     {"leap.json", exchange::leap_modular},
      {"astra.txt", always<exchange::astra_vectors>},
      {"matrices.ompl", always<exchange::ompl_matrices>},
      {"matrices.csv", always<exchange::matrices_csv>},

@@ -183,7 +183,6 @@ void learn_deviations(const SequenceData& work, const BodyPlan& plan, const Sequ
     const double averaged = sequence.lasting + (1 - sequence.lasting) / frames;
     at.by_place.push_back(spread / frames);
     if (plan.geometry.empty()) at.by_place.back() += averaged * own.by_images;
-    if (at.shape.in_body[i]) body.markers[i].in_body = {*at.shape.in_body[i], at.by_place.back()};
   }
 }
 
@@ -198,16 +197,23 @@ void place_rare_markers(const SequenceData& work, const BodyPlan& plan, const Se
     at.shape.in_body[i] = found->place.place;
     at.by_place[i] = found->place.covariance;
     at.spread[i] = 4 * (std::pow(body.deviation_mm, 2) + 1e-6) * Eigen::Matrix3d::Identity();
-    body.markers[i].in_body = {found->place.place, at.by_place[i]};
     body.markers[i].loose_mm = std::sqrt(at.spread[i].trace() / 3);
   }
+}
+
+/// The markers' places in the body, in the world in which its poses are stated.
+void place_in_first_frame(const Estimated& at, const RigidTransform& first, BodySequence& body) {
+  for (std::size_t i = 0; i < body.markers.size(); ++i)
+    if (const OptionalPlace& place = at.shape.in_body[i])
+      body.markers[i].in_body =
+          FramePlace{first * *place, first.rotation * at.by_place[i] * first.rotation.transpose()};
 }
 
 /// Which markers count, where they are in the body, and their deviations from there.
 void learn_shape(SequenceData& work, const BodyPlan& plan, Estimated& at, BodySequence& body,
                  Sequence& sequence) {
   constexpr int rounds = 2;
-  for (const std::size_t marker : plan.markers) body.markers.push_back({marker, {}, 0, {}});
+  for (const std::size_t marker : plan.markers) body.markers.push_back({marker});
   at.counts.assign(plan.markers.size(), 1);
   // A marker that two views show in a few frames alone, perhaps wrongly, determines no pose.
   for (std::size_t i = 0; i < plan.markers.size(); ++i) {
@@ -323,7 +329,8 @@ void estimate_body(SequenceData& work, const BodyPlan& plan, Estimated& at, Body
     if (pose) pose->covariance *= fewer;
   at.motion = smooth_poses(work.times, measured, geometry::mean_of(points));
   place_rare_markers(work, plan, sequence, at, body);
-  take_motion(body, at.poses, at.motion, geometry::mean_of(points));
+  if (const auto first = take_motion(body, at.poses, at.motion, geometry::mean_of(points)))
+    place_in_first_frame(at, first->pose, body);
 }
 
 std::optional<FramePlace> place_by_body(const SequenceData& work, const BodyPlan& plan, const Estimated& at,

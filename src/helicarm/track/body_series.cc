@@ -48,8 +48,9 @@ void against_first(TrackedBody& frame, const FramePose& pose, const Eigen::Vecto
   frame.centre = pose.pose * centre_in_body;
 }
 
-void take_motion(BodySequence& body, const std::vector<std::optional<FramePose>>& poses,
-                 const std::optional<SmoothMotion>& motion, const Eigen::Vector3d& centre_in_body) {
+std::optional<FramePose> take_motion(BodySequence& body, const std::vector<std::optional<FramePose>>& poses,
+                                     const std::optional<SmoothMotion>& motion,
+                                     const Eigen::Vector3d& centre_in_body) {
   // Before the first and behind the last pose nothing bounds the motion.
   const auto has_pose = [](const auto& pose) { return pose.has_value(); };
   const auto begin = std::size_t(std::ranges::find_if(poses, has_pose) - poses.begin());
@@ -81,6 +82,7 @@ void take_motion(BodySequence& body, const std::vector<std::optional<FramePose>>
       against_first(body.frames[f], *poses[f], centre_in_body, *first, f == 0);
     else
       body.frames[f].decision = PoseDecision::refuse;
+  return first;
 }
 
 std::vector<std::vector<TrackedBody>> relative_motions(const std::vector<BodySequence>& bodies) {

@@ -20,11 +20,12 @@ FramePose relative_pose(const FramePose& reference, const Eigen::Vector3d& refer
                         const FramePose& body, const Eigen::Vector3d& centre);
 
 /// Puts a body's poses of all frames and its smooth motion into its series, each against its first frame, by
-/// its smooth pose if there is one. `body.frames` has the decisions, reasons
-/// and markers of the frames, and `body.smoothed` is as long; frames without a pose are refused, and warned
-/// of where the motion fills them between others.
-void take_motion(BodySequence& body, const std::vector<std::optional<FramePose>>& poses,
-                 const std::optional<SmoothMotion>& motion, const Eigen::Vector3d& centre_in_body);
+/// its smooth pose if there is one: that pose is returned. `body.frames` has the decisions, reasons and
+/// markers of the frames, and `body.smoothed` is as long; frames without a pose are refused, and warned of
+/// where the motion fills them between others.
+std::optional<FramePose> take_motion(BodySequence& body, const std::vector<std::optional<FramePose>>& poses,
+                                     const std::optional<SmoothMotion>& motion,
+                                     const Eigen::Vector3d& centre_in_body);
 
 /// Smooth motion of the second and further bodies in the first one's coordinates, [body - 1][frame]. The
 /// bodies' errors are taken as independent.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/track/camera_errors.h"
 
+#include <cmath>
+
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/localization/locate.h"
@@ -68,7 +70,9 @@ void add_to_joint(JointAngles& joint, const BodyAxes& reference_axes, const Body
     const auto other = joint_angles(moved(reference, of_reference.col(i)), reference_axes,
                                     moved(body, of_body.col(i)), axes);
     if (!other) continue;
-    const Vector3d turn = other->angles - joint.angles;
+    const Vector3d turn = (other->angles - joint.angles).unaryExpr([](double angle) -> double {
+      return std::remainder(angle, 2 * EIGEN_PI);
+    });
     joint.covariance += turn * turn.transpose();
     if (!joint.shift || !other->shift) continue;
     const Vector3d shift = *other->shift - *joint.shift;
@@ -105,7 +109,8 @@ void add_camera_errors(const SequenceData& work, Sequence& sequence) {
     std::vector<Vector3d> first;
     std::vector<Matrix3Xd> in_first;
     for (const PlacedMarker& marker : body.markers) {
-      first.push_back(marker.in_body.place);
+      if (!marker.in_body || marker.moved_at) continue;
+      first.push_back(marker.in_body->place);
       const Matrix3Xd by_cameras = place_by_cameras(work, first.back());
       in_first.push_back(by_cameras.cols() == 0 ? by_cameras : Matrix3Xd(by_cameras * errors));
     }

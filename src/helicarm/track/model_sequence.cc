@@ -44,15 +44,9 @@ std::string identity_of(const pipeline::Case& the_case, const case_registration:
   for (const SequenceView& view : views_of(the_case))
     text +=
         fmt::format("\n{} {} {}", view.images.name, view.images.image.filename().string(), view.frame_offset);
-  for (const geometry::View& camera : follower.cameras()) {
-    const geometry::Projection projection = camera.projection();
-    for (const double value : projection.reshaped()) text += fmt::format(" {}", value);
-  }
   for (const pipeline::CaseModel& model : the_case.models)
     text += "\n" + model.name + pipeline::to_json(model, the_case.folder).dump();
-  for (const Eigen::Vector3d& centre : follower.centres())
-    text += fmt::format("\n{} {} {}", centre.x(), centre.y(), centre.z());
-  return xray::digest(text);
+  return xray::digest(text + follower.identity());
 }
 
 std::string first_line(const std::string& identity) {

@@ -13,9 +13,11 @@ namespace helicarm::track {
 /// A marker's place in its body.
 struct PlacedMarker {
   std::size_t marker;
-  FramePlace in_body;           ///< world frame of the first frame
-  double loose_mm = 0;          ///< rms of its deviations per axis, from the other markers
-  std::optional<int> moved_at;  ///< frame at which it moved in its bone
+  /// World frame of the first frame, also of a geometry with coordinates of its own; nothing: not known, or
+  /// its body has no pose there.
+  std::optional<FramePlace> in_body = {};
+  double loose_mm = 0;               ///< rms of its deviations per axis, from the other markers
+  std::optional<int> moved_at = {};  ///< frame at which it moved in its bone
 };
 
 /// A body through the sequence.

@@ -20,9 +20,10 @@ namespace fs = std::filesystem;
 void check_size(const std::string& view, int number, const Eigen::Vector2i& size,
                 const std::optional<Eigen::Vector2i>& expected) {
   if (expected && *expected != size)
-    throw BadInput(Reason::bad_size,
-                   fmt::format("{}: image {} has {} x {} pixels, the camera or the first image {} x {}", view,
-                               number, size.x(), size.y(), expected->x(), expected->y()));
+    throw BadInput(
+        Reason::bad_size,
+        fmt::format("{}: image {} has {} x {} pixels, the camera, its map or the first image {} x {}", view,
+                    number, size.x(), size.y(), expected->x(), expected->y()));
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace helicarm::track {
 struct SequenceView {
   pipeline::CaseView images;                  ///< "image" with {frame}, or a file with several frames
   int frame_offset = 0;                       ///< the image's number is the sequence's frame plus this
-  std::optional<Eigen::Vector2i> image_size;  ///< as the camera's file states it
+  std::optional<Eigen::Vector2i> image_size;  ///< as the camera's file or the map states it
   std::shared_ptr<const xray::ImageFile> opened = {};  ///< instead of a file of `images`
 };
 
@@ -25,8 +25,8 @@ struct SequenceView {
 class SequenceImages {
  public:
   /// Fails with missing_file where images do not exist, bad_value for frames that a file does not have and
-  /// for a view that names one frame, and bad_size where sizes differ within a view or from its camera's, as
-  /// far as the files' headers state them.
+  /// for a view that names one frame, and bad_size where sizes differ within a view or from its camera's or
+  /// map's, as far as the files' headers state them.
   static Expected<SequenceImages> open(std::span<const SequenceView> views,
                                        const case_registration::FrameRange& frames);
 

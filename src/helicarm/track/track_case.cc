@@ -27,6 +27,7 @@ namespace fs = std::filesystem;
 void read_cameras(TrackCase& read, const pipeline::Case& the_case, const std::string& origin) {
   constexpr Eigen::Index each = calibration::view_parameters;
   std::map<fs::path, calibration::SavedCalibration> calibrations;
+  std::vector<fs::path> files(read.views.size());
   for (std::size_t i = 0; i < read.views.size(); ++i) {
     TrackView& view = read.views[i];
     const std::string where = fmt::format("{}: views[{}]", origin, i);
@@ -35,18 +36,15 @@ void read_cameras(TrackCase& read, const pipeline::Case& the_case, const std::st
       view.camera = camera.view;
       view.image_size = camera.image_size;
       if (view.images.map)
-        view.map = value_or_throw(rectification::distortion_map_from_json(
-            value_or_throw(read_json(*view.images.map)), view.images.map->filename().string()));
-      if (view.map && view.image_size &&
-          *view.image_size != Eigen::Vector2i(view.map->width, view.map->height))
-        throw BadInput(
-            Reason::bad_size,
-            fmt::format("{}: \"map\" is for images of {} x {} pixels, \"camera\" for {} x {}", where,
-                        view.map->width, view.map->height, view.image_size->x(), view.image_size->y()));
+        take_map(view,
+                 value_or_throw(rectification::distortion_map_from_json(
+                     value_or_throw(read_json(*view.images.map)), view.images.map->filename().string())),
+                 where);
       read.warnings.insert(read.warnings.end(), camera.warnings.begin(), camera.warnings.end());
       continue;
     }
-    const fs::path& file = view.images.calibration ? *view.images.calibration : *the_case.calibration;
+    const fs::path& file = files[i] =
+        view.images.calibration ? *view.images.calibration : *the_case.calibration;
     if (!calibrations.contains(file))
       calibrations[file] = value_or_throw(calibration::saved_calibration_from_json(
           value_or_throw(read_json(file)), file.filename().string()));
@@ -57,14 +55,14 @@ void read_cameras(TrackCase& read, const pipeline::Case& the_case, const std::st
                                                     file.filename().string(), view.images.name));
     const auto index = std::size_t(found - saved.views.begin());
     view.camera = found->view;
-    view.map = saved.maps[index];
+    take_map(view, saved.maps[index], where);
     if (saved.joint_covariance.size() == 0) continue;
     const auto n = each * Eigen::Index(read.views.size());
     if (read.camera_covariance.size() == 0) read.camera_covariance = Eigen::MatrixXd::Zero(n, n);
     for (std::size_t k = 0; k <= i; ++k) {
+      if (files[k] != file) continue;  // calibrated apart
       const auto other =
           std::ranges::find(saved.views, read.views[k].images.name, &calibration::CalibratedView::name);
-      if (other == saved.views.end() || read.views[k].images.camera) continue;
       const auto at = Eigen::Index(other - saved.views.begin());
       const Eigen::MatrixXd block =
           saved.joint_covariance.block(each * Eigen::Index(index), each * at, each, each);
@@ -81,7 +79,7 @@ void calibrate(TrackCase& read, const pipeline::Case& base, const case_registrat
   const auto loaded = value_or_throw(case_registration::load_views(first, {}));
   for (std::size_t i = 0; i < read.views.size(); ++i) {
     read.views[i].camera = loaded.views[i].view;
-    read.views[i].map = loaded.maps[i];
+    take_map(read.views[i], loaded.maps[i], read.views[i].images.name);
   }
   read.camera_covariance = loaded.camera_covariance;
   read.warnings.insert(read.warnings.end(), loaded.warnings.begin(), loaded.warnings.end());
@@ -106,7 +104,7 @@ void check_frames_of_picks(const std::vector<pipeline::Pick>& picks,
     if (pick.frame && *pick.frame != first) {
       others.insert(*pick.frame);
       const int behind_first = *pick.frame - first;
-      if (behind_first > 0 && *pick.frame < frames.last && behind_first % frames.step != 0)
+      if (behind_first > 0 && *pick.frame <= frames.last && behind_first % frames.step != 0)
         throw BadInput(
             Reason::bad_value,
             fmt::format("{}: picks: \"{}\" of frame {}: is not among the frames, every {}th from {} on",

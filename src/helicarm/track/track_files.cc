@@ -49,11 +49,12 @@ Json json_of(const Warning& warning) {
 Json json_of(const BodySequence& body, const BodyPlan& plan, const TrackCase& the_case) {
   Json json = {{"name", plan.name}, {"markers", Json::array()}};
   for (const PlacedMarker& marker : body.markers)
-    json["markers"].push_back({{"name", the_case.markers[marker.marker]},
-                               {"in_body_mm", json_list(marker.in_body.place)},
-                               {"covariance_mm2", json_rows(marker.in_body.covariance)},
-                               {"deviation_mm", marker.loose_mm},
-                               {"moved_at", marker.moved_at ? Json(*marker.moved_at) : Json(nullptr)}});
+    json["markers"].push_back(
+        {{"name", the_case.markers[marker.marker]},
+         {"in_body_mm", marker.in_body ? json_list(marker.in_body->place) : Json(nullptr)},
+         {"covariance_mm2", marker.in_body ? json_rows(marker.in_body->covariance) : Json(nullptr)},
+         {"deviation_mm", marker.loose_mm},
+         {"moved_at", marker.moved_at ? Json(*marker.moved_at) : Json(nullptr)}});
   json["geometry"] = plan.geometry.empty() ? "learnt" : "given";
   json["deviation_mm"] = body.deviation_mm;
   json["condition_per_m"] = body.condition_per_m;

@@ -5,6 +5,17 @@
 
 namespace helicarm::track {
 
+void take_map(TrackView& view, std::optional<rectification::DistortionMap> map, const std::string& where) {
+  view.map = std::move(map);
+  if (!view.map) return;
+  const Eigen::Vector2i size(view.map->width, view.map->height);
+  if (view.image_size && *view.image_size != size)
+    throw BadInput(Reason::bad_size,
+                   fmt::format("{}: \"map\" is for images of {} x {} pixels, \"camera\" for {} x {}", where,
+                               size.x(), size.y(), view.image_size->x(), view.image_size->y()));
+  view.image_size = size;
+}
+
 std::optional<Eigen::Vector2d> rectified_in(const TrackView& view, const Eigen::Vector2d& raw) {
   return view.map ? view.map->rectified_from_raw(raw) : std::optional(raw);
 }

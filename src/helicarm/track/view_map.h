@@ -7,6 +7,10 @@
 
 namespace helicarm::track {
 
+/// Gives a view its distortion map, which states the size of its images. Throws BadInput (bad_size) where the
+/// camera states another; `where` begins the message.
+void take_map(TrackView& view, std::optional<rectification::DistortionMap> map, const std::string& where);
+
 /// Rectified pixel of a raw one; nothing outside the domain of the view's distortion map.
 std::optional<Eigen::Vector2d> rectified_in(const TrackView& view, const Eigen::Vector2d& raw);
 

@@ -70,9 +70,30 @@ TEST_F(DeclaredVolume, NrrdSpacingsThatContradictTheDirectionsAreRefused) {
             Vector3d(5, 7, 9));
 }
 
-TEST_F(DeclaredVolume, NrrdPlacedByAxisMinsAloneIsRefused) {
+TEST_F(DeclaredVolume, NegativeSpacingIsRefused) {
+  EXPECT_THAT(message(nrrd("encoding: raw\nspace: LPS\nspacings: 1 1 -1\n", four)),
+              HasSubstr("spacings is 1 1 -1, must be positive"));
+  EXPECT_EQ(refusal(nrrd("encoding: raw\n" + directions + "spacings: 1 2 -3\n", four)), Reason::bad_value);
+  for (const char* key : {"ElementSpacing", "ElementSize"})
+    for (const char* matrix : {"", "TransformMatrix = 1 0 0 0 1 0 0 0 1\n"})
+      EXPECT_EQ(refusal(meta(fmt::format("ElementType = MET_SHORT\n{}{} = 1 1 -1\n", matrix, key), four)),
+                Reason::bad_value);
+}
+
+TEST_F(DeclaredVolume, NrrdWithoutTheVoxelsSize) {
+  const Warning said = warning(nrrd("encoding: raw\nspace: LPS\nspace origin: (4,5,6)\n", four));
+  EXPECT_EQ(said.reason, Reason::spacing_missing);
+  EXPECT_THAT(said.message, HasSubstr("spacings is missing: 1 is assumed"));
+  EXPECT_EQ(said.figures.at("assumed"), 1);
+  EXPECT_TRUE(read("a", nrrd("encoding: raw\n" + directions, four))->warnings.empty());
+}
+
+TEST_F(DeclaredVolume, NrrdPlacedByAxisMinsIsRefused) {
   EXPECT_EQ(refusal(nrrd("encoding: raw\naxis mins: 0 0 0\naxis maxs: 1 1 1\n", four)), Reason::unsupported);
-  EXPECT_TRUE(read("a", nrrd("encoding: raw\naxis mins: nan nan nan\n", four)).has_value());
+  EXPECT_EQ(refusal(nrrd("encoding: raw\nspacings: 1 2 3\naxis mins: 10 20 30\n", four)),
+            Reason::unsupported);
+  EXPECT_EQ(refusal(nrrd("encoding: raw\nspacings: 1 2 3\naxismaxs: 10 20 30\n", four)), Reason::unsupported);
+  EXPECT_TRUE(read("a", nrrd("encoding: raw\nspacings: 1 2 3\naxis mins: nan nan nan\n", four)).has_value());
 }
 
 TEST_F(DeclaredVolume, NrrdWordsInLettersOfEitherCase) {
@@ -86,8 +107,8 @@ TEST_F(DeclaredVolume, NrrdWordsInLettersOfEitherCase) {
 }
 
 TEST_F(DeclaredVolume, NrrdByteSkipOfMinusOneCountsFromTheEndOfTheDecompressedData) {
-  const auto volume =
-      read("a", nrrd("encoding: gzip\nspace: LPS\nbyte skip: -1\n", packed("a header" + four, true)));
+  const auto volume = read("a", nrrd("encoding: gzip\nspace: LPS\nspacings: 1 1 1\nbyte skip: -1\n",
+                                     packed("a header" + four, true)));
   ASSERT_TRUE(volume.has_value()) << volume.error().message;
   EXPECT_THAT(volume->voxels, ElementsAre(1, 2, -3, 4));
   EXPECT_TRUE(volume->warnings.empty());
@@ -161,6 +182,7 @@ TEST_F(DeclaredVolume, MetaImageIntensityFunctionIsAppliedAndSaid) {
 
 TEST_F(DeclaredVolume, DataBehindTheVoxelsAreWarnedOf) {
   const std::string type = "ElementType = MET_SHORT\nElementSpacing = 1 1 1\n";
+  const std::string lps = "space: LPS\nspacings: 1 1 1\n";
   const auto surplus = [&](const std::string& bytes) {
     const Warning said = warning(bytes);
     EXPECT_EQ(said.reason, Reason::surplus_data) << said.message;
@@ -168,9 +190,9 @@ TEST_F(DeclaredVolume, DataBehindTheVoxelsAreWarnedOf) {
   };
   EXPECT_EQ(surplus(meta(type, four + four)), 8);
   EXPECT_EQ(surplus(meta(type + "CompressedData = True\n", packed(four + "abc", false))), 3);
-  EXPECT_EQ(surplus(nrrd("space: LPS\nencoding: raw\n", four + four)), 8);
-  EXPECT_EQ(surplus(nrrd("space: LPS\nencoding: gzip\n", packed(four + four, true))), 8);
-  EXPECT_EQ(surplus(nrrd("space: LPS\nencoding: gzip\n", packed(four, true) + "tail")), 4);
+  EXPECT_EQ(surplus(nrrd(lps + "encoding: raw\n", four + four)), 8);
+  EXPECT_EQ(surplus(nrrd(lps + "encoding: gzip\n", packed(four + four, true))), 8);
+  EXPECT_EQ(surplus(nrrd(lps + "encoding: gzip\n", packed(four, true) + "tail")), 4);
   EXPECT_EQ(surplus(Nifti().bytes + four), 8);
   EXPECT_EQ(surplus(packed(Nifti().bytes + four, true)), 8);
   EXPECT_TRUE(read("a", meta(type, four + "\n"))->warnings.empty());

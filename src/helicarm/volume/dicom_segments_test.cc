@@ -122,6 +122,17 @@ TEST_F(Segments, GapsAreEmptySlicesWhereTheSpacingIsStated) {
   EXPECT_EQ(thick->patient_from_voxel.linear().col(2), Vector3d(0, 0, 3));
 }
 
+TEST_F(Segments, AThinSliceBetweenTwoPlacesIsRefused) {
+  auto thin = two_segments();
+  thin.raw(0x52009229, "SQ", items_of({shared(text_element(0x00180088, "DS", "0.06"))}));
+  thin.raw(0x52009230, "SQ",
+           items_of({frame(1, "-3\\4\\10"), frame(1, "-3\\4\\10.12"), frame(2, "-3\\4\\10.06")}));
+  EXPECT_TRUE(read_seg(thin).has_value());
+  thin.raw(0x52009230, "SQ",
+           items_of({frame(1, "-3\\4\\10"), frame(1, "-3\\4\\10.12"), frame(2, "-3\\4\\10.09")}));
+  expect_refused(thin, Reason::bad_value, "no multiple of 0.06 mm");
+}
+
 /// Shares in hundredths in slices of 3 x 3 voxels: the first segment in both slices, the second in the first
 /// one, where they have a voxel in common.
 DicomBuilder shares() {

@@ -9,6 +9,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/volume/in_memory.h"
+#include "helicarm/volume/read_volume.h"
 #include "helicarm/volume/voxels.h"
 #include "helicarm/xray/dicom_check.h"
 #include "helicarm/xray/dicom_frame.h"
@@ -27,9 +28,6 @@ constexpr std::string_view label_map_of = "1.2.840.10008.5.1.4.1.1.66.7";
 
 bool is_segmentation(std::string_view kind) { return kind == segmentation_of || kind == label_map_of; }
 constexpr double most_coordinate_mm = 1e5;
-// Positions are decimal text with few digits; the relative limit allows for more rounding in thick slices.
-constexpr double uneven_mm = 0.1;
-constexpr double uneven_part = 0.02;
 
 /// Geometry of one slice; columns of `axes`: along a row, along a column, mm per pixel.
 struct Slice {
@@ -39,6 +37,8 @@ struct Slice {
   Vector3d corner;
   int columns = 0;
   int rows = 0;
+  std::string frame_of_reference;        ///< its UID; may be empty
+  std::string patient_id, patient_name;  ///< compare, do not print; may be empty
 
   Vector3d normal() const { return axes.col(0).cross(axes.col(1)).normalized(); }
 };
@@ -55,6 +55,9 @@ Slice slice_of(const xray::DicomOutline& outline) {
   Slice slice;
   slice.columns = outline.columns;
   slice.rows = outline.rows;
+  slice.frame_of_reference = elements.text(xray::tags::frame_of_reference);
+  slice.patient_id = elements.text(xray::tags::patient_id);
+  slice.patient_name = elements.text(xray::tags::patient_name);
   const auto corner =
       needed(elements, xray::tags::image_position, 3, -most_coordinate_mm, most_coordinate_mm);
   const auto turn = needed(elements, xray::tags::image_orientation, 6, -1.001, 1.001);
@@ -140,7 +143,30 @@ Warning skipped(const std::vector<Failure>& unreadable) {
   return {unreadable.front().reason, message, {}, {{"files", double(unreadable.size())}}};
 }
 
+/// A series is of one patient in one frame of reference; what a slice does not state is not compared.
+void check_origin(const std::vector<Slice>& slices) {
+  const auto other = [&](std::string Slice::*what) -> const Slice* {
+    const auto stated =
+        std::ranges::find_if(slices, [&](const Slice& slice) { return !(slice.*what).empty(); });
+    for (const Slice& slice : slices)
+      if (!(slice.*what).empty() && slice.*what != *stated.*what) return &slice;
+    return nullptr;
+  };
+  for (std::string Slice::*what : {&Slice::patient_id, &Slice::patient_name})
+    if (const Slice* slice = other(what))
+      throw BadInput(
+          Reason::patient_mismatch,
+          fmt::format("{}: names another patient than other slices of its series", slice->path.string()));
+  if (const Slice* slice = other(&Slice::frame_of_reference))
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("{}: Frame of Reference UID (0020,0052) is {}, other slices of its series have "
+                    "another: their positions are of different frames",
+                    slice->path.string(), slice->frame_of_reference));
+}
+
 void check_alike(const std::vector<Slice>& slices) {
+  check_origin(slices);
   for (const Slice& slice : slices) {
     if (slice.columns != slices[0].columns || slice.rows != slices[0].rows)
       throw BadInput(Reason::bad_size,
@@ -161,7 +187,7 @@ Vector3d even_step(const std::vector<Slice>& slices, const std::string& origin) 
   std::vector<double> sorted = gaps;
   std::ranges::sort(sorted);
   const double usual = sorted[sorted.size() / 2];
-  const double allowed = std::max(uneven_mm, uneven_part * usual);
+  const double allowed = uneven_mm(usual);
   if (usual < 1e-3)
     throw BadInput(
         Reason::bad_value,
@@ -275,6 +301,20 @@ Volume volume_of(FolderOfSlices found, const std::string& origin) {
 }
 
 }  // namespace
+
+Expected<std::optional<std::filesystem::path>> slice_of_series(const std::filesystem::path& folder) {
+  return guarded([&]() -> std::optional<std::filesystem::path> {
+    std::error_code error;
+    if (!std::filesystem::is_directory(folder, error)) return std::nullopt;
+    FolderOfSlices found = find_series(folder);
+    if (found.series.empty()) return std::nullopt;
+    std::vector<Warning> warnings;
+    const std::vector<Slice>& slices = largest_of(found, folder.string(), warnings);
+    check_origin(slices);
+    const auto stated = std::ranges::find_if_not(slices, &std::string::empty, &Slice::frame_of_reference);
+    return (stated == slices.end() ? slices.front() : *stated).path;
+  });
+}
 
 Volume read_ct_series(const std::filesystem::path& folder) {
   return volume_of(find_series(folder), folder.string());

@@ -61,6 +61,47 @@ TEST_F(CtSeries, MissingOrDuplicateSliceIsRefusedWithFigures) {
   EXPECT_EQ(read().error().reason, Reason::bad_value);
 }
 
+TEST_F(CtSeries, AMissingThinSliceIsRefused) {
+  for (const int i : {0, 1, 2, 4, 5}) put(slice(0.06 * i));
+  const auto gap = read();
+  ASSERT_FALSE(gap.has_value());
+  EXPECT_EQ(gap.error().reason, Reason::bad_value);
+  EXPECT_NEAR(gap.error().figures.at("gap_mm"), 0.12, 1e-9);
+  put(slice(0.06 * 3));
+  EXPECT_TRUE(read().has_value());
+}
+
+TEST_F(CtSeries, PositionsRoundedToTheirLastDigitAreEven) {
+  for (const char* z : {"0", "0.06", "0.13", "0.19", "0.25", "0.31", "0.38"}) put(slice(std::stod(z)));
+  EXPECT_TRUE(read().has_value());
+}
+
+TEST_F(CtSeries, SlicesOfTwoPatientsOrFramesAreRefused) {
+  put(slice(0).text(0x00200052, "UI", "2.25.1"));
+  put(slice(1));  // states no frame of reference
+  put(slice(2).text(0x00100020, "LO", "2"));
+  EXPECT_EQ(read().error().reason, Reason::patient_mismatch);
+  EXPECT_EQ(slice_of_series(folder_).error().reason, Reason::patient_mismatch);
+  EXPECT_EQ(read().error().message.find("ANON"), std::string::npos);
+  --count_;
+  put(slice(2).erase(0x00100020).text(0x00200052, "UI", "2.25.1"));
+  EXPECT_TRUE(read().has_value()) << read().error().message;
+  --count_;
+  put(slice(2).text(0x00200052, "UI", "2.25.2"));
+  EXPECT_EQ(read().error().reason, Reason::bad_value);
+}
+
+TEST_F(CtSeries, ASliceIsOfTheSeriesThatIsRead) {
+  EXPECT_EQ(slice_of_series(folder_).value(), std::nullopt);
+  put(slice(7, "2.25.9").text(0x00080008, "CS", "ORIGINAL\\PRIMARY\\LOCALIZER"));
+  for (const double z : {0.0, 1.0}) put(slice(z, "2.25.8").text(0x00100020, "LO", "2"));
+  for (const double z : {0.0, 1.0, 2.0}) put(slice(z));
+  EXPECT_EQ(slice_of_series(folder_).value(), folder_ / "003");
+  put(slice(3).text(0x00200052, "UI", "2.25.1"));
+  EXPECT_EQ(slice_of_series(folder_).value(), folder_ / "006");
+  EXPECT_EQ(slice_of_series(folder_ / "003").value(), std::nullopt);
+}
+
 TEST_F(CtSeries, AllSlicesTwiceAreNamed) {
   for (const double z : {0.0, 1.0, 2.0, 0.0, 1.0, 2.0}) put(slice(z));
   const auto twice = read();

@@ -125,7 +125,9 @@ double millimetres(const MetaHeader& header) {
 }
 
 Eigen::Affine3d place_of(const MetaHeader& header, std::vector<Warning>& warnings) {
-  const auto spacing = header.numbers({header.has("ElementSpacing") ? "ElementSpacing" : "ElementSize"}, 3);
+  const char* spacing_key = header.has("ElementSpacing") ? "ElementSpacing" : "ElementSize";
+  const auto spacing = header.numbers({spacing_key}, 3);
+  if (!spacing.empty()) check_spacings(Vector3d::Map(spacing.data()), header.field(spacing_key));
   const auto offset = header.numbers({"Offset", "Position", "Origin"}, 3);
   const auto matrix = header.numbers({"TransformMatrix", "Rotation", "Orientation"}, 9);
   Eigen::Affine3d patient_from_index = Eigen::Affine3d::Identity();
@@ -151,9 +153,7 @@ Eigen::Affine3d place_of(const MetaHeader& header, std::vector<Warning>& warning
                                     header.field("AnatomicalOrientation"), xray::quote(letters),
                                     letters_of(patient_from_index.linear()))});
   if (spacing.empty())
-    warnings.push_back({Reason::spacing_missing,
-                        header.field("ElementSpacing") +
-                            " is missing: 1 is assumed, in the file's unit (mm unless it says so)"});
+    warnings.push_back(size_not_stated(header.field("ElementSpacing")));
   else
     patient_from_index.linear() *= Vector3d::Map(spacing.data()).asDiagonal();
   if (!offset.empty()) patient_from_index.translation() = Vector3d::Map(offset.data());

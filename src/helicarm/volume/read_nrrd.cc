@@ -113,12 +113,12 @@ void check_axes(const NrrdHeader& header) {
                      fmt::format("{} is {}, must be domain for each axis: not one volume; export one frame "
                                  "or channel as a volume of its own",
                                  header.field("kinds"), xray::quote(header.text("kinds"))));
-  if (!header.text("space directions").empty() || !header.text("spacings").empty()) return;
+  if (!header.text("space directions").empty() || !header.text("space origin").empty()) return;
   for (const char* name : {"axis mins", "axis maxs"})
     for (const std::string& word : header.words(name))
       if (word != "nan")
-        throw BadInput(Reason::unsupported, fmt::format("{} is {}, but neither space directions nor spacings "
-                                                        "are given; save the volume with one of them",
+        throw BadInput(Reason::unsupported, fmt::format("{} is {}, but neither space directions nor space "
+                                                        "origin are given; save the volume with both",
                                                         header.field(name), xray::quote(header.text(name))));
 }
 
@@ -131,6 +131,7 @@ Eigen::Affine3d place_of(const NrrdHeader& header) {
     space_from_index.linear() = Eigen::Map<const Eigen::Matrix3d>(directions.data());
   else if (!spacings.empty())
     space_from_index.linear() = Vector3d::Map(spacings.data()).asDiagonal();
+  if (!spacings.empty()) check_spacings(Vector3d::Map(spacings.data()), header.field("spacings"));
   if (!directions.empty() && !spacings.empty())
     for (Eigen::Index axis = 0; axis < 3; ++axis)
       if (differ(space_from_index.linear().col(axis).norm(), spacings[static_cast<std::size_t>(axis)], 0.01))
@@ -207,6 +208,8 @@ Volume read_nrrd(const std::filesystem::path& path, std::string_view bytes) {
   volume.size = Vector3d::Map(size.data()).cast<int>();
   check_axes(header);
   volume.patient_from_voxel = place_of(header);
+  if (header.text("space directions").empty() && header.text("spacings").empty())
+    volume.warnings.push_back(size_not_stated(header.field("spacings")));
   if (header.text("space").empty())
     volume.warnings.push_back(
         {Reason::spacing_missing,

@@ -14,8 +14,14 @@ namespace helicarm::volume {
 /// pair of .hdr and .img, each plain or .gz), or a DICOM segmentation (BINARY, LABELMAP; a label map of the
 /// slices that hold a segment), detected by content, or a folder with the slices of a DICOM CT series. Every
 /// length in a file is checked before use. Failures name file and field; codes: missing_file, not_an_image,
-/// truncated, bad_size, bad_value, unsupported, not_finite, unknown_key, path_outside, name_clash.
+/// truncated, bad_size, bad_value, unsupported, not_finite, unknown_key, path_outside, name_clash,
+/// patient_mismatch (slices of one series that name different patients).
 Expected<Volume> read_volume(const std::filesystem::path& path);
+
+/// A slice of the CT series that `read_volume` reads of a folder, one that states its frame of reference if
+/// any does; nothing for a file, and for a folder without a CT slice. Refuses name_clash as `read_volume`,
+/// and slices of two patients or frames of reference (patient_mismatch, bad_value).
+Expected<std::optional<std::filesystem::path>> slice_of_series(const std::filesystem::path& folder);
 
 /// The other file of a NIfTI pair, by the name of one (.hdr, .img, each plain or .gz); nothing for a file of
 /// another name. Fails with missing_file, and with name_clash where it exists both plain and packed.

@@ -187,7 +187,7 @@ std::vector<SegmentFrame> frames_of(const DicomElements& elements) {
 
 Vector3d place_frames(std::vector<SegmentFrame>& frames, const std::string& origin) {
   const Vector3d normal = frames[0].normal(), first = frames[0].corner;
-  const double step = step_of(frames, origin), allowed = std::max(0.1, 0.02 * step);
+  const double step = step_of(frames, origin), allowed = uneven_mm(step);
   for (SegmentFrame& frame : frames) {
     const double at = normal.dot(frame.corner - first) / step;
     if (!(at < max_volume_side))

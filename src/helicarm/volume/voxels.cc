@@ -216,6 +216,27 @@ void warn_of_surplus(Volume& volume, std::string_view behind, std::size_t needed
   if (behind != "\n" && behind != "\r\n") warn_of_surplus(volume, behind.size(), needed, origin);
 }
 
+double uneven_mm(double usual_mm) {
+  // The relative part allows for more rounding in thick slices.
+  return std::max(std::min(0.1, 0.25 * usual_mm), 0.02 * usual_mm);
+}
+
+void check_spacings(const Eigen::Vector3d& spacings, const std::string& field) {
+  if ((spacings.array() > 0).all()) return;
+  throw BadInput(
+      Reason::bad_value,
+      fmt::format("{} is {:.6g} {:.6g} {:.6g}, must be positive: programs mirror the volume or not; "
+                  "write it again with its orientation in the axes' directions",
+                  field, spacings.x(), spacings.y(), spacings.z()));
+}
+
+Warning size_not_stated(const std::string& field) {
+  return {Reason::spacing_missing,
+          field + " is missing: 1 is assumed, in the file's unit (mm unless it says so)",
+          {},
+          {{"assumed", 1}}};
+}
+
 bool differ(double a, double b, double part) {
   return !(std::abs(a - b) <= part * std::max(std::abs(a), std::abs(b)));
 }

@@ -40,6 +40,16 @@ std::string inflate_end(std::string_view packed, std::size_t size, const std::st
 void warn_of_surplus(Volume& volume, std::size_t surplus, std::size_t needed, const std::string& origin);
 void warn_of_surplus(Volume& volume, std::string_view behind, std::size_t needed, const std::string& origin);
 
+/// By how much the distance of two slices may differ from the `usual_mm` of the others: positions are decimal
+/// text. A missing slice is more than that however thin the slices are.
+double uneven_mm(double usual_mm);
+
+/// Throws BadInput (bad_value) unless all are positive: programs mirror the volume or not.
+void check_spacings(const Eigen::Vector3d& spacings, const std::string& field);
+
+/// 1 mm is assumed for voxels whose size is not stated.
+Warning size_not_stated(const std::string& field);
+
 /// Whether two lengths differ by more than the part of the larger.
 bool differ(double a, double b, double part);
 

@@ -67,6 +67,8 @@ std::optional<double> offset_s(std::string_view text) {
   return (text[0] == '-' ? -60 : 60) * (60.0 * *hours + *minutes);
 }
 
+constexpr std::string_view of_content = "Content Date and Time", in_utc = ", UTC";
+
 std::optional<AcquisitionTime> moment(std::string_view date, std::string_view time, std::string_view zone,
                                       std::string source) {
   const auto day = date_s(date);
@@ -74,7 +76,7 @@ std::optional<AcquisitionTime> moment(std::string_view date, std::string_view ti
   if (!day || !clock) return std::nullopt;
   const auto offset = offset_s(clock->rest.empty() ? zone : clock->rest);
   if (!clock->rest.empty() && !offset) return std::nullopt;
-  if (offset) source += ", UTC";
+  if (offset) source += in_utc;
   return AcquisitionTime{*day + clock->seconds - offset.value_or(0), clock->resolution_s, std::move(source)};
 }
 
@@ -93,7 +95,7 @@ std::optional<AcquisitionTime> acquisition_time(const DicomElements& elements) {
   };
   if (auto read = of(tags::acquisition_date, tags::acquisition_time, "Acquisition Date and Time"))
     return read;
-  return of(tags::content_date, tags::content_time, "Content Date and Time");
+  return of(tags::content_date, tags::content_time, of_content.data());
 }
 
 std::string dicom_date_time(double seconds_since_1970) {
@@ -105,6 +107,20 @@ std::string dicom_date_time(double seconds_since_1970) {
   return fmt::format("{:04}{:02}{:02}{:02}{:02}{:02}.{:06}+0000", int(date.year()), unsigned(date.month()),
                      unsigned(date.day()), time.hours().count(), time.minutes().count(),
                      time.seconds().count(), time.subseconds().count());
+}
+
+WrittenTime written_time(const AcquisitionTime& time) {
+  constexpr std::size_t date_digits = 8, whole_digits = 14, most_decimals = 6;
+  const double unit = time.resolution_s > 0 ? std::min(time.resolution_s, 1.0) : 1e-6;
+  const auto decimals =
+      std::min(std::size_t(std::lround(std::ceil(-std::log10(unit) - 1e-9))), most_decimals);
+  const double rounding = std::pow(10.0, -double(decimals));
+  const std::string all = dicom_date_time(std::round(time.seconds / rounding) * rounding);
+  // A time without a source is this program's own.
+  const bool utc = time.source.empty() || time.source.ends_with(in_utc);
+  return {all.substr(0, date_digits),
+          all.substr(date_digits, whole_digits - date_digits + (decimals > 0 ? 1 + decimals : 0)),
+          utc ? "+0000" : "", time.source.starts_with(of_content)};
 }
 
 }  // namespace helicarm::xray

@@ -17,4 +17,12 @@ std::optional<AcquisitionTime> acquisition_time(const DicomElements& elements);
 /// In the format of Acquisition DateTime (UTC, microseconds).
 std::string dicom_date_time(double seconds_since_1970);
 
+/// A time as DICOM writes it, with the digits of its resolution.
+struct WrittenTime {
+  std::string date, time;      ///< YYYYMMDD, HHMMSS.F
+  std::string offset;          ///< +0000, or empty: the source did not state its offset from UTC
+  bool is_of_content = false;  ///< Content Date and Time, not that of the acquisition
+};
+WrittenTime written_time(const AcquisitionTime& time);
+
 }  // namespace helicarm::xray

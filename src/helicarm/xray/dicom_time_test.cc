@@ -58,6 +58,18 @@ TEST(DicomTime, InvalidTimesAreAbsent) {
     EXPECT_FALSE(read(dated(time))) << time;
 }
 
+TEST(DicomTime, IsWrittenAsItWasStated) {
+  const auto rewritten = [](const char* stated) {
+    const WrittenTime time = written_time(*read(dated(stated)));
+    EXPECT_FALSE(time.is_of_content);
+    return time.date + time.time + time.offset;
+  };
+  EXPECT_EQ(rewritten("20260228235958"), "20260228235958");
+  EXPECT_EQ(rewritten("20260228235958.25"), "20260228235958.25");
+  EXPECT_EQ(rewritten("20260228235958.123456"), "20260228235958.123456");
+  EXPECT_EQ(rewritten("20260301005958.5+0100"), "20260228235958.5+0000");
+}
+
 TEST(DicomTime, WrittenTimeRoundTrips) {
   for (const double seconds : {0.25, late_in_february + 0.123456, 4e9})
     EXPECT_NEAR(read(dated(dicom_date_time(seconds)))->seconds, seconds, 1e-6);

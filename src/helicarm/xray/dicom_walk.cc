@@ -377,7 +377,10 @@ std::vector<DicomElements> sequence_items(const DicomElements& of, DicomTag sequ
   about.origin = of.origin;
   about.transfer_syntax = of.transfer_syntax;
   about.irregular = of.irregular;
-  return Walker(element->value, about).items(transfer_syntax(of.transfer_syntax)->explicit_vr);
+  // A sequence without its VR is in the implicit syntax, whatever the file's (PS3.5 6.2.2).
+  const bool explicit_vr =
+      transfer_syntax(of.transfer_syntax)->explicit_vr && element->vr == std::array{'S', 'Q'};
+  return Walker(element->value, about).items(explicit_vr);
 }
 
 }  // namespace helicarm::xray

@@ -55,6 +55,26 @@ TEST(FunctionalGroups, SharedOnesHoldForEveryFrame) {
   }
 }
 
+/// A program that did not know the sequence: VR UN, its items in the implicit syntax (PS3.5 6.2.2).
+TEST(FunctionalGroups, AreReadWithoutTheirVr) {
+  const auto implicit = [](std::uint32_t tag, const std::string& value) {
+    return DicomBuilder::element(tag, "", value, false);
+  };
+  const auto nested = [&](std::uint32_t tag, const std::string& content) {
+    return implicit(tag, DicomBuilder::item(content));
+  };
+  const std::string frames =
+      DicomBuilder::item(nested(0x00189405, implicit(0x00181510, "10") + implicit(0x00181511, "-2"))) +
+      DicomBuilder::item(nested(0x00189405, implicit(0x00181510, "95") + implicit(0x00181511, "-2")));
+  DicomBuilder file = enhanced();
+  file.raw(0x52009229, "UN", DicomBuilder::item(nested(0x00289443, implicit(0x00181164, "0.3\\0.2 "))));
+  file.raw(0x52009230, "UN", frames);
+  const auto image = read_dicom(file.bytes(), "x.dcm", 2);
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->acquisition.primary_angle_deg, 95);
+  EXPECT_EQ(image->acquisition.pixel_mm, std::optional(Eigen::Vector2d(0.2, 0.3)));
+}
+
 TEST(FunctionalGroups, EachFrameHasItsOwn) {
   const auto first = read_dicom(enhanced().bytes(), "x.dcm", 1),
              second = read_dicom(enhanced().bytes(), "x.dcm", 2);

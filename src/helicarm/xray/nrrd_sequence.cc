@@ -13,16 +13,19 @@
 #define ZLIB_CONST
 #include <zlib.h>
 
+#include "helicarm/xray/dicom_elements.h"
+
 namespace helicarm::xray {
 namespace {
 
 constexpr std::string_view magic = "NRRD000";
 constexpr std::size_t most_sequence_bytes = std::size_t{4} << 30;
 
-/// Fields in small letters, and where the values begin.
+/// Fields in small letters, their names without blanks, and where the values begin.
 struct SequenceHeader {
   std::map<std::string, std::string> fields;
   std::size_t values_at = 0;
+  std::string given_twice;  ///< a field's name; empty: none
 
   std::string field(const char* name) const {
     const auto found = fields.find(name);
@@ -57,7 +60,10 @@ std::optional<SequenceHeader> header_of(std::string_view bytes) {
     }
     const std::size_t colon = line.find(':');
     const bool is_field = colon != line.npos && line.substr(colon + 1, 1) != "=" && line.front() != '#';
-    if (is_field) header.fields[small_trimmed(line.substr(0, colon))] = small_trimmed(line.substr(colon + 1));
+    if (!is_field) continue;
+    std::string name = small_trimmed(line.substr(0, colon));
+    std::erase(name, ' ');  // Teem knows "byte skip" and "byteskip"
+    if (!header.fields.emplace(name, small_trimmed(line.substr(colon + 1))).second) header.given_twice = name;
   }
   return {};
 }
@@ -96,14 +102,18 @@ SequenceLayout layout_of(std::string_view bytes, const std::string& origin) {
       header ? sizes_in(header->field("sizes")) : std::vector<std::size_t>{};
   if (!is_of_images(sizes))
     throw BadInput(Reason::bad_value, fmt::format("{}: is no NRRD file of images", origin));
+  if (!header->given_twice.empty())
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: {} is given twice", origin, quote(header->given_twice)));
   const auto unsupported = [&](const char* name) {
     return BadInput(Reason::unsupported,
-                    fmt::format("{}: \"{}\" is \"{}\"; read are images with values of 8 or 16 bits, whole "
-                                "numbers, in the file itself, raw or packed by gzip",
-                                origin, name, header->field(name)));
+                    fmt::format("{}: \"{}\" is {}; read are images with values of 8 or 16 bits, whole "
+                                "numbers, in the file itself from its first byte on, raw or packed by gzip",
+                                origin, name, quote(header->field(name))));
   };
-  for (const char* name : {"data file", "datafile"})
-    if (header->fields.contains(name)) throw unsupported(name);
+  if (header->fields.contains("datafile")) throw unsupported("datafile");
+  for (const char* name : {"byteskip", "lineskip"})
+    if (const std::string skip = header->field(name); !skip.empty() && skip != "0") throw unsupported(name);
   SequenceLayout layout{
       sizes[0], sizes[1], sizes.size() == 4 ? sizes[3] : 1, header->values_at,
       0,        false,    header->field("endian") == "big", header->field("encoding").starts_with("gz")};
@@ -120,6 +130,10 @@ SequenceLayout layout_of(std::string_view bytes, const std::string& origin) {
     layout.bytes_each = 2, layout.is_signed = true;
   else
     throw unsupported("type");
+  const std::string endian = header->field("endian");
+  if (endian != "little" && endian != "big" && (!endian.empty() || layout.bytes_each == 2))
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: endian is {}, must be little or big", origin, quote(endian)));
   if (layout.width > image::max_image_side || layout.height > image::max_image_side ||
       layout.image_bytes() > image::max_image_bytes ||
       layout.images > most_sequence_bytes / layout.image_bytes())
@@ -130,17 +144,19 @@ SequenceLayout layout_of(std::string_view bytes, const std::string& origin) {
   return layout;
 }
 
-/// Exactly `size` bytes. Memory grows with what is found, not with what the header says.
+/// Exactly `size` bytes, of all members of a gzip file. Memory grows with what is found, not with what the
+/// header says.
 std::string inflated(std::string_view packed, std::size_t size, const std::string& origin) {
   z_stream stream{};
   constexpr int zlib_or_gzip = 15 + 32;
   constexpr std::size_t step = std::size_t{1} << 24;
   if (inflateInit2(&stream, zlib_or_gzip) != Z_OK) throw std::bad_alloc();
+  const std::size_t most = size + 1;  // one byte more tells that there are more
   std::string plain;
   int state = Z_OK;
-  while (state == Z_OK && plain.size() < size) {
+  while (state == Z_OK && plain.size() < most) {
     const std::size_t written = plain.size(), in = std::min(packed.size(), step);
-    plain.resize(std::min(size, written + step));
+    plain.resize(std::min(most, written + step));
     stream.next_in = reinterpret_cast<const Bytef*>(packed.data());
     stream.avail_in = static_cast<uInt>(in);
     stream.next_out = reinterpret_cast<Bytef*>(plain.data() + written);
@@ -148,8 +164,16 @@ std::string inflated(std::string_view packed, std::size_t size, const std::strin
     state = inflate(&stream, Z_NO_FLUSH);
     packed.remove_prefix(in - stream.avail_in);
     plain.resize(plain.size() - stream.avail_out);
+    if (state == Z_STREAM_END && packed.starts_with("\x1f\x8b")) state = inflateReset(&stream);
   }
   inflateEnd(&stream);
+  if (state == Z_DATA_ERROR)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: its values are damaged after {} bytes", origin, plain.size()));
+  const bool padded = packed.find_first_not_of(std::string_view("\0\r\n", 3)) == packed.npos;
+  if (plain.size() > size || (state == Z_STREAM_END && !padded))
+    throw BadInput(Reason::surplus_data,
+                   fmt::format("{}: holds more than the {} bytes that its sizes take", origin, size));
   if (plain.size() < size)
     throw BadInput(Reason::truncated,
                    fmt::format("{}: its values end after {} of {} bytes", origin, plain.size(), size));

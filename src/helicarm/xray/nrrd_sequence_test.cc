@@ -81,6 +81,39 @@ TEST(NrrdSequence, AVolumeIsNone) {
   EXPECT_FALSE(is_nrrd_sequence("NRRD0004\nsizes: 40 30 1 3"));
 }
 
+TEST(NrrdSequence, WhatWouldMoveOrMixPixelsIsRefused) {
+  const auto header = [](const std::string& lines, const std::string& encoding = "raw") {
+    std::string text = slicer_header("ushort", encoding);
+    return text.insert(text.find("encoding"), lines);
+  };
+  EXPECT_EQ(refusal(header("byte skip: 2000\n", "gzip") + packed(std::string(2000, 'x') + values_of())),
+            Reason::unsupported);
+  EXPECT_EQ(refusal(header("byteskip: -1\n", "gzip") + packed("x" + values_of())), Reason::unsupported);
+  EXPECT_EQ(refusal(header("line skip: 1\n", "gzip") + "x\n" + packed(values_of())), Reason::unsupported);
+  EXPECT_EQ(refusal(header("sizes: 30 40 1 3\n") + values_of()), Reason::bad_value);
+  std::string no_order = slicer_header("ushort", "raw"), other_order = no_order;
+  no_order.erase(no_order.find("endian: little\n"), 15);
+  other_order.replace(other_order.find("little"), 6, "huge");
+  EXPECT_EQ(refusal(no_order + values_of()), Reason::bad_value);
+  EXPECT_EQ(refusal(other_order + values_of()), Reason::bad_value);
+  EXPECT_TRUE(guarded([&] { return unpacked_sequence(header("byte skip: 0\n") + values_of(), "s"); }));
+}
+
+TEST(NrrdSequence, MembersOfAGzipFileAreOneStream) {
+  const std::string values = values_of();
+  const std::string members = packed(values.substr(0, 1001)) + packed(values.substr(1001));
+  const auto plain =
+      guarded([&] { return unpacked_sequence(slicer_header("ushort", "gzip") + members + "\n", "s"); });
+  ASSERT_TRUE(plain) << plain.error().message;
+  EXPECT_TRUE(plain->ends_with("\n\n" + values));
+  EXPECT_EQ(refusal(slicer_header("ushort", "gzip") + members + packed("more")), Reason::surplus_data);
+  EXPECT_EQ(refusal(slicer_header("ushort", "gzip") + packed(values + "more")), Reason::surplus_data);
+  EXPECT_EQ(refusal(slicer_header("ushort", "gzip") + members + "tail"), Reason::surplus_data);
+  std::string damaged = packed(values);
+  damaged[damaged.size() - 6] = static_cast<char>(damaged[damaged.size() - 6] ^ 1);
+  EXPECT_EQ(refusal(slicer_header("ushort", "gzip") + damaged), Reason::bad_value);
+}
+
 TEST(NrrdSequence, WhatIsNotWholeOrNotGreyIsRefused) {
   EXPECT_EQ(refusal(slicer_header("ushort", "raw") + values_of(2)), Reason::truncated);
   EXPECT_EQ(refusal(slicer_header("ushort", "gzip") + packed(values_of(2))), Reason::truncated);

@@ -125,9 +125,8 @@ XrayImage read_by_content(const fs::path& path, std::string_view bytes, FileKind
           {Reason::lossy_image, fmt::format("{}: JPEG compresses an image with loss", origin)});
   }
   // NAME.json beside a DICOM file may be of its case.
-  if (const auto sidecar = kind == FileKind::dicom ? full_sidecar_of(path) : sidecar_of(path)) {
-    const StatedGeometry stated = value_or_throw(read_sidecar(*sidecar));
-    const std::string name = sidecar->filename().string();
+  if (const auto sidecar = value_or_throw(stated_beside(path, kind == FileKind::dicom))) {
+    const auto& [stated, name] = *sidecar;
     const int frames = outline ? outline->frames : film ? film->frames() : frames_of(bytes, kind, origin);
     if (frames > 1 && (stated.primary_deg || stated.secondary_deg))
       throw BadInput(

@@ -99,6 +99,9 @@ TEST_F(ReadXrayImage, SidecarMustBeValid) {
   EXPECT_EQ(reason("a.png"), "not_finite");
   write("a.json", R"({"pixel": 1})");
   EXPECT_EQ(reason("a.png"), "unknown_key");
+  write("a.png.json", R"({"source_detector_mm": 1000})");
+  EXPECT_EQ(reason("a.png"), "unknown_key");  // both count
+  write("a.json", R"({"pixel_mm": null})");
   write("a.png.json", R"({"pixel_mm": null, "source_detector_mm": 1000})");
   const auto xray_image = read("a.png");
   ASSERT_TRUE(xray_image) << xray_image.error().message;

@@ -64,6 +64,24 @@ void state_angle(std::optional<double>& own, std::optional<double> stated, const
   if (!own) own = stated;
 }
 
+/// Adds what another sidecar of the image states.
+void add_agreeing(StatedGeometry& stated, const StatedGeometry& other, const std::string& name,
+                  const std::string& other_name) {
+  const auto add = [&](std::optional<double> StatedGeometry::*value, const char* key) {
+    if (!(stated.*value)) stated.*value = other.*value;
+    if (other.*value && stated.*value != other.*value)
+      throw BadInput({Reason::bad_value,
+                      fmt::format("{}: \"{}\" is {:g}, {} states {:g}: correct one of them, or remove it",
+                                  name, key, *(stated.*value), other_name, *(other.*value)),
+                      {},
+                      {{"value", *(stated.*value)}, {"other", *(other.*value)}}});
+  };
+  add(&StatedGeometry::pixel_mm, "pixel_mm");
+  add(&StatedGeometry::source_detector_mm, "source_detector_mm");
+  add(&StatedGeometry::primary_deg, "primary_deg");
+  add(&StatedGeometry::secondary_deg, "secondary_deg");
+}
+
 }  // namespace
 
 std::optional<fs::path> full_sidecar_of(const fs::path& image) {
@@ -75,6 +93,20 @@ std::optional<fs::path> sidecar_of(const fs::path& image) {
   if (const auto full = full_sidecar_of(image)) return full;
   const fs::path name = short_name(image);
   return name != image && fs::exists(name) && !is_other_json(name) ? std::optional(name) : std::nullopt;
+}
+
+Expected<std::optional<std::pair<StatedGeometry, std::string>>> stated_beside(const fs::path& image,
+                                                                              bool full_name_only) {
+  return guarded([&]() -> std::optional<std::pair<StatedGeometry, std::string>> {
+    const auto first = full_name_only ? full_sidecar_of(image) : sidecar_of(image);
+    if (!first) return std::nullopt;
+    StatedGeometry stated = value_or_throw(read_sidecar(*first));
+    const std::string name = first->filename().string();
+    const fs::path other = short_name(image);
+    if (!full_name_only && other != *first && other != image && fs::exists(other) && !is_other_json(other))
+      add_agreeing(stated, value_or_throw(read_sidecar(other)), name, other.filename().string());
+    return std::pair(stated, name);
+  });
 }
 
 std::optional<fs::path> other_json_of(const fs::path& image) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "helicarm/xray/xray_image.h"
 
@@ -28,6 +29,11 @@ std::optional<std::filesystem::path> other_json_of(const std::filesystem::path& 
 
 /// Fails with the codes of JSON, or bad_value.
 Expected<StatedGeometry> read_sidecar(const std::filesystem::path& path);
+
+/// What the sidecars beside an image state together, and the name of the first; nothing without one.
+/// `full_name_only`: as `full_sidecar_of`. Refuses bad_value where two state different values.
+Expected<std::optional<std::pair<StatedGeometry, std::string>>> stated_beside(
+    const std::filesystem::path& image, bool full_name_only);
 
 /// Gives the image what its file does not state; `origin` names who states it. A pixel size takes the warning
 /// spacing_missing away. Refuses bad_value where the file's own value differs by more than 1 %, an angle by

@@ -124,6 +124,20 @@ TEST_F(Sidecar, CameraBesideTheImageIsNone) {
   EXPECT_EQ(read("a.png")->acquisition.pixel_mm->x(), 0.2);
 }
 
+TEST_F(Sidecar, TwoOfOneImageAgree) {
+  write_png("a.png");
+  write("a.png.json", R"({"pixel_mm": 0.2})");
+  write("a.json", R"({"pixel_mm": 0.2, "source_detector_mm": 1000})");
+  const auto image = read("a.png");
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->acquisition.source_detector_mm, 1000);
+  write("a.json", R"({"pixel_mm": 0.205, "source_detector_mm": 1000})");
+  const auto refused = read("a.png");
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message,
+              testing::HasSubstr("a.png.json: \"pixel_mm\" is 0.2, a.json states 0.205"));
+}
+
 TEST_F(Sidecar, MisspeltKeyIsRefused) {
   write_png("a.png");
   write("a.json", R"({"pixel": 0.2, "source_detector": 1000})");

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/xray/spatial_registration.h"
 
-#include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include <Eigen/LU>
 #include <dcmtk/config/osconfig.h>
@@ -20,16 +18,6 @@ namespace helicarm::xray {
 namespace {
 
 constexpr std::uintmax_t most_ct_slice_bytes = std::uintmax_t{64} << 20;
-
-std::optional<CtFrame> ct_frame_in(const std::filesystem::path& file) {
-  const auto bytes = read_file(file, most_ct_slice_bytes);
-  if (!bytes || !looks_like_dicom(*bytes)) return std::nullopt;
-  const auto elements = walk_dicom(*bytes, file.string());
-  if (!elements || elements->text(tags::sop_class) != ct_class) return std::nullopt;
-  CtFrame frame{std::string(elements->text(tags::frame_of_reference)), patient_study_in(*elements)};
-  if (frame.frame_of_reference_uid.empty()) return std::nullopt;
-  return frame;
-}
 
 /// A DS has at most sixteen characters.
 std::string decimals_of(const std::array<double, 16>& matrix) {
@@ -76,17 +64,15 @@ void put_registration(DcmDataset& dataset, const SpatialRegistration& registrati
 
 }  // namespace
 
-Expected<std::optional<CtFrame>> ct_frame_of(const std::filesystem::path& folder) {
+Expected<std::optional<CtFrame>> ct_frame_of(const std::filesystem::path& slice) {
   return guarded([&]() -> std::optional<CtFrame> {
-    std::error_code error;
-    if (!std::filesystem::is_directory(folder, error)) return std::nullopt;
-    std::vector<std::filesystem::path> files;
-    for (const auto& entry : std::filesystem::directory_iterator(folder))
-      if (entry.is_regular_file()) files.push_back(entry.path());
-    std::ranges::sort(files);
-    for (const auto& file : files)
-      if (auto frame = ct_frame_in(file)) return frame;
-    return std::nullopt;
+    const std::string bytes = value_or_throw(read_file(slice, most_ct_slice_bytes));
+    if (!looks_like_dicom(bytes)) return std::nullopt;
+    const DicomElements elements = value_or_throw(walk_dicom(bytes, slice.string()));
+    if (elements.text(tags::sop_class) != ct_class) return std::nullopt;
+    CtFrame frame{std::string(elements.text(tags::frame_of_reference)), patient_study_in(elements)};
+    if (frame.frame_of_reference_uid.empty()) return std::nullopt;
+    return frame;
   });
 }
 

@@ -17,8 +17,8 @@ struct CtFrame {
   PatientStudy patient_study;
 };
 
-/// Of the first CT slice of a folder, by name, that states one; nothing without such a slice.
-Expected<std::optional<CtFrame>> ct_frame_of(const std::filesystem::path& folder);
+/// Of the file of a CT slice; nothing for another file, or where the slice states none.
+Expected<std::optional<CtFrame>> ct_frame_of(const std::filesystem::path& slice);
 
 /// A rigid registration of a CT to another frame.
 struct SpatialRegistration {

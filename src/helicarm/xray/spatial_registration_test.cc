@@ -41,8 +41,8 @@ Written written(const SpatialRegistration& registration, const std::filesystem::
 
 TEST(SpatialRegistration, CarriesTheCtsFrameIntoTheOther) {
   const TemporaryFolder folder;
-  ASSERT_TRUE(write_file(folder.path() / "ct" / "1.dcm", ct_slice().bytes()));
-  const auto frame = ct_frame_of(folder.path() / "ct");
+  ASSERT_TRUE(write_file(folder.path() / "1.dcm", ct_slice().bytes()));
+  const auto frame = ct_frame_of(folder.path() / "1.dcm");
   ASSERT_TRUE(frame && *frame);
   EXPECT_EQ((*frame)->frame_of_reference_uid, "1.2.3.6");
   const auto file =
@@ -65,8 +65,8 @@ TEST(SpatialRegistration, CarriesTheCtsFrameIntoTheOther) {
 
 TEST(SpatialRegistration, ConformsToTheStandard) {
   const TemporaryFolder folder;
-  ASSERT_TRUE(write_file(folder.path() / "ct" / "1.dcm", ct_slice().bytes()));
-  const auto frame = ct_frame_of(folder.path() / "ct");
+  ASSERT_TRUE(write_file(folder.path() / "1.dcm", ct_slice().bytes()));
+  const auto frame = ct_frame_of(folder.path() / "1.dcm");
   written({**frame, "1.2.3.7", quarter_turn, "femur to calibrator"}, folder.path() / "reg.dcm");
   const auto errors = validated(folder.path() / "reg.dcm");
   if (!errors) GTEST_SKIP() << "dciodvfy (dicom3tools) is not installed";
@@ -94,12 +94,13 @@ TEST(SpatialRegistration, AMatrixThatIsNotRigidIsRefused) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "reg.dcm"));
 }
 
-TEST(SpatialRegistration, AFolderWithoutACtHasNoFrame) {
+TEST(SpatialRegistration, AFileThatIsNoCtSliceHasNoFrame) {
   const TemporaryFolder folder;
   ASSERT_TRUE(write_file(folder.path() / "note.txt", "no image"));
   ASSERT_TRUE(write_file(folder.path() / "ct.dcm", ct_slice().erase(0x00200052).bytes()));
-  EXPECT_FALSE(*ct_frame_of(folder.path()));
+  EXPECT_FALSE(*ct_frame_of(folder.path() / "note.txt"));
   EXPECT_FALSE(*ct_frame_of(folder.path() / "ct.dcm"));
+  EXPECT_EQ(ct_frame_of(folder.path() / "none.dcm").error().reason, Reason::missing_file);
 }
 
 }  // namespace spatial_registration_test

@@ -141,7 +141,7 @@ void put_identity(DcmDataset& dataset, const DerivedImage& image, const SopClass
   put(dataset, DCM_StudyInstanceUID, or_fresh(image.study_uid));
   if (!image.derived) return;
   put(dataset, DCM_PatientIdentityRemoved, "YES");
-  put(dataset, DCM_DeidentificationMethod, "Nothing of the source but geometry and pixels");
+  put(dataset, DCM_DeidentificationMethod, "Nothing of the source but geometry, technique and pixels");
 }
 
 /// The table by which logarithmic values become proportional to the dose (PS3.3 C.8.7.1.1.3 and C.11.1).
@@ -194,6 +194,16 @@ void put_object_spacing(DcmDataset& dataset, const ObjectSpacing& at) {
       decimal(*at.source_detector_mm / at.source_object_mm));
 }
 
+/// The source's time as it states it; not of an image without its patient.
+void put_time(DcmDataset& dataset, const DerivedImage& image) {
+  if (!image.acquisition.acquired || (image.derived && !image.patient_study)) return;
+  const WrittenTime at = written_time(*image.acquisition.acquired);
+  if (!at.is_of_content) return put(dataset, DCM_AcquisitionDateTime, at.date + at.time + at.offset);
+  put(dataset, DCM_ContentDate, at.date);
+  put(dataset, DCM_ContentTime, at.time);
+  if (!at.offset.empty()) put(dataset, DCM_TimezoneOffsetFromUTC, at.offset);
+}
+
 void put_acquisition(DcmDataset& dataset, const DerivedImage& image, const SopClass& sop_class) {
   const Acquisition& a = image.acquisition;
   if (a.pixel_mm)
@@ -205,7 +215,7 @@ void put_acquisition(DcmDataset& dataset, const DerivedImage& image, const SopCl
     if (a.source_detector_mm) put(dataset, DCM_DistanceSourceToDetector, decimal(*a.source_detector_mm));
     if (a.source_patient_mm) put(dataset, DCM_DistanceSourceToPatient, decimal(*a.source_patient_mm));
   }
-  if (a.acquired) put(dataset, DCM_AcquisitionDateTime, dicom_date_time(a.acquired->seconds));
+  put_time(dataset, image);
   if (sop_class.modality == "CR") return;
   if (a.flip_hint) put(dataset, DCM_FieldOfViewHorizontalFlip, "YES");
   if (sop_class.modality != "RF" || a.primary_angle_deg || a.secondary_angle_deg) {

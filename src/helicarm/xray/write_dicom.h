@@ -29,10 +29,10 @@ struct ObjectSpacing {
 /// except the fields below.
 struct DerivedImage {
   image::Image<std::uint16_t> pixels;
-  int bits_stored = 16;  ///< 8 .. 16; up to 8 bits are written as one byte per pixel
-  Acquisition
-      acquisition;      ///< spacing, source distance, angles, time, flip, logarithmic; keys are not written
-  bool derived = true;  ///< DERIVED, patient identity removed; else ORIGINAL
+  int bits_stored = 16;     ///< 8 .. 16; up to 8 bits are written as one byte per pixel
+  Acquisition acquisition;  ///< spacing, source distance, angles, flip, logarithmic; keys are not written,
+                            ///< the time only of an image that is not derived or has its `patient_study`
+  bool derived = true;      ///< DERIVED, patient identity removed; else ORIGINAL
   std::string series_description = {};
   std::string derivation = {};  ///< what was done to the source, one sentence
   std::string patient_name = "ANON";

@@ -154,6 +154,31 @@ TEST_F(WriteDicom, ImageIsStoredWithItsPatientWhereAsked) {
   for (const char* word : {"LLER", "76543", "A17", "1941"}) EXPECT_EQ(plain.find(word), plain.npos) << word;
 }
 
+TEST_F(WriteDicom, AnImageWithItsPatientKeepsItsTimeAsStated) {
+  const auto written = [&](const DicomBuilder& source, bool keeps) {
+    EXPECT_TRUE(write_file(folder_ / "source.dcm", source.bytes()));
+    const auto xray_image = read_xray_image(folder_ / "source.dcm", "AP", {});
+    EXPECT_TRUE(xray_image);
+    DerivedImage image = derived_image(*xray_image, xray_image->pixels, "rectified");
+    if (keeps) image.patient_study = *read_patient_study(folder_ / "source.dcm");
+    EXPECT_TRUE(write_dicom(folder_ / "written.dcm", image));
+    return *read_file(folder_ / "written.dcm", 1 << 20);
+  };
+  const auto value = [](const std::string& bytes, std::uint32_t tag) {
+    return std::string(walk_dicom(bytes, "written.dcm").value().text({tag, ""}));
+  };
+  constexpr std::uint32_t acquisition = 0x0008002A, day = 0x00080023, time = 0x00080033, zone = 0x00080201;
+  DicomBuilder local, content;
+  local.text(acquisition, "DT", "20260228235958.5");
+  content.text(day, "DA", "20260228").text(time, "TM", "235958").text(zone, "SH", "+0100");
+  EXPECT_EQ(value(written(local, true), acquisition), "20260228235958.5");
+  const std::string kept = written(content, true);
+  EXPECT_EQ(value(kept, acquisition), "");
+  EXPECT_EQ(value(kept, day) + value(kept, time) + value(kept, zone), "20260228225958+0000");
+  for (const DicomBuilder& source : {local, content})
+    EXPECT_EQ(written(source, false).find("20260228"), std::string::npos);
+}
+
 TEST(DerivedImages, OfOneStudyStayInOneStudy) {
   DicomBuilder file;
   file.text(0x0020000D, "UI", "1.2.76543.21");

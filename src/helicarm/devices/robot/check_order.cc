@@ -62,8 +62,8 @@ void check_keep_outs(const RobotOrder& order, const RobotModel& model, const Joi
       return radius_mm - (point - order.keep_outs[i].point_in_base).dot(order.keep_outs[i].normal);
     };
     double deepest = std::max(depth(tip, 0), depth(frames.back().translation, 0));
-    for (int joint = 1; joint < 5; ++joint)
-      deepest = std::max(deepest, depth(frames[joint].translation, limits.arm_radius_mm));
+    for (const Eigen::Vector3d& point : arm_points(model, joints))
+      deepest = std::max(deepest, depth(point, limits.arm_radius_mm));
     if (deepest > 0)
       throw BadInput({Reason::keep_out,
                       fmt::format("the path enters keep-out region {} by {:.1f} mm", i, deepest),
@@ -143,6 +143,13 @@ double angle_deg(const geometry::RigidTransform& a, const geometry::RigidTransfo
 }
 
 }  // namespace
+
+std::array<Eigen::Vector3d, 7> arm_points(const RobotModel& model, const Joints& joints) {
+  const auto frames = joint_frames(model, joints);
+  const Eigen::Vector3d beside(0, 0, model.shoulder_offset);
+  return {frames[0].translation, frames[0] * beside,    frames[1].translation, frames[1] * beside,
+          frames[2].translation, frames[3].translation, frames[4].translation};
+}
 
 Expected<Joints> check_path(const RobotOrder& order, const RobotLimits& limits) {
   return guarded([&] { return walk_all(order, order.start, limits); });

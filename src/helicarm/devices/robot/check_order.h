@@ -15,13 +15,17 @@ struct RobotLimits {
   double heaviest_kg = 5;              ///< UR5 and UR5e
   double fastest_joint_rad_s = 0.6;    ///< lets `stop_rad_s2` of script.h stop it in 75 ms
   double least_singular_value = 0.02;  ///< lengths in metres; 0.02 is 4 degrees from a stretched wrist
-  double arm_radius_mm = 60;           ///< from the joints' frames to the arm's surface, for keep-out planes
+  double arm_radius_mm = 60;           ///< from `arm_points` to the arm's surface, for keep-out planes
   double start_mm = 2;                 ///< largest distance of the tip from its position at planning
   double start_joint_deg = 2;
   double tool_mm = 0.5;  ///< largest difference between the robot's TCP and the order's
   double tool_deg = 0.2;
   double payload_kg = 0.2;
 };
+
+/// Points of shoulder, elbow and wrists in the base, mm: the arm lies between them. The upper arm runs beside
+/// the frames of shoulder and elbow.
+std::array<Eigen::Vector3d, 7> arm_points(const RobotModel& model, const Joints& joints);
 
 /// Checks the order alone: numbers and limits, then reach, joint limits, configuration changes, singular
 /// poses, joint speeds and keep-out planes along the whole path, every 2 mm and half degree. Refuses with

@@ -75,11 +75,13 @@ void append_solutions(const RobotModel& model, const geometry::RigidTransform& b
 
 }  // namespace
 
+// Shoulder offsets: Universal_Robots_ROS2_Description, config/ur5 and config/ur5e, physical_parameters.yaml.
+
 // UR5 user manual (CB3, series 3), appendix B.2.
-RobotModel ur5() { return {"UR5", 89.159, -425, -392.25, 109.15, 94.65, 82.3, 125, joint_limits()}; }
+RobotModel ur5() { return {"UR5", 89.159, -425, -392.25, 109.15, 94.65, 82.3, 135.85, 125, joint_limits()}; }
 
 // Universal Robots, "DH parameters for calculations of kinematics and dynamics".
-RobotModel ur5e() { return {"UR5e", 162.5, -425, -392.2, 133.3, 99.7, 99.6, 500, joint_limits()}; }
+RobotModel ur5e() { return {"UR5e", 162.5, -425, -392.2, 133.3, 99.7, 99.6, 138, 500, joint_limits()}; }
 
 std::array<geometry::RigidTransform, 6> joint_frames(const RobotModel& model, const Joints& joints) {
   std::array<geometry::RigidTransform, 6> frames;

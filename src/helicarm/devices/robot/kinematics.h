@@ -20,6 +20,7 @@ using Joints = Eigen::Matrix<double, 6, 1>;
 struct RobotModel {
   std::string name;
   double d1, a2, a3, d4, d5, d6;
+  double shoulder_offset;   ///< of the upper arm beside the plane of a2 and a3, along the axis of joint 2, mm
   double rate_hz;           ///< of the controller and of its states
   Joints farthest = {};     ///< in either direction, rad
   double fastest = 3.1416;  ///< every joint, rad/s

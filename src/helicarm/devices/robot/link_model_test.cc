@@ -75,5 +75,38 @@ TEST(LinkModel, EveryBrokenRuleOfTheScriptIsDetected) {
   expect_found("watch", [](Rules& rules) { rules.watch = false; });
 }
 
+RobotState in_mode(SafetyMode mode) {
+  RobotState state;
+  state.safety_mode = mode;
+  return state;
+}
+
+TEST(LinkStateMachine, StopOfTheRobotItselfIsItsReasonAlsoBehindAnotherStop) {
+  const LinkStateMachine::Time now{};
+  LinkStateMachine machine;
+  machine.heard(in_mode(SafetyMode::normal), now);
+  machine.stop({Reason::plan_stale, "femur moved"});
+  const auto shown = machine.stops();
+  machine.heard(in_mode(SafetyMode::protective_stop), now);
+  machine.heard(in_mode(SafetyMode::normal), now);
+  EXPECT_EQ(machine.why().value().reason, Reason::robot_stopped);
+  const auto refused = machine.unlock(shown, now);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::robot_stopped);
+  EXPECT_TRUE(machine.unlock(machine.stops(), now));
+}
+
+TEST(LinkStateMachine, StopOfAnotherKindCountsAgain) {
+  const LinkStateMachine::Time now{};
+  LinkStateMachine machine;
+  machine.heard(in_mode(SafetyMode::safeguard_stop), now);
+  const auto shown = machine.stops();
+  machine.heard(in_mode(SafetyMode::safeguard_stop), now);
+  EXPECT_EQ(machine.stops(), shown);
+  machine.heard(in_mode(SafetyMode::protective_stop), now);
+  EXPECT_GT(machine.stops(), shown);
+  EXPECT_NE(machine.why().value().message.find("PROTECTIVE_STOP"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace helicarm::robot

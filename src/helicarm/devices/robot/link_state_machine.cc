@@ -14,6 +14,12 @@ using enum LinkAction;
 /// Larger jumps of the robot's clock between two states are treated as another clock.
 constexpr double clock_leap_s = 1;
 
+/// Of the robot's safety system.
+bool is_another_stop(const RobotState& before, const RobotState& now) {
+  return now.safety_mode != before.safety_mode && now.safety_mode != SafetyMode::normal &&
+         now.safety_mode != SafetyMode::reduced;
+}
+
 Failure robot_stopped(std::string message) { return {Reason::robot_stopped, std::move(message)}; }
 
 std::chrono::steady_clock::duration duration_of(double s) {
@@ -78,7 +84,7 @@ Heartbeat LinkStateMachine::heard(const RobotState& state, Time now) {
   }
   if (const auto why = why_stopped(state)) {
     // A lasting stop counts once; otherwise a protective stop could not be unlocked.
-    if (!robot_stopped_ || phase_ != stopped) stop(*why);
+    if (!robot_stopped_ || phase_ != stopped || is_another_stop(*state_, state)) stop_by_robot(*why);
     confirmations_.forget_all();
     robot_stopped_ = true;
   } else {
@@ -102,6 +108,12 @@ void LinkStateMachine::lost(const Failure& why) {
   robot_stopped_ = false;
 }
 
+/// Its own stop is no consequence of another one: whoever unlocks the robot must be shown it.
+void LinkStateMachine::stop_by_robot(const Failure& why) {
+  why_ = why;
+  apply(LinkEvent::stop);
+}
+
 /// The first reason is kept: later ones are consequences.
 void LinkStateMachine::stop(const Failure& why) {
   if (phase_ != stopped) why_ = why;
@@ -116,7 +128,7 @@ Failure LinkStateMachine::stop_order(Stops since, const Failure& why) {
 
 Failure LinkStateMachine::stopped_since() const {
   return why_.value_or(
-      robot_stopped("the robot was stopped and unlocked since the confirmation: confirm the order again"));
+      robot_stopped("the robot was stopped and unlocked meanwhile: look at it and confirm again"));
 }
 
 Expected<LinkStateMachine::Stops> LinkStateMachine::redeem(const std::string& token, const RobotOrder& order,
@@ -126,8 +138,13 @@ Expected<LinkStateMachine::Stops> LinkStateMachine::redeem(const std::string& to
   return stops_;
 }
 
-Expected<void> LinkStateMachine::unlock(Stops since, Time now) {
+Expected<void> LinkStateMachine::none_since(Stops since) const {
   if (since != stops_) return tl::unexpected<Failure>(stopped_since());
+  return {};
+}
+
+Expected<void> LinkStateMachine::unlock(Stops since, Time now) {
+  if (auto none = none_since(since); !none) return none;
   if (!state_ || age_s(now) > times_.stale_s)
     return fail(Reason::stale_state, "the robot's state is unknown");
   if (const auto why = why_stopped(*state_)) return tl::unexpected<Failure>(*why);

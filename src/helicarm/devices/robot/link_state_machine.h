@@ -84,7 +84,9 @@ class LinkStateMachine {
   std::string confirm(const RobotOrder& order, Time now) { return confirmations_.confirm(order, now); }
   /// Returns the stop count for the order. Refuses `order_not_confirmed`.
   Expected<Stops> redeem(const std::string& token, const RobotOrder& order, Time now);
-  /// Refuses `stale_state`, `robot_stopped`, and `robot_locked` during an order.
+  /// Refuses with the reason of a stop that was counted since.
+  Expected<void> none_since(Stops since) const;
+  /// Refuses as `none_since`, `stale_state`, `robot_stopped`, and `robot_locked` during an order.
   Expected<void> unlock(Stops since, Time now);
   /// Whether an order may be sent now: else `not_connected`, `robot_locked`, `stale_state`, or the stop in
   /// between.
@@ -98,7 +100,9 @@ class LinkStateMachine {
   LinkPhase phase() const { return phase_; }
   Stops stops() const { return stops_; }
   const std::optional<RobotState>& state() const { return state_; }
-  const std::optional<Failure>& why() const { return why_; }  ///< reason of the last stop
+  /// Reason of the last stop: the first one until the robot is unlocked, but a stop of the robot itself goes
+  /// before all others.
+  const std::optional<Failure>& why() const { return why_; }
   double age_s(Time now) const { return std::chrono::duration<double>(now - heard_).count(); }
   /// Whether an order is sent or in execution.
   bool permits() const { return order_ != OrderNumber{}; }
@@ -108,6 +112,7 @@ class LinkStateMachine {
   bool apply(LinkEvent event);
   Expected<bool> judge(Time now) const;
   Failure stopped_since() const;
+  void stop_by_robot(const Failure& why);
 
   LinkTimes times_;
   const LinkTable* table_;

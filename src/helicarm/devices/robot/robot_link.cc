@@ -73,7 +73,8 @@ RobotLinkStatus RobotLink::status() const {
   const std::lock_guard lock(guard_);
   const auto& state = machine_.state();
   RobotLinkStatus status{
-      machine_.phase(), machine_.why(), state, state ? machine_.age_s(Clock::now()) : 0, version_, {}};
+      machine_.phase(), machine_.why(), state, state ? machine_.age_s(Clock::now()) : 0, version_, {},
+      machine_.stops()};
   if (!state) return status;
   const double mismatch = kinematic_mismatch_mm(config_.model, *state);
   if (mismatch > config_.mismatch_mm)
@@ -95,24 +96,27 @@ Expected<RobotState> RobotLink::wait_connected(Clock::duration patience) const {
       machine_.why().value_or(Failure{Reason::not_connected, "the robot does not respond"}));
 }
 
-Expected<void> RobotLink::unlock(const std::string& who) {
+Expected<void> RobotLink::unlock(const std::string& who, const RobotLinkStatus& shown) {
   if (who.empty() || who.size() > 100 || holds_control_character(who))
     return fail(Reason::bad_value, "the name of the user who unlocks the robot is missing");
-  const Stops since = [&] {
-    const std::lock_guard lock(guard_);
-    return machine_.stops();
-  }();
   const auto present = wait_connected({});
   if (!present) return tl::unexpected<Failure>(present.error());
   if (auto remote = driver_->check_remote_control(); !remote) return remote;
-  if (present->safety_mode == SafetyMode::protective_stop) {
+  const auto is_protective = [&] {
+    const std::lock_guard lock(guard_);
+    return machine_.none_since(shown.stops).map([&] {
+      return machine_.state() && machine_.state()->safety_mode == SafetyMode::protective_stop;
+    });
+  }();
+  if (!is_protective) return tl::unexpected<Failure>(is_protective.error());
+  if (*is_protective) {
     if (auto released = driver_->release_protective_stop(); !released) return released;
     std::unique_lock lock(guard_);
     news_.wait_for(lock, clock_duration(config_.start_s),
                    [&] { return machine_.state() && !why_stopped(*machine_.state()); });
   }
   const std::lock_guard lock(guard_);
-  return machine_.unlock(since, Clock::now());
+  return machine_.unlock(shown.stops, Clock::now());
 }
 
 void RobotLink::stop() {

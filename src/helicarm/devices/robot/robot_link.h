@@ -35,6 +35,7 @@ struct RobotLinkStatus {
   double age_s = 0;  ///< of the state
   ControllerVersion version;
   std::vector<Warning> warnings;
+  LinkStateMachine::Stops stops = 0;  ///< counted so far: what `RobotLink::unlock` resets
 };
 
 /// A robot behind its driver, and the lock on its motion: threads around a `LinkStateMachine`, which decides.
@@ -53,10 +54,11 @@ class RobotLink {
   /// Recent tool poses.
   const ToolTrack& track() const { return track_; }
 
-  /// The user has inspected the robot and allows motion. Releases a protective stop, which the robot permits
-  /// 5 s after it; refuses if the robot's state does not allow motion (`robot_stopped`), in local mode
-  /// (`robot_locked`), without a connection, or after a stop during the call.
-  Expected<void> unlock(const std::string& who);
+  /// The user has inspected the robot, whose status was `shown`, and allows motion. Releases a protective
+  /// stop, which the robot permits 5 s after it; refuses with its reason a stop that the status did not hold,
+  /// if the robot's state does not allow motion (`robot_stopped`), in local mode (`robot_locked`), and
+  /// without a connection.
+  Expected<void> unlock(const std::string& who, const RobotLinkStatus& shown);
 
   /// Token for this order, for the user who has seen its preview.
   std::string confirm(const RobotOrder& order);

@@ -143,6 +143,36 @@ TEST(CheckOrder, PathIntoAKeepOutRegionIsRefused) {
   EXPECT_GT(checked.error().figures.at("depth_mm"), 0);
 }
 
+/// Stays where it is, behind a plane.
+RobotOrder at_rest_before(const KeepOut& plane) {
+  RobotOrder order = planned();
+  order.waypoints.resize(1);
+  order.waypoints[0].base_from_tcp = base_from_flange(ur5(), order.start) * drill().flange_from_tcp;
+  order.keep_outs = {plane};
+  return order;
+}
+
+TEST(CheckOrder, UpperArmBesideTheJointsFramesIsKeptOut) {
+  const geometry::RigidTransform elbow = joint_frames(ur5(), resting_joints())[1];
+  const auto plane_at = [&](double clearance_mm) {
+    const double off_mm = 135.85 + 60 + clearance_mm;  // the frames of elbow and wrist end 27 mm before
+    return KeepOut{elbow * Eigen::Vector3d(0, 0, off_mm), -elbow.rotation.col(2)};
+  };
+  EXPECT_TRUE(check_path(at_rest_before(plane_at(1))));
+  const auto refused = check_path(at_rest_before(plane_at(-5)));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::keep_out);
+  EXPECT_NEAR(refused.error().figures.at("depth_mm"), 5, 1e-6);
+}
+
+TEST(CheckOrder, ShoulderIsKeptOut) {
+  const double lowest_mm = ur5().d1 - 60;  // everything else is higher
+  EXPECT_TRUE(check_path(at_rest_before({{0, 0, lowest_mm - 1}, Eigen::Vector3d::UnitZ()})));
+  const auto refused = check_path(at_rest_before({{0, 0, lowest_mm + 10}, Eigen::Vector3d::UnitZ()}));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::keep_out);
+}
+
 TEST(CheckOrder, ArmMovedSincePlanningIsRefused) {
   RobotState state = resting_state();
   state.joints[0] += 0.001;

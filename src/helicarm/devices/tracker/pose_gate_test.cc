@@ -189,6 +189,67 @@ TEST(DeviceClock, DelayedPosesGiveNoNewTimeBase) {
   EXPECT_NEAR(*clock.local(102.02, 3.02), 3.02, 1e-3);
 }
 
+TEST(DeviceClock, LatePosesStayLateUntilTheyCatchUp) {
+  Scene scene;
+  EXPECT_EQ(scene.rejected_of(50), 0);
+  scene.delay += 0.8;
+  EXPECT_EQ(scene.rejected_of(1000), 1000);
+  EXPECT_EQ(scene.gate.rejected().at("late"), 1000u);
+  scene.delay -= 0.8;
+  EXPECT_EQ(scene.next(), "passed");
+  EXPECT_NEAR(scene.last.time_s, scene.now + scene.delay, 1e-3);
+}
+
+TEST(DeviceClock, DelayIsNoDriftThoughItLasts) {
+  Scene scene;
+  scene.rejected_of(50);
+  const double least = scene.delay;
+  scene.delay += 0.3;
+  EXPECT_EQ(scene.rejected_of(200000), 0);  // more than an hour
+  EXPECT_NEAR(scene.last.time_s, scene.now + least, 2e-3);
+}
+
+TEST(DeviceClock, DriftIsFollowed) {
+  DeviceClock clock;
+  for (int i = 0; i < 200000; ++i) {
+    const double now = 0.02 * i, time = *clock.local(1000 + now * (1 - 50e-6), now + 0.005);
+    ASSERT_NEAR(time, now + 0.005, 1e-4);
+  }
+}
+
+TEST(DeviceClock, ClockSetByLessThanHalfASecondDoesNotChangeTheAge) {
+  for (const double step : {-0.1, -0.3, -0.45, 0.3}) {
+    Scene scene;
+    scene.rejected_of(100);
+    scene.device_ahead += step;
+    EXPECT_LE(scene.rejected_of(100), 1 / 0.02 + 2) << step;
+    EXPECT_EQ(scene.rejected_of(100), 0) << step;
+    EXPECT_NEAR(scene.last.time_s, scene.now + scene.delay, 1e-3) << step;
+  }
+}
+
+TEST(DeviceClock, DelayOutlastsASettingOfTheClock) {
+  for (const double step : {-1.0, -3600.0, 3600.0}) {
+    Scene scene;
+    scene.rejected_of(100);
+    scene.delay += 0.8;
+    scene.rejected_of(200);
+    scene.device_ahead += step;
+    EXPECT_EQ(scene.rejected_of(500), 500) << step;
+    scene.delay -= 0.8;
+    scene.next();
+    EXPECT_NEAR(scene.last.time_s, scene.now + scene.delay, 1e-3) << step;
+  }
+}
+
+TEST(DeviceClock, MessagesLostInAStallAreNoSettingOfTheClock) {
+  DeviceClock clock;
+  for (int i = 0; i < 50; ++i) ASSERT_TRUE(clock.local(100 + 0.02 * i, 1 + 0.02 * i));
+  for (int i = 50; i < 60; ++i) EXPECT_EQ(clock.local(100 + 0.02 * i, 4).error(), PoseFault::late);
+  for (int i = 148; i < 151; ++i) EXPECT_TRUE(clock.local(100 + 0.02 * i, 4));
+  EXPECT_NEAR(*clock.local(103.02, 4.02), 4.02, 1e-3);
+}
+
 TEST(DeviceClock, WithoutStampsTheArrivalTimeIsUsed) {
   DeviceClock clock;
   EXPECT_EQ(clock.local(0, 5), 5);

@@ -31,7 +31,7 @@ struct LinkedArm {
   }
   /// The failure of an order during which `bring` is called while the arm moves.
   Failure fault_on_the_way(const std::function<void()>& bring) {
-    EXPECT_TRUE(link->unlock("tester"));
+    EXPECT_TRUE(link->unlock("tester", link->status()));
     const RobotOrder order = planned();
     const std::string token = link->confirm(order);
     auto done = std::async(std::launch::async, [&] { return link->execute(order, token); });
@@ -50,7 +50,7 @@ struct LinkedArm {
 
 TEST(ArmDriver, ConfirmedOrderEndsAtItsTarget) {
   LinkedArm robot;
-  ASSERT_TRUE(robot.link->unlock("tester"));
+  ASSERT_TRUE(robot.link->unlock("tester", robot.link->status()));
   const RobotOrder order = planned();
   const auto misses = robot.execute(order);
   ASSERT_TRUE(misses) << misses.error().message;
@@ -93,14 +93,28 @@ TEST(ArmDriver, ProtectiveStopIsReleasedByUnlocking) {
   const Failure why = robot.fault_on_the_way([&] { robot.arm->set_protective_stop(true); });
   EXPECT_EQ(why.reason, Reason::robot_stopped) << why.message;
   robot.wait_until_it_rests();
-  const auto unlocked = robot.link->unlock("tester");
+  const auto unlocked = robot.link->unlock("tester", robot.link->status());
   EXPECT_TRUE(unlocked) << unlocked.error().message;
+}
+
+TEST(ArmDriver, ProtectiveStopThatWasNotShownIsNotReleased) {
+  LinkedArm robot;
+  robot.link->stop();
+  const RobotLinkStatus shown = robot.link->status();
+  robot.arm->set_protective_stop(true);
+  while (robot.link->status().stops == shown.stops) std::this_thread::yield();
+  const auto refused = robot.link->unlock("tester", shown);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::robot_stopped);
+  EXPECT_EQ(robot.arm->state().safety_mode, SafetyMode::protective_stop);
+  EXPECT_EQ(robot.link->status().phase, LinkPhase::stopped);
+  EXPECT_TRUE(robot.link->unlock("tester", robot.link->status()));
 }
 
 TEST(ArmDriver, LocalModeIsRefused) {
   LinkedArm robot;
   robot.arm->set_local_mode(true);
-  const auto refused = robot.link->unlock("tester");
+  const auto refused = robot.link->unlock("tester", robot.link->status());
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::robot_locked);
 }

@@ -58,7 +58,7 @@ struct Drill {
 
   /// Starts the slow order and causes the fault while the arm moves; returns the order's failure.
   Failure fault_on_the_way(const std::function<void()>& bring) {
-    EXPECT_TRUE(link.unlock("tester"));
+    EXPECT_TRUE(link.unlock("tester", link.status()));
     const RobotOrder order = slow_order();
     const std::string token = link.confirm(order);
     auto done = std::async(std::launch::async, [&] { return link.execute(order, token, {}, watch); });
@@ -114,8 +114,8 @@ TEST(RobotDrill, ConfirmedOrderIsExecutedOnce) {
   const RobotOrder order = planned();
   const auto locked = drill.link.execute(order, drill.link.confirm(order));
   EXPECT_EQ(locked.error().reason, Reason::robot_locked);
-  EXPECT_EQ(drill.link.unlock("").error().reason, Reason::bad_value);
-  ASSERT_TRUE(drill.link.unlock("tester"));
+  EXPECT_EQ(drill.link.unlock("", drill.link.status()).error().reason, Reason::bad_value);
+  ASSERT_TRUE(drill.link.unlock("tester", drill.link.status()));
   EXPECT_EQ(drill.link.execute(order, "0123").error().reason, Reason::order_not_confirmed);
   const std::string token = drill.link.confirm(order);
   const auto misses = drill.link.execute(order, token);
@@ -139,7 +139,7 @@ TEST(RobotDrill, EveryStopIsLatchedUntilUnlocked) {
     EXPECT_EQ(failure.reason, Reason::robot_stopped);
     EXPECT_THAT(failure.message, testing::HasSubstr(text));
     EXPECT_LT(drill.silent_stop_s(), 0.5);
-    EXPECT_EQ(drill.link.unlock("tester").error().reason, Reason::robot_stopped);
+    EXPECT_EQ(drill.link.unlock("tester", drill.link.status()).error().reason, Reason::robot_stopped);
     drill.expect_locked();
     drill.robot->set(fault, false);
     for (const auto command : {"restart safety", "power on", "brake release"})
@@ -150,7 +150,7 @@ TEST(RobotDrill, EveryStopIsLatchedUntilUnlocked) {
     const Joints rested = drill.robot->truth().state.joints;
     drill.pass(1);
     EXPECT_EQ(drill.robot->truth().state.joints, rested);
-    EXPECT_TRUE(drill.link.unlock("tester"));
+    EXPECT_TRUE(drill.link.unlock("tester", drill.link.status()));
   }
 }
 
@@ -161,13 +161,13 @@ TEST(RobotDrill, EmergencyStopNeedsPowerBrakesAndUnlock) {
   EXPECT_THAT(failure.message, testing::HasSubstr("EMERGENCY"));
   EXPECT_LT(drill.silent_stop_s(), 0.5);
   drill.robot->set(RobotFault::emergency_stop, false);
-  EXPECT_EQ(drill.link.unlock("tester").error().reason, Reason::robot_stopped);
+  EXPECT_EQ(drill.link.unlock("tester", drill.link.status()).error().reason, Reason::robot_stopped);
   for (const auto command : {DashboardCommand::power_on, DashboardCommand::brake_release})
     EXPECT_TRUE(ask_dashboard("127.0.0.1", drill.robot->dashboard_port(), command, 10s));
   drill.pass(0.1);
   EXPECT_EQ(drill.link.status().phase, LinkPhase::stopped);
   drill.expect_locked();
-  EXPECT_TRUE(drill.link.unlock("tester"));
+  EXPECT_TRUE(drill.link.unlock("tester", drill.link.status()));
 }
 
 TEST(RobotDrill, ProtectiveStopIsReleasedByUnlockAfterFiveSeconds) {
@@ -184,7 +184,7 @@ TEST(RobotDrill, ProtectiveStopIsReleasedByUnlockAfterFiveSeconds) {
   drill.robot->advance(5.1);
   drill.robot->set(RobotFault::frozen_states, false);
   drill.pass(0.1);  // the jump of the robot's clock is a stop of its own
-  EXPECT_TRUE(drill.link.unlock("tester")) << drill.link.unlock("tester").error().message;
+  EXPECT_TRUE(drill.link.unlock("tester", drill.link.status()));
 }
 
 TEST(RobotDrill, CutCableStopsTheRobotByItself) {
@@ -205,7 +205,7 @@ TEST(RobotDrill, CutCableStopsTheRobotByItself) {
   EXPECT_EQ(drill.link.status().phase, LinkPhase::idle);
   drill.expect_locked();
   EXPECT_EQ(drill.robot->truth().state.joints, rested);
-  EXPECT_TRUE(drill.link.unlock("tester"));
+  EXPECT_TRUE(drill.link.unlock("tester", drill.link.status()));
 }
 
 TEST(RobotDrill, InterruptedStreamsStopTheRobotAndEndTheConnection) {
@@ -273,7 +273,7 @@ TEST(RobotDrill, TrackerLostDuringMotionStopsTheRobotAndIsLatched) {
 
 TEST(RobotDrill, NothingMovesWithoutTracking) {
   Drill drill;
-  ASSERT_TRUE(drill.link.unlock("tester"));
+  ASSERT_TRUE(drill.link.unlock("tester", drill.link.status()));
   const RobotOrder order = planned();
   const auto refused = drill.link.execute(order, drill.link.confirm(order), {}, [] {
     return Expected<void>(fail(Reason::no_pose, "the tool was never visible"));
@@ -284,7 +284,7 @@ TEST(RobotDrill, NothingMovesWithoutTracking) {
 
 TEST(RobotDrill, ArmMovedByHandOrOtherToolRequiresANewPlan) {
   Drill drill;
-  ASSERT_TRUE(drill.link.unlock("tester"));
+  ASSERT_TRUE(drill.link.unlock("tester", drill.link.status()));
   const RobotOrder order = planned();
   drill.robot->set(RobotFault::other_tool);
   drill.pass(0.1);
@@ -298,11 +298,11 @@ TEST(RobotDrill, ArmMovedByHandOrOtherToolRequiresANewPlan) {
 
 TEST(RobotDrill, LocalModeAndClosedBrakesAreRefused) {
   Drill drill;
-  ASSERT_TRUE(drill.link.unlock("tester"));
+  ASSERT_TRUE(drill.link.unlock("tester", drill.link.status()));
   const RobotOrder order = planned();
   drill.robot->set(RobotFault::local_mode);
   EXPECT_EQ(drill.link.execute(order, drill.link.confirm(order)).error().reason, Reason::robot_locked);
-  EXPECT_EQ(drill.link.unlock("tester").error().reason, Reason::robot_locked);
+  EXPECT_EQ(drill.link.unlock("tester", drill.link.status()).error().reason, Reason::robot_locked);
   drill.robot->set(RobotFault::local_mode, false);
   drill.robot->set(RobotFault::brake_not_released);
   drill.pass(0.1);
@@ -338,7 +338,7 @@ TEST(RobotLink, RobotThatIsAbsentOrUsesAnotherProtocolIsReported) {
     nowhere.rtde_port = gone->rtde_port();
   }
   RobotLink link(nowhere);
-  EXPECT_EQ(link.unlock("tester").error().reason, Reason::not_connected);
+  EXPECT_EQ(link.unlock("tester", link.status()).error().reason, Reason::not_connected);
 }
 
 TEST(RobotLink, LoopOverTheTrackerCorrectsAnArmThatIsNotNominal) {
@@ -348,7 +348,7 @@ TEST(RobotLink, LoopOverTheTrackerCorrectsAnArmThatIsNotNominal) {
   auto robot = VirtualUr::start(options).value();
   RobotLink link(config_for(*robot));
   ASSERT_TRUE(link.wait_connected(10s));
-  ASSERT_TRUE(link.unlock("tester"));
+  ASSERT_TRUE(link.unlock("tester", link.status()));
   ApproachOptions approach;
   approach.corrections = {
       .most = 4, .longest_mm = 3, .widest_deg = 2, .tolerance_mm = 0.05, .tolerance_deg = 0.05};
@@ -371,7 +371,7 @@ TEST(RobotLink, ToolThatStaysOffTargetIsStopped) {
   auto robot = VirtualUr::start(options).value();
   RobotLink link(config_for(*robot));
   ASSERT_TRUE(link.wait_connected(10s));
-  ASSERT_TRUE(link.unlock("tester"));
+  ASSERT_TRUE(link.unlock("tester", link.status()));
   ApproachOptions approach;
   approach.corrections.most = 3;
   const RobotOrder order = planned(approach);

@@ -22,7 +22,7 @@ struct StopDrill {
   explicit StopDrill(double start_s = 60, bool lockstep = true)
       : robot(VirtualUr::start(options(lockstep)).value()), link(config(*robot, start_s)) {
     EXPECT_TRUE(link.wait_connected(10s));
-    EXPECT_TRUE(link.unlock("tester"));
+    EXPECT_TRUE(link.unlock("tester", link.status()));
   }
   static VirtualUrOptions options(bool lockstep) {
     VirtualUrOptions options;
@@ -152,7 +152,7 @@ TEST(StoppedOrder, IsNotKeptAliveByALaterOrder) {
   StopDrill drill(1);
   const Eigen::Vector3d rested = drill.tip();
   drill.stop_while_script_waits(order_with(1200), {0.5, 0.8});
-  ASSERT_TRUE(drill.link.unlock("tester"));
+  ASSERT_TRUE(drill.link.unlock("tester", drill.link.status()));
   drill.robot->delay_scripts({});  // the next one never starts
   const RobotOrder next = order_with(1200);
   EXPECT_EQ(drill.link.execute(next, drill.link.confirm(next)).error().reason, Reason::robot_stopped);
@@ -194,7 +194,8 @@ TEST(StoppedOrder, ScriptReceivedAgainDuringItsMotionEndsIt) {
 TEST(StoppedOrder, StopDuringUnlockIsNotLost) {
   StopDrill drill;
   drill.robot->hold_dashboard(true);
-  auto unlocked = std::async(std::launch::async, [&] { return drill.link.unlock("tester"); });
+  auto unlocked =
+      std::async(std::launch::async, [&] { return drill.link.unlock("tester", drill.link.status()); });
   while (drill.robot->truth().waiting_questions == 0) std::this_thread::yield();
   drill.link.stop();
   drill.robot->hold_dashboard(false);
@@ -202,7 +203,7 @@ TEST(StoppedOrder, StopDuringUnlockIsNotLost) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::robot_stopped);
   EXPECT_EQ(drill.link.status().phase, LinkPhase::stopped);
-  EXPECT_TRUE(drill.link.unlock("tester"));
+  EXPECT_TRUE(drill.link.unlock("tester", drill.link.status()));
 }
 
 TEST(StoppedOrder, UnlockDoesNotResumeItBeforeItsScript) {
@@ -212,7 +213,7 @@ TEST(StoppedOrder, UnlockDoesNotResumeItBeforeItsScript) {
   const auto refused = drill.link.execute(order, drill.link.confirm(order), {}, [&]() -> Expected<void> {
     if (std::exchange(stopped, true)) return {};
     drill.link.stop();
-    return drill.link.unlock("tester");
+    return drill.link.unlock("tester", drill.link.status());
   });
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::robot_stopped);
@@ -228,7 +229,7 @@ TEST(StoppedOrder, UnlockDoesNotResumeItsCorrections) {
   const auto refused =
       drill.link.execute(order, drill.link.confirm(order), [&]() -> Expected<ToolMeasurement> {
         drill.link.stop();
-        EXPECT_TRUE(drill.link.unlock("tester"));
+        EXPECT_TRUE(drill.link.unlock("tester", drill.link.status()));
         rested = drill.tip();
         return ToolMeasurement{{}, {Eigen::Matrix3d::Identity(), {0, 0, 2}}};
       });
@@ -245,7 +246,7 @@ TEST(StoppedOrder, ConcurrentCallsEndWithTheLastStop) {
   std::atomic<int> stops{0};
   std::atomic<bool> over{false};
   std::jthread person([&] {
-    while (!over) (void)drill.link.unlock("tester");
+    while (!over) (void)drill.link.unlock("tester", drill.link.status());
   });
   std::jthread other([&] {
     while (!over) {
