@@ -48,6 +48,7 @@ void print(const pipeline::CaseBundle& bundle, const std::filesystem::path& out,
 /// Packs a de-identified case, its result and a log into one file for a bug report.
 CommandResult bundle_command(const BundleArguments& arguments, Console& console) {
   return guarded([&] {
+    value_or_throw(pipeline::check_bundle_file(arguments.out, arguments.folder, arguments.result));
     forget_files(arguments.out.parent_path(), {arguments.out.filename().string()});
     pipeline::BundleOptions options{arguments.options, !arguments.no_run, {}};
     options.run.threads = console.threads;

@@ -69,13 +69,15 @@ bool Consent::agreed(const robot::RobotOrder& order, const std::function<Expecte
 }
 
 void Consent::unlock() {
+  std::optional<Failure> refused;
   for (;;) {
     const robot::RobotLinkStatus shown = robot_.status();
-    if (shown.phase == robot::LinkPhase::stopped && !enters(shown.why.value(), "go on"))
+    if (shown.phase == robot::LinkPhase::stopped && !enters(refused.value_or(shown.why.value()), "go on"))
       throw BadInput(*shown.why);
     const auto unlocked = robot_.unlock("the operator at the terminal", shown);
     if (unlocked) return;
-    if (robot_.status().phase != robot::LinkPhase::stopped) throw BadInput(unlocked.error());
+    refused = unlocked.error();
+    if (robot_.status().phase != robot::LinkPhase::stopped) throw BadInput(*refused);
   }
 }
 

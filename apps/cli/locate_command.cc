@@ -25,7 +25,7 @@ namespace {
 struct PickedPoint {
   std::string name;
   std::vector<localization::PointObservation> images;
-  std::optional<Failure> unseen = {};  ///< the last failure of one of its picks
+  std::vector<Warning> unseen = {};  ///< picks that were not taken, and why
 };
 
 /// Converts picks as `run` does for its case; rectified ones are used unchanged.
@@ -49,7 +49,8 @@ Expected<localization::PointObservation> image_from(const CsvTable& table, std::
                                                   where, uv.x(), uv.y(), map->width, map->height));
   if (!raw && map && !rectification::raw_in_image(*map, uv))
     return fail(Reason::not_seen,
-                fmt::format("{}: {:g}, {:g} lies outside the rectified image", where, uv.x(), uv.y()));
+                fmt::format("{}: {:g}, {:g} lies outside the rectified image: it is not taken", where, uv.x(),
+                            uv.y()));
   return (raw && map ? fiducials::point_of_click(*map, uv, given_sigma)
                      : fiducials::ImagePoint{uv, uv, given_sigma.value_or(fiducials::click_sigma_px)})
       .map([&](const fiducials::ImagePoint& seen) {
@@ -73,7 +74,7 @@ std::vector<PickedPoint> picked_points(const CsvTable& table,
     if (image)
       point->images.push_back(*image);
     else
-      point->unseen = image.error();
+      point->unseen.push_back(image.error());
   }
   return points;
 }
@@ -134,7 +135,9 @@ Json located(const LocateArguments& arguments, std::ostream& progress) {
     const auto unknown = point && of_cameras ? localization::covariance_missing(*point, images, calibration)
                                              : std::optional<Warning>();
     std::vector<Warning> own_warnings, own_notes;
-    std::optional<Failure> refusal = point ? std::nullopt : unseen ? unseen : std::optional(point.error());
+    std::optional<Failure> refusal;
+    if (!point) refusal = unseen.empty() ? point.error() : unseen.back();
+    if (point) own_warnings = unseen;
     if (point && point->missing_rays) own_warnings.push_back(*point->missing_rays);
     if (unknown) own_warnings.push_back(*unknown);
     if (refusal) progress << fmt::format("{}: {}\n", name, refusal->message);

@@ -84,6 +84,23 @@ TEST(LocateCommand, RaysThatMissAreWarnedOfAtThePointAlsoWithImportedCameras) {
   EXPECT_GE(point["error_95_mm"].get<double>(), 0.5 * point["ray_gap_mm"].get<double>());
 }
 
+TEST(LocateCommand, PickOffTheRectifiedImageIsNamedWhereOtherViewsLocateThePoint) {
+  Json result = result_json();
+  Json third = result["views"][0];
+  third["name"] = "OBL";
+  result["views"].push_back(third);
+  const Eigen::Vector2d a = view_at(0).project({10, 20, 30}), b = view_at(1.5).project({10, 20, 30});
+  const Answer answer =
+      locate_in(result, fmt::format("name,view,u_px,v_px\nT,OBL,5000,300\nT,AP,{},{}\nT,LAT,{},{}\n", a.x(),
+                                    a.y(), b.x(), b.y()));
+  ASSERT_TRUE(answer.result) << answer.result.error().message;
+  const Json& point = answer.json["points"][0];
+  EXPECT_FALSE(point["xyz_mm"].is_null());
+  ASSERT_EQ(point["warnings"].size(), 1u);
+  EXPECT_EQ(point["warnings"][0]["code"], "not_seen");
+  EXPECT_NE(point["warnings"][0]["message"].get<std::string>().find("row 1: 5000, 300"), std::string::npos);
+}
+
 TEST(LocateCommand, RaysThatMissAreWarnedOfWithoutACovarianceToo) {
   const fs::path folder = fs::temp_directory_path() / fmt::format("helicarm_locate_{}", ::getpid());
   std::vector<std::string> cameras;

@@ -20,11 +20,11 @@ using testing::HasSubstr;
 const geometry::View lateral{{6000, 6000, 512, 500, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}};
 
 /// One view, the located point FS, and two fiducials about the calibrator's origin.
-Json measured_result_json() {
+Json measured_result_json(const geometry::View& seen_in) {
   Json view{{"name", "LAT"}};
   view["rectification"] = {{"map", rectification::to_json(rectification::identity_map(1024, 1024, 0.2))}};
-  view["projection"] = geometry::json_rows(lateral.projection());
-  view["camera_from_calibrator"] = geometry::json_rows(lateral.camera_from_world.matrix());
+  view["projection"] = geometry::json_rows(seen_in.projection());
+  view["camera_from_calibrator"] = geometry::json_rows(seen_in.camera_from_world.matrix());
   const Json point{{"name", "FS"},
                    {"xyz_mm", {4, 3, 20}},
                    {"covariance_mm2", geometry::json_rows(0.01 * Eigen::Matrix3d::Identity())}};
@@ -48,9 +48,9 @@ struct Measured {
 };
 
 Measured measured(const std::string& rows, MeasureArguments arguments = {}, bool calibrated = true,
-                  bool as_json = true) {
+                  bool as_json = true, const geometry::View& seen_in = lateral) {
   const fs::path folder = fs::temp_directory_path() / fmt::format("helicarm_measure_{}", ::getpid());
-  EXPECT_TRUE(write_file(folder / "result.json", measured_result_json().dump()));
+  EXPECT_TRUE(write_file(folder / "result.json", measured_result_json(seen_in).dump()));
   EXPECT_TRUE(write_file(folder / "clicks.csv", "measure,kind,view,name,u_px,v_px,sigma_px\n" + rows));
   arguments.clicks = folder / "clicks.csv";
   if (calibrated) arguments.calibration = folder / "result.json";
@@ -68,6 +68,16 @@ const std::string quadrants =
     "q,femoral_quadrants,LAT,blumensaat_anterior,800,500,0.5\n"
     "q,femoral_quadrants,LAT,inferior,600,700,0.5\n"
     "q,femoral_quadrants,LAT,FS,,,\n";
+
+TEST(MeasureCommand, AMirroredViewHasItsReceiverBehindThePlane) {
+  geometry::View mirrored = lateral;
+  mirrored.intrinsics.fx *= -1;
+  MeasureArguments at_depth;
+  at_depth.depth_mm = 600;
+  const Measured found = measured(distance, at_depth, true, true, mirrored);
+  ASSERT_TRUE(found.result) << found.result.error().message;
+  EXPECT_NEAR(found.measures()[0]["quantities"][0]["value"].get<double>(), 50, 1e-9);
+}
 
 TEST(MeasureCommand, LengthsAreInMillimetresOfThePlane) {
   MeasureArguments at_depth;
@@ -216,7 +226,7 @@ InSpace in_space(const std::string& rows, bool as_json = true, const std::string
                      {"covariance_mm2", geometry::json_rows(Eigen::Matrix3d::Identity())}};
   const Json model{{"name", "femur"},    {"decision", "accept"},    {"world_from_model", turned},
                    {"covariance", zero}, {"centre_mm", {0, 0, 20}}, {"points", {planned}}};
-  EXPECT_TRUE(write_file(folder / "result.json", measured_result_json().dump()));
+  EXPECT_TRUE(write_file(folder / "result.json", measured_result_json(lateral).dump()));
   EXPECT_TRUE(write_file(folder / "registration.json", Json{{"models", {model}}}.dump()));
   EXPECT_TRUE(
       write_file(folder / "landmarks.csv", "measure,kind,model,name,x_mm,y_mm,z_mm,sigma_mm\n" + rows));

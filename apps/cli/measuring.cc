@@ -29,17 +29,21 @@ Expected<void> add_to_c_arm_history(const std::filesystem::path& path, const pip
                                     Console& console) {
   const auto growth = pipeline::add_to_record(path, result);
   if (!growth) return tl::unexpected<Failure>(growth.error());
-  if (!console.quiet)
-    console.progress << (result.calibration->variance_scale > 1
-                             ? fmt::format(
-                                   "helicarm: {}: not added to the C-arm history: residuals are {:.2g} times "
-                                   "the noise model\n",
-                                   path.string(), std::sqrt(result.calibration->variance_scale))
-                             : fmt::format("helicarm: {}: {} earlier acquisitions, {} added\n", path.string(),
-                                           growth->earlier, growth->added));
-  if (!console.quiet && growth->is_new)
+  if (console.quiet) return {};
+  const std::string file = path.string();
+  if (result.calibration->variance_scale > 1)
     console.progress << fmt::format(
-        "helicarm: note: {} did not exist: the record of this C-arm begins with this case\n", path.string());
+        "helicarm: {}: not added to the C-arm history: residuals are {:.2g} times the noise model\n", file,
+        std::sqrt(result.calibration->variance_scale));
+  else if (result.calibration->contradicts_calibrator)
+    console.progress << fmt::format(
+        "helicarm: {}: not added to the C-arm history: the images contradict the calibrator's file\n", file);
+  else
+    console.progress << fmt::format("helicarm: {}: {} earlier acquisitions, {} added\n", file,
+                                    growth->earlier, growth->added);
+  if (growth->is_new && growth->added > 0)
+    console.progress << fmt::format(
+        "helicarm: note: {} did not exist: the record of this C-arm begins with this case\n", file);
   return {};
 }
 

@@ -74,16 +74,9 @@ CommandResult migration_command(const MigrationArguments& arguments, Console& co
       request.options.segments.push_back(value_or_throw(migration::segment_from(text)));
     request.options.reference = arguments.reference;
     if (arguments.by_name) request.options.matching = migration::Matching::name;
-    const auto answer = migration::answer(request);
-    if (!answer) {
-      if (exit_code(answer.error().reason) == 3)
-        value_or_throw(write_file(arguments.out / "migration.json",
-                                  to_text(migration::refused_json(answer.error())) + "\n"));
-      throw BadInput(answer.error());
-    }
-    value_or_throw(migration::write_migration(*answer, arguments.out));
-    print_warnings(answer->migration.migration.warnings, console);
-    const Json json = migration::to_json(*answer);
+    const auto answer = value_or_throw(migration::answer_into(request, arguments.out));
+    print_warnings(migration::all_warnings(answer), console);
+    const Json json = migration::to_json(answer);
     if (console.json)
       console.out << to_text(json) << '\n';
     else if (!console.quiet)

@@ -104,6 +104,19 @@ class Migration(unittest.TestCase):
         self.assertEqual(done.returncode, 2)
         self.assertIn("the same pair as first.csv and second.csv", done.stderr)
 
+    def test_the_order_of_a_pair_does_not_count(self):
+        second = exam(self.root / "second.csv", seed=3, sigma=0.01)
+        done = self.migrate(self.first, second, "--double", self.first, second, "--double", second, self.first)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("the same pair as first.csv and second.csv", done.stderr)
+
+    def test_warnings_of_a_double_examination_are_shown(self):
+        pair = [exam(self.root / f"d{k}.csv", seed=4 + k, sigma=0.02) for k in (0, 1)]
+        pair[1].write_text("\n".join(line for line in pair[1].read_text().splitlines() if not line.startswith("tray1,")))
+        done = self.migrate(self.first, exam(self.root / "second.csv", seed=3, sigma=0.01), "--double", *pair)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("double examination d0.csv and d1.csv: segment", done.stderr)
+
     def test_a_refusal_is_written(self):
         (self.out).mkdir()
         (self.out / "migration.csv").write_text("earlier")

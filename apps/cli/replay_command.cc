@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
-#include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -8,7 +8,6 @@
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
 #include "helicarm/operation/replay.h"
-#include "helicarm/pipeline/result.h"
 
 namespace helicarm::cli {
 
@@ -31,35 +30,14 @@ std::string words_of(const operation::GuidanceSpan& span) {
                       : begun + ", its end is not recorded";
 }
 
-std::optional<Failure> failure_of(const operation::ReplayReport& report,
-                                  const std::filesystem::path& session) {
-  if (!report.differences.empty())
-    return Failure{Reason::replay_differs,
-                   fmt::format("{} recorded values or files differ from what the record implies",
-                               report.differences.size()),
-                   {},
-                   {}};
-  if (report.complete()) return {};
-  return Failure{Reason::replay_differs,
-                 fmt::format("{}: the record has no end: the program was killed or is still running, or "
-                             "records were removed",
-                             session.string()),
-                 {},
-                 {}};
-}
-
 }  // namespace
 
 /// Recomputes an operation from its record and reports differences.
 CommandResult replay_command(const ReplayArguments& arguments, Console& console) {
   return guarded([&] {
     const operation::ReplayReport report = value_or_throw(operation::replay(arguments.session));
-    const std::optional<Failure> failure = failure_of(report, arguments.session);
     if (console.json) {
-      Json answer = operation::to_json(report);
-      answer["status"] = failure ? "refused" : "ok";
-      answer["failure"] = failure ? pipeline::to_json(*failure) : Json();
-      console.out << to_text(answer) << '\n';
+      console.out << to_text(operation::to_json(report)) << '\n';
       console.answered = true;
     } else {
       console.out << fmt::format(
@@ -74,7 +52,10 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
       for (const std::string& note : report.notes) console.out << "  note: " << note << '\n';
       for (const std::string& difference : report.differences) console.out << "  " << difference << '\n';
     }
-    if (failure) throw BadInput(*failure);
+    if (auto failure = operation::failure_of(report)) {
+      failure->message = fmt::format("{}: {}", arguments.session.string(), failure->message);
+      throw BadInput(*std::move(failure));
+    }
     if (!console.json)
       console.out << (report.notes.empty() ? "all recorded values are reproduced bit for bit\n"
                                            : "all recorded values are reproduced, bit for bit but for the "

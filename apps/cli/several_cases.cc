@@ -2,9 +2,11 @@
 #include "several_cases.h"
 
 #include <algorithm>
+#include <array>
 #include <span>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "distinct_names.h"
 #include "helicarm/core/csv.h"
@@ -17,6 +19,17 @@ namespace helicarm::cli {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Options on which no answer depends: where it is written, what is kept for later, how it is divided.
+constexpr std::array<std::string_view, 6> without_effect{"--help",  "--out",      "--share",
+                                                         "--cache", "--no-cache", "--resume"};
+
+/// One spelling of a path, which need not exist.
+fs::path whole_path(const fs::path& path) {
+  std::error_code ignored;
+  const fs::path whole = fs::weakly_canonical(fs::absolute(path, ignored), ignored);
+  return whole.has_filename() ? whole : whole.parent_path();
+}
 
 std::string_view status_of(const CaseRow& row) {
   if (!row.failure) return "ok";
@@ -139,7 +152,8 @@ CommandResult do_shared(const SeveralCases& several, const CaseWork& work, const
   const std::vector<std::string> names = names_of(several.cases);
   const fs::path csv = work.out / "summary.csv";
   return guarded([&] {
-    SharedWork shared(work.out, launch, names, [&] { forget_earlier(work); });
+    SharedWork shared(
+        work.out, launch, names, [&] { forget_earlier(work); }, terms_of(several, work.out));
     const auto given_up = [&](std::size_t index) {
       return json_of(
           CaseRow{names[index],
@@ -177,17 +191,42 @@ std::vector<std::string> names_of(const std::vector<fs::path>& cases) {
   return distinct(names);
 }
 
+std::map<std::string, std::string> terms_of(const SeveralCases& several, const fs::path& out) {
+  std::map<std::string, std::string> terms;
+  const std::vector<std::string> names = names_of(several.cases);
+  // Relative: another machine may see the folder that they share under another name.
+  for (std::size_t i = 0; i < names.size(); ++i)
+    terms["case " + names[i]] =
+        whole_path(several.cases[i]).lexically_relative(whole_path(out)).generic_string();
+  if (!several.command) return terms;
+  terms["command"] = several.command->get_name();
+  for (const CLI::Option* option : several.command->get_options()) {
+    const std::string name = option->get_name();
+    if (!name.starts_with("--") || std::ranges::find(without_effect, name) != without_effect.end()) continue;
+    std::vector<std::string> words = option->results();
+    for (std::string& word : words)
+      if (std::error_code ignored; fs::exists(word, ignored)) word = whole_path(word).string();
+    const std::string value =
+        words.empty() ? option->get_default_str() : fmt::format("{}", fmt::join(words, " "));
+    if (!value.empty()) terms[name] = value;
+  }
+  return terms;
+}
+
 void add_cases(CLI::App* command, SeveralCases& several) {
+  several.command = command;
   command
       ->add_option(
           "CASE", several.cases,
           "Folder that holds case.json; several are done one after the other, each in --out/NAME, with "
           "--out/summary.csv")
       ->required();
-  command->add_option("--share", several.share,
-                      "A word that several processes have in common, which do the cases together, each the "
-                      "next that no other "
-                      "has; mpirun and srun need none. The same word goes on after an interruption");
+  command->add_option(
+      "--share", several.share,
+      "A word that several processes have in common, which do the cases together, each the "
+      "next that no other "
+      "has; mpirun and srun need none. The same word goes on after an interruption, with the same "
+      "cases and options only");
 }
 
 CommandResult do_cases(const SeveralCases& several, const CaseWork& work, Console& console) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@ namespace helicarm::cli {
 struct SeveralCases {
   std::vector<std::filesystem::path> cases = {};  ///< folders that hold case.json, or case files
   std::string share = {};                         ///< common word of the processes that do the cases together
+  const CLI::App* command = nullptr;              ///< whose options the answers depend on
 };
 
 /// CASE, of which there may be several, and --share.
@@ -48,6 +50,10 @@ struct CaseWork {
 /// one launch (`launch_of_environment`), or with one `share`, do them together: the one that ends them
 /// reports, the others succeed.
 CommandResult do_cases(const SeveralCases& several, const CaseWork& work, Console& console);
+
+/// What the rows of cases that are shared depend on, besides the cases' names: the command, where each case
+/// lies from `out`, and each option, as given or by default; files by their whole path.
+std::map<std::string, std::string> terms_of(const SeveralCases& several, const std::filesystem::path& out);
 
 /// A different name for each case: that of its folder, numbered where it repeats.
 std::vector<std::string> names_of(const std::vector<std::filesystem::path>& cases);

@@ -18,5 +18,32 @@ TEST(NamesOfCases, ThatRepeatAreNumbered) {
             (Names{"knee", "knee_2", "knee_2_2", "knee_3"}));
 }
 
+/// Terms of a command line of a command with one option.
+std::map<std::string, std::string> terms(const std::string& line, const std::filesystem::path& out) {
+  CLI::App app;
+  CLI::App* command = app.add_subcommand("run");
+  SeveralCases several;
+  add_cases(command, several);
+  std::string method = "best";
+  std::filesystem::path folder;
+  command->add_option("--method", method)->capture_default_str();
+  command->add_option("--out", folder);
+  app.parse(line);
+  return terms_of(several, out);
+}
+
+TEST(TermsOfCases, AreTheCommandItsOptionsAndWhereTheCasesLie) {
+  EXPECT_EQ(terms("run /s/a /s/b --out /s/o --share w", "/s/o"),
+            (std::map<std::string, std::string>{
+                {"command", "run"}, {"case a", "../a"}, {"case b", "../b"}, {"--method", "best"}}));
+}
+
+TEST(TermsOfCases, DifferWithStudyAndOptionAndNotWithTheWordsThatSayTheSame) {
+  const auto one = terms("run /s/a /s/b", "/s/o");
+  EXPECT_EQ(terms("run --method best /s/a/ /s/../s/b --share w", "/s/o"), one);
+  EXPECT_NE(terms("run /t/a /t/b", "/s/o"), one);
+  EXPECT_NE(terms("run /s/a /s/b --method paper", "/s/o"), one);
+}
+
 }  // namespace
 }  // namespace helicarm::cli

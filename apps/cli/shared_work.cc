@@ -10,6 +10,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -43,6 +44,27 @@ void write_or_throw(const fs::path& path, const Json& json) {
   value_or_throw(write_file(path, to_text(json)));
 }
 
+/// Refuses work that differs from the one begun.
+void check_same_work(const Json& begun, const Json& mine, const std::string& word) {
+  if (begun == mine) return;
+  const std::string refusal = fmt::format("the processes of \"{}\" have begun other work: ", word);
+  if (!begun.is_object() || begun.value("names", Json()) != mine["names"])
+    throw BadInput(Reason::usage, refusal + "they have a different list of cases; give another word");
+  const Json terms = begun.value("terms", Json::object());
+  const auto value_in = [](const Json& of, const std::string& name) {
+    return of.is_object() && of.contains(name) ? to_text(of[name]) : std::string("not given");
+  };
+  std::vector<std::string> different;
+  Json all = mine["terms"];
+  if (terms.is_object()) all.update(terms);
+  for (const auto& [name, ignored] : all.items())
+    if (value_in(terms, name) != value_in(mine["terms"], name))
+      different.push_back(
+          fmt::format("{} was {} and is {}", name, value_in(terms, name), value_in(mine["terms"], name)));
+  throw BadInput(Reason::usage,
+                 fmt::format("{}{}; give the same, or another word", refusal, fmt::join(different, "; ")));
+}
+
 }  // namespace
 
 std::optional<Launch> launch_of_environment() {
@@ -62,7 +84,7 @@ std::optional<Launch> launch_of_environment() {
 }
 
 SharedWork::SharedWork(const fs::path& folder, const Launch& launch, const std::vector<std::string>& names,
-                       const std::function<void()>& first)
+                       const std::function<void()>& first, const Terms& terms)
     : folder_(folder / (".shared-" + as_name(launch.key))),
       processes_(launch.processes),
       known_done_(names.size(), false) {
@@ -71,12 +93,13 @@ SharedWork::SharedWork(const fs::path& folder, const Launch& launch, const std::
   value_or_throw(make_private_folder(folder_));
   const fs::path list = folder_ / "names.json";
   const FileLock lock = value_or_throw(FileLock::of(list));
+  const Json mine{{"names", names}, {"terms", Json(terms)}};
   std::error_code ignored;
-  if (!fs::exists(list, ignored)) {
+  if (fs::exists(list, ignored)) {
+    check_same_work(value_or_throw(read_json(list)), mine, launch.key);
+  } else {
     first();
-    write_or_throw(list, names);
-  } else if (value_or_throw(read_json(list)) != Json(names)) {
-    throw BadInput(Reason::usage, "processes that share their work have different lists of cases");
+    write_or_throw(list, mine);
   }
   std::ofstream(folder_ / "arrived", std::ios::app) << '+';
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,10 +33,13 @@ class SharedWork {
     int lock;         ///< a descriptor, closed by `done`
   };
 
+  /// What else the rows depend on, by name: the command, its options, where each case lies.
+  using Terms = std::map<std::string, std::string>;
+
   /// `first` is called by one process before any item is taken. Throws
-  /// BadInput: usage if another process has the same key for other names, cannot_write.
+  /// BadInput: usage if another process has the same key for other names or terms, cannot_write.
   SharedWork(const std::filesystem::path& folder, const Launch& launch, const std::vector<std::string>& names,
-             const std::function<void()>& first);
+             const std::function<void()>& first, const Terms& terms = {});
 
   /// The next item for this process; waits while others hold all that are left. None when all are done.
   /// `given_up` makes the row of an item whose processes ended.

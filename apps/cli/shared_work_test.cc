@@ -84,6 +84,21 @@ TEST(SharedWork, OtherCasesUnderTheSameWordAreRefused) {
   EXPECT_THROW(SharedWork(folder.path(), {"job"}, {"other"}, [] {}), BadInput);
 }
 
+TEST(SharedWork, OtherTermsUnderTheSameWordAreRefusedByName) {
+  const TemporaryFolder folder;
+  const SharedWork work(folder.path(), {"job"}, names, [] {}, {{"--method", "best"}, {"command", "run"}});
+  EXPECT_NO_THROW(
+      SharedWork(folder.path(), {"job"}, names, [] {}, {{"--method", "best"}, {"command", "run"}}));
+  try {
+    SharedWork(folder.path(), {"job"}, names, [] {}, {{"--method", "paper"}, {"command", "run"}});
+    FAIL() << "took other options";
+  } catch (const BadInput& refused) {
+    EXPECT_EQ(refused.failure().reason, Reason::usage);
+    EXPECT_THAT(refused.failure().message, testing::HasSubstr("--method was \"best\" and is \"paper\""));
+    EXPECT_THAT(refused.failure().message, testing::Not(testing::HasSubstr("command")));
+  }
+}
+
 TEST(SharedWork, WordWithoutALetterIsRefused) {
   const TemporaryFolder folder;
   EXPECT_THROW(SharedWork(folder.path(), {"../"}, names, [] {}), BadInput);

@@ -33,12 +33,21 @@ inline std::string shape_of(const py::array& array) {
 }
 
 /// What NumPy's conversion to a number type would change without a word: it drops a mask and an imaginary
-/// part, and reads numbers in texts.
+/// part, and reads numbers in texts, also of what lists hold.
 inline void check_plain(const py::handle& given, const std::string& name) {
+  if (py::isinstance<py::list>(given) || py::isinstance<py::tuple>(given)) {
+    for (const py::handle element : given) {
+      if (py::isinstance<py::str>(element) || py::isinstance<py::bytes>(element))
+        raise({Reason::bad_value, name + ": its elements are texts, not real numbers", {}, {}});
+      check_plain(element, name);
+    }
+    return;
+  }
   if (!py::isinstance<py::array>(given)) return;
   const auto array = py::reinterpret_borrow<py::array>(given);
   const char kind = array.dtype().kind();
   if (std::string_view("biufO").find(kind) == std::string_view::npos) raise_not_real(array, name);
+  if (kind == 'O') check_plain(array.attr("ravel")().attr("tolist")(), name);
   if (Py_TYPE(array.ptr()) == py::detail::npy_api::get().PyArray_Type_) return;
   const auto masked = py::module_::import("numpy.ma");
   if (!masked.attr("is_masked")(array).cast<bool>()) return;
@@ -163,13 +172,14 @@ template <>
 class type_caster<helicarm::python::Doubles> : public pyobject_caster<helicarm::python::Doubles> {
  public:
   bool load(handle given, bool convert) {
-    helicarm::python::check_plain(given, "an array of shape " + shape(given));
+    helicarm::python::check_plain(given, name_of(given));
     return pyobject_caster<helicarm::python::Doubles>::load(given, convert);
   }
 
  private:
-  static std::string shape(handle given) {
-    return isinstance<array>(given) ? helicarm::python::shape_of(reinterpret_borrow<array>(given)) : "";
+  static std::string name_of(handle given) {
+    if (!isinstance<array>(given)) return "a list";
+    return "an array of shape " + helicarm::python::shape_of(reinterpret_borrow<array>(given));
   }
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/pipeline/c_arm.h"
 
+#include "helicarm/core/files.h"
 #include "helicarm/report/c_arm_report.h"
 #include "module.h"
 #include "options.h"
@@ -38,6 +39,8 @@ py::object c_arm_report(const std::filesystem::path& record,
                         const std::optional<std::filesystem::path>& out) {
   const report::CArmFindings findings = value_or_raise(without_gil([&] {
     return guarded([&] {
+      if (out) value_or_throw(check_can_write(*out));
+      if (out) report::forget_c_arm_report(*out);
       auto found = report::c_arm_findings(value_or_throw(
           pipeline::model_of_record(value_or_throw(calibration::read_history(record)), record.string())));
       if (out) value_or_throw(report::write_c_arm_report(found, *out));

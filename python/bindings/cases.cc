@@ -9,6 +9,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/c_arm.h"
 #include "helicarm/pipeline/run_fields.h"
+#include "helicarm/report/earlier_results.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/report/rectified_image.h"
 #include "helicarm/report/report.h"
@@ -76,7 +77,9 @@ HeldCalibration calibration_of(const pipeline::Result& result) {
 
 void write(const case_registration::Measurement& measured, const std::filesystem::path& folder,
            const std::optional<std::filesystem::path>& dicom) {
+  value_or_raise(check_can_write(folder));
   const auto written = without_gil([&] {
+    report::forget_results(folder);
     return case_registration::write_models(measured.registration, folder)
         .and_then([&]() -> Expected<void> {
           if (!dicom || measured.result.failure) return {};
@@ -285,8 +288,10 @@ void add_result(py::module_& module) {
            "result.json, report.html and an overlay PNG for each view; of a case with models also "
            "registration.json and\n"
            "registration/. dicom: the case's folder: also measurements.dcm, a DICOM measurement report, and\n"
-           "DICOM registrations, as `helicarm run --dicom`. Raises InputError: cannot_write, and bad_value\n"
-           "where neither the X-ray images nor a CT are DICOM files.")
+           "DICOM registrations, as `helicarm run --dicom`. What an earlier result left in the folder is "
+           "removed.\n"
+           "Raises InputError: cannot_write, bad_value where the case's images are not those measured or\n"
+           "neither they nor a CT are DICOM files; RefusedError: patient_mismatch.")
       .def("__repr__", [](const Measurement& m) {
         const pipeline::Result& r = m.result;
         if (r.failure) return fmt::format("<Result: refused, {}>", code(r.failure->reason));
@@ -320,8 +325,8 @@ or of its plan, may be off by more (95 %). motion_sigma_mm: standard deviation p
 bone or model between the acquisitions. search_mm, search_deg: about each model's start, per axis. history: a C-arm's history
 file, which serves as prior and to which this case is added unless it is refused; made where there is none. cache: a
 folder that keeps the distortion maps of plate images, True for the user's cache folder, False for none. progress:
-called with the name of each stage (read, rectify, detect, label, calibrate, locate) before it begins, and, if it takes a
-second argument, with name and share while models are searched for, as register does; an exception from it ends the run,
+called with the name of each stage (read, rectify, detect, label, calibrate, locate) before it begins, and, if it has a
+parameter share, with name and share while models are searched for, as register does; an exception from it ends the run,
 and Ctrl-C does between two views. Releases the GIL. Returns a Result.
 Raises InputError; RefusedError with .result, which holds all that was computed until then.)");
   const simulation::SimulationOptions usual_simulation;

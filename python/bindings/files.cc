@@ -6,6 +6,7 @@
 
 #include "arrays.h"
 #include "helicarm/case_registration/measured_object.h"
+#include "helicarm/core/earlier_files.h"
 #include "helicarm/core/private_files.h"
 #include "helicarm/operation/schemas.h"
 #include "helicarm/pipeline/case_bundle.h"
@@ -70,6 +71,8 @@ py::dict bundle(const std::filesystem::path& folder, const std::filesystem::path
                 const std::optional<std::filesystem::path>& result, bool measure, unsigned threads) {
   const auto written = value_or_raise(without_gil([&] {
     return guarded([&] {
+      value_or_throw(pipeline::check_bundle_file(out, folder, result));
+      forget_files(out.parent_path(), {out.filename().string()});
       pipeline::BundleOptions options;
       options.measure = measure;
       options.run.threads = threads;
@@ -118,7 +121,8 @@ the plate, name_clash, bad_value, cannot_write, and as read_image.)");
              R"(Packs a de-identified case into one file for a bug report, as `helicarm bundle` does.
 
 out: the file (tar.gz). result: result.json of an earlier run, or its folder. run: measure the packed case. Returns {"written",
-"files": {name: bytes}, "left_out"}. Text within the images' pixels stays. Raises InputError.)");
+"files": {name: bytes}, "left_out"}. Text within the images' pixels stays. Raises InputError: name_clash where out is a file of
+the case or of result, and as read_case.)");
   module.def(
       "schema", &schema, py::arg("file"),
       "The JSON Schema of a file that helicarm reads (calibrator, case, machine, plan, plate, session) or "

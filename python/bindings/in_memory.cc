@@ -13,6 +13,7 @@
 #include "helicarm/pipeline/model_description.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/registration/model.h"
+#include "helicarm/report/earlier_results.h"
 #include "helicarm/sweep/sweep.h"
 #include "helicarm/volume/hounsfield.h"
 #include "helicarm/xray/image_file.h"
@@ -143,6 +144,7 @@ py::object register_given(const std::vector<std::pair<std::string, py::dict>>& m
   const auto options = measuring_options("register", "best", max_error_mm, motion_sigma_mm, search_mm,
                                          search_deg, threads, {}, py::bool_(false));
   if (out) value_or_raise(check_can_write(*out));
+  if (out) report::forget_registration(*out);
   std::vector<case_registration::GivenModel> loaded_models;
   for (const auto& [name, model] : models) {
     const auto at = starts.find(name);

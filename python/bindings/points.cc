@@ -61,6 +61,12 @@ std::map<std::size_t, Doubles> by_view(const HeldCalibration& calibration,
 Expected<localization::PointObservation> observation_of(const HeldCalibration& calibration, std::size_t view,
                                                         const Eigen::Vector2d& uv,
                                                         std::optional<double> sigma_px, bool raw) {
+  if (const auto& map = calibration.maps[view]; !raw && map && !rectification::raw_in_image(*map, uv))
+    return tl::unexpected<Failure>(
+        Failure{Reason::not_seen,
+                fmt::format("{:g}, {:g} lies outside the rectified image", uv.x(), uv.y()),
+                calibration.views[view].name,
+                {}});
   auto seen = raw ? fiducials::point_of_click(map_of(calibration, view), uv, sigma_px)
                   : Expected<fiducials::ImagePoint>({uv, uv, sigma_px.value_or(fiducials::click_sigma_px)});
   if (!seen) {

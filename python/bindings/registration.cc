@@ -30,6 +30,8 @@ py::object register_models(const std::filesystem::path& folder,
   const auto options = measuring_options("register", method, max_error_mm, motion_sigma_mm, search_mm,
                                          search_deg, threads, history, cache);
   const RunHooks hooks = run_hooks(progress);
+  if (out) value_or_raise(check_can_write(*out));
+  if (out) report::forget_registration(*out);
   const auto result = value_or_raise(without_gil([&] {
     pipeline::Case the_case;
     return pipeline::read_case(folder, pipeline::Purpose::registration)
@@ -215,9 +217,9 @@ void add_registration(py::module_& module) {
       "its\n"
       "plan may be off by more (95 %). search_mm, search_deg: searched about each start, per axis. threads: "
       "0\n"
-      "for all cores. progress: called with the name of each step before it begins and, if it takes a "
-      "second\n"
-      "argument, with the name and the share (0 to 1) of the searches for all models that is done.\n\n"
+      "for all cores. progress: called with the name of each step before it begins and, if it has a "
+      "parameter\n"
+      "share, with the name and the share (0 to 1) of the searches for all models that is done.\n\n"
       "Raises as run_case; RefusedError if the views or a model are refused, with all that was computed in\n"
       ".result.");
   module.def(

@@ -23,12 +23,11 @@ struct RunHooks {
   std::function<void(double)> on_share;  ///< empty: `progress` takes the name alone
 };
 
-/// Whether `progress` may be called with a name and a share.
+/// Whether `progress` has a parameter `share`.
 inline bool takes_share(const py::object& progress) {
   if (progress.is_none()) return false;
   try {
-    py::module_::import("inspect").attr("signature")(progress).attr("bind")("", 0.0);
-    return true;
+    return py::module_::import("inspect").attr("signature")(progress).attr("parameters").contains("share");
   } catch (const py::error_already_set& error) {
     if (error.matches(PyExc_TypeError) || error.matches(PyExc_ValueError)) return false;  // so `inspect` says
     throw;
@@ -61,7 +60,7 @@ inline RunHooks run_hooks(const py::object& progress) {
     told->percent = percent;
     try {
       const py::gil_scoped_acquire acquire;
-      progress(told->stage, share);
+      progress(told->stage, py::arg("share") = share);
     } catch (...) {
       const std::lock_guard lock(ended->guard);
       ended->reason = std::current_exception();

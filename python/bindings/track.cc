@@ -317,6 +317,8 @@ void add_track(py::module_& module) {
       .def(
           "write",
           [](const Tracked& t, const std::filesystem::path& folder) {
+            value_or_raise(check_can_write(folder));
+            track::forget_track(folder);
             value_or_raise(without_gil([&] { return track::write_track(t.sequence, t.the_case, folder); }));
           },
           py::arg("folder"), "All files of `helicarm track`. Raises InputError: cannot_write.")

@@ -170,6 +170,9 @@ def _volume_of_itk(image):
     affine = np.eye(4)
     affine[:3, :3] = direction * np.asarray(image.GetSpacing(), float)
     affine[:3, 3] = np.asarray(image.GetOrigin(), float)
+    if hasattr(image, "GetBufferedRegion"):  # the origin is that of index 0, which need not be the first voxel
+        index = image.GetBufferedRegion().GetIndex()
+        affine[:3, 3] += affine[:3, :3] @ np.array([index[i] for i in range(3)], float)
     return _c.Volume(np.asarray(read(image)).transpose(2, 1, 0), affine, frame="LPS")
 
 
@@ -296,16 +299,19 @@ def as_model(obj):
 def as_image(obj, *, name="", pixel_mm=None, source_detector_mm=None, range=None, frame=None):
     """An XrayImage of an XrayImage, a path, a pydicom dataset, or an array (height, width); frame: 1-based.
 
-    pixel_mm, source_detector_mm and range are those of an array; the others state their own.
+    pixel_mm, source_detector_mm and range are those of an array; the others state their own. frame is of a file or a
+    dataset. name: of the image; an XrayImage keeps its own.
     """
     stated = {"pixel_mm": pixel_mm, "source_detector_mm": source_detector_mm, "range": range}
     own = isinstance(obj, (_c.XrayImage, str, os.PathLike)) or _is_dataset(obj)
     if own and any(value is not None for value in stated.values()):
         _refuse("image: pixel_mm, source_detector_mm and range are for arrays, other images state their own", "usage")
+    if frame is not None and (isinstance(obj, _c.XrayImage) or not own):
+        _refuse("image: frame is for files and datasets, an array or XrayImage is one image", "usage")
     if isinstance(obj, _c.XrayImage):
         return obj
     if isinstance(obj, (str, os.PathLike)):
-        return _c.read_image(obj, frame=frame)
+        return _c.read_image(obj, frame=frame, name=name or None)
     if _is_dataset(obj):
         return _c._image_of_dicom(_bytes_of(obj), name or "dataset", frame)
     return _c.XrayImage(obj, name=name, **stated)

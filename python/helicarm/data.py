@@ -166,7 +166,7 @@ def register(folder=None, *, models=None, views=None, starts=None, camera_covari
     Returns the content of registration.json: ["models"][i]["world_from_model"], "covariance" (6 x 6: rotation vector in
     rad, then mm, world axes, about centre_mm), "decision", ...; each model also has .world_from_model, .covariance,
     .rotation (SciPy) and .points {name: {"xyz_mm", "covariance_mm2", "error_95_mm"}}, the whole .to_frame() (pandas). World: the calibrator's frame, or that of the cameras.
-    Releases the GIL; progress is called with the name of each step before it begins and, if it takes a second argument
+    Releases the GIL; progress is called with the name of each step before it begins and, if it has a parameter share
     (def progress(step, share=None)), with the name and the share, 0 to 1, of the searches for all models that is done. An
     exception from it ends the work, and Ctrl-C does.
     Raises InputError; RefusedError if the views or a model are refused, with all that was computed in .result.

@@ -39,7 +39,8 @@ def register_sequence(folder: _Path, frames: Union[str, Sequence[int]], **option
 def migration(first: _Path, second: _Path, **options: Any) -> MigrationAnswer: ...
 @overload
 def sweep(folder: _Path, *, path: Optional[str] = None, check: Optional[str] = None,
-          wire: Optional[Sequence[Sequence[float]]] = None, against: Optional[_Path] = None, threads: int = 0, progress: _Progress = None) -> Sweep: ...
+          wire: Optional[Sequence[Sequence[float]]] = None, against: Optional[_Path] = None, history: Optional[_Path] = None,
+          threads: int = 0, progress: _Progress = None) -> Sweep: ...
 @overload
 def sweep(folder: None = None, *, images: Sequence[_Image], calibrator: Union[Calibrator, _Path],
           plate: Union[None, Plate, _Path] = None, pixel_mm: Union[None, float, Tuple[float, float]] = None,

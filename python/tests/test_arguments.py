@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an argument may be: each refusal names argument, value and limit."""
+import ast
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +29,14 @@ def refused(call, argument, code="bad_value"):
         call()
     assert error.value.code == code and argument in error.value.message, error.value
     return error.value
+
+
+def test_stubs_name_the_arguments_of_every_function():
+    stubs = ast.parse((Path(helicarm.__file__).parent / "_helicarm.pyi").read_text())
+    for stub in (each for each in stubs.body if isinstance(each, ast.FunctionDef)):
+        arguments = {each.arg for each in [*stub.args.posonlyargs, *stub.args.args, *stub.args.kwonlyargs]}
+        signature = getattr(helicarm._helicarm, stub.name).__doc__.splitlines()[0]
+        assert arguments == set(re.findall(r"(?:\(|, )(\w+): ", signature)), stub.name
 
 
 def test_limit_and_value_are_in_message_and_figures(calibration):

@@ -2,6 +2,7 @@
 """Volumes, surfaces and cameras from arrays, and registration, DRR, sweep and track of them."""
 import json
 
+import cv2
 import numpy as np
 import pytest
 
@@ -105,6 +106,20 @@ def test_order_type_and_container_of_an_array_do_not_matter(same):
     lambda a: helicarm.as_surface((a, TETRAHEDRON[1]), frame="LPS"), lambda a: helicarm.Camera(np.eye(3), np.eye(3), a[0])])
 def test_masked_elements_are_no_numbers(call):
     refused("bad_value", "elements are masked", call, np.ma.masked_equal(TETRAHEDRON[0], 0))
+
+
+@pytest.mark.parametrize("vector", [["1", "2", "40"], ("1", 2, 40), [b"1", 2, 40], np.array(["1", 2, None], object), [[np.str_("1"), 2, 40]]])
+def test_texts_are_no_numbers_also_in_lists(vector):
+    refused("bad_value", "texts, not real numbers", helicarm.Camera, np.eye(3), np.eye(3), vector)
+
+
+def test_an_argument_that_an_image_does_not_take_is_refused(tmp_path):
+    image = helicarm.as_image(np.zeros((4, 5), np.uint8), name="AP")
+    refused("usage", "frame is for files", helicarm.as_image, image, frame=3)
+    refused("usage", "frame is for files", helicarm.as_image, np.zeros((4, 5), np.uint8), frame=3)
+    cv2.imwrite(str(tmp_path / "a.png"), np.arange(20, dtype=np.uint8).reshape(4, 5))
+    assert helicarm.as_image(tmp_path / "a.png", name="LAT").name == "LAT"
+    assert helicarm.as_image(tmp_path / "a.png").name == "a"
 
 
 def test_a_camera_takes_opencvs_columns_and_names_what_a_mapping_lacks():
@@ -335,6 +350,9 @@ def test_markers_are_tracked_in_arrays(tmp_path):
     assert motion.places == pytest.approx(np.array(moved), abs=0.1)
     assert motion.smoothed["bone"][-1, :3, 3] == pytest.approx([1.5, 0, 0.75], abs=0.1)
     assert (tmp_path / "out/markers.csv").exists() and (tmp_path / "out/bone.tra").exists()
+    (tmp_path / "out/earlier.tra").write_text("")  # of a body of another measurement
+    motion.write(tmp_path / "out")
+    assert not (tmp_path / "out/earlier.tra").exists() and (tmp_path / "out/bone.tra").exists()
     assert motion.joint_angles == {} == motion.joint_covariances
     spot = {"a": {"B": views["B"][1].project(moved[2][1])}}
     corrected = helicarm.track(views=views, picks=picks, diameter_mm=3, bodies={"bone": names}, corrections={3: spot}, out=tmp_path / "corrected")

@@ -32,6 +32,40 @@ def test_result_is_result_json(result, tmp_path):
     assert overlay is not None
 
 
+def test_what_an_earlier_result_left_goes(result, tmp_path):
+    (tmp_path / "result.json").write_text(json.dumps({"views": [{"name": "SMITH"}]}))
+    left = [tmp_path / name for name in ("SMITH_overlay.png", "measurements.dcm", "registration.json", "registration/registration.json")]
+    (tmp_path / "registration").mkdir()
+    for file in left:
+        file.write_text("{}")
+    (tmp_path / "notes.txt").write_text("of the user")
+    result.write(tmp_path)
+    assert not [file for file in left if file.exists()]
+    assert (tmp_path / "notes.txt").exists() and (tmp_path / "AP_overlay.png").exists()
+
+
+def test_dicom_files_of_another_case_are_refused(case, result, tmp_path):
+    helicarm.simulate_case(tmp_path / "other", seed=4, size=512)
+    with pytest.raises(helicarm.RefusedError, match="not the image that was measured") as error:
+        result.write(tmp_path / "out", dicom=tmp_path / "other")
+    assert (error.value.code, error.value.view) == ("patient_mismatch", "AP")
+    assert not (tmp_path / "out/measurements.dcm").exists()
+    result.write(tmp_path / "out", dicom=case[0])
+    assert (tmp_path / "out/measurements.dcm").exists()
+
+
+def test_a_rectified_pixel_off_the_image_is_no_place(result):
+    held = result.calibration
+    point = next(p for p in result.points if p.xyz_mm is not None)
+    seen = {name: held.project(point.xyz_mm, name) for name in held.names}
+    for off in ((5000, 300), (-700, 300)):
+        with pytest.raises(helicarm.RefusedError, match="outside the rectified image") as error:
+            held.locate({**seen, "AP": off})
+        assert (error.value.code, error.value.view) == ("not_seen", "AP")
+        many = held.locate_all({**{name: [uv] for name, uv in seen.items()}, "AP": [off]})
+        assert np.isnan(many["xyz_mm"]).all() and many["reasons"][0]["code"] == "not_seen"
+
+
 def test_saved_calibration_locates_as_the_run_did(result, tmp_path):
     result.write(tmp_path)
     loaded, held = helicarm.Calibration.load(tmp_path / "result.json"), result.calibration

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Migration between two examinations."""
 
+import json
+
 import helicarm
 import numpy as np
 import pytest
@@ -35,7 +37,24 @@ def test_segments_may_be_given_and_are_checked(tmp_path):
     answer = helicarm.migration(first, second, segments={"a": ["bone0", "bone1", "bone2"], "b": ["tray0", "tray1", "tray2"]},
                                 reference="b", by_name=True)
     assert answer["reference"] == "b"
+    unsorted = {"tibia": ["bone0", "bone1", "bone2"], "stem": ["tray0", "tray1", "tray2"]}
+    assert helicarm.migration(first, second, segments=unsorted, by_name=True)["reference"] == "tibia"
+    with pytest.raises(TypeError, match="segments"):
+        helicarm.migration(first, second, segments={"a": "bone0"})
     with pytest.raises(helicarm.InputError, match="cup"):
         helicarm.migration(first, second, reference="cup")
     with pytest.raises(helicarm.InputError, match="same examination"):
         helicarm.migration(first, first)
+
+
+def test_a_refusal_replaces_what_was_written_earlier(tmp_path):
+    first, second, out = exam(tmp_path / "a.csv", seed=1), exam(tmp_path / "b.csv", seed=2), tmp_path / "out"
+    helicarm.migration(first, second, out=out)
+    with pytest.raises(helicarm.InputError):
+        helicarm.migration(first, first, out=out)
+    assert not (out / "migration.json").exists()
+    few = tmp_path / "few.csv"
+    few.write_text("name,x_mm,y_mm,z_mm\nA,0,0,0\nB,10,0,0\nC,0,12,0\n")
+    with pytest.raises(helicarm.RefusedError):
+        helicarm.migration(first, few, out=out)
+    assert json.loads((out / "migration.json").read_text())["status"] == "refused"

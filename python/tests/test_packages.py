@@ -59,6 +59,11 @@ def test_itk_has_a_matrix_of_directions():
     module = sys.modules.setdefault("itk_stand_in", types.ModuleType("itk_stand_in"))
     module.array_view_from_image = lambda image: voxels
     assert np.array_equal(helicarm.as_volume(Image()).affine, helicarm.as_volume(image).affine)
+    # A filter that cuts a part out keeps the origin and numbers the voxels from another index.
+    Image.GetBufferedRegion = staticmethod(lambda: types.SimpleNamespace(GetIndex=lambda: (100, -10, 2)))
+    part, whole = helicarm.as_volume(Image()).affine, helicarm.as_volume(image).affine
+    assert np.array_equal(part[:3, :3], whole[:3, :3])
+    assert np.array_equal(part[:3, 3], (whole @ [100, -10, 2, 1])[:3])
 
 
 def test_trimesh_states_its_unit_but_no_frame():

@@ -48,6 +48,15 @@ def test_cameras_without_covariance_are_a_warning(landmarks):
     assert (model["decision"], [w["code"] for w in model["warnings"]]) == ("warn", ["covariance_missing"])
 
 
+def test_what_an_earlier_registration_left_goes_before_anything_can_fail(case, tmp_path):
+    left = [tmp_path / name for name in ("registration.json", "registration.csv", "measurements.dcm")]
+    for file in left:
+        file.write_text("{}")
+    with pytest.raises(helicarm.InputError):
+        helicarm.register(case[0], out=tmp_path)
+    assert not [file for file in left if file.exists()]
+
+
 def test_register_without_models_is_an_input_error(case):
     with pytest.raises(helicarm.InputError) as error:
         helicarm.register(case[0])

@@ -189,6 +189,12 @@ def test_progress_that_takes_a_share_is_told_how_much_of_the_search_is_done(sequ
     assert {step for step, share in told if share is not None} <= set(steps)
 
 
+def test_progress_with_other_parameters_is_told_the_names_alone(sequence):  # noqa: F811
+    told = []
+    registration(sequence, progress=lambda step, *others: told.append((step, others)))
+    assert told and all(others == () for _, others in told)
+
+
 def test_an_exception_of_progress_at_a_share_ends_the_call(sequence):  # noqa: F811
     def stop(step, share=None):
         if share is not None:

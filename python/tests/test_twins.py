@@ -201,6 +201,8 @@ def test_a_new_case_is_the_same(case, tmp_path):
     program("new", *images, "--calibrator", "udcsc", "--plate", "plate48", "--out", tmp_path / "program", "--quiet")
     made = helicarm.new_case(images, tmp_path / "python", calibrator="udcsc", plate="plate48")
     assert made["case"] == str(tmp_path / "python/case.json")
+    for name in ("case.json", "AP.dcm"):
+        assert (tmp_path / "python" / name).stat().st_mode & 0o777 == 0o600
     assert (tmp_path / "program/case.json").read_text() == (tmp_path / "python/case.json").read_text()
     with pytest.raises(helicarm.InputError, match="calibrator"):
         helicarm.new_case(images, tmp_path / "other", calibrator="")
@@ -213,6 +215,12 @@ def test_a_bundle_is_the_same(case, tmp_path):
     made = helicarm.bundle(case[0], out=tmp_path / "python.tar.gz", run=False)
     assert "case.json" in made["files"]
     assert (tmp_path / "program.tar.gz").read_bytes() == (tmp_path / "python.tar.gz").read_bytes()
+    with pytest.raises(helicarm.InputError, match="is a file that the bundle is made of"):
+        helicarm.bundle(case[0], out=case[0] / "case.json", run=False)
+    assert (case[0] / "case.json").exists()
+    with pytest.raises(helicarm.InputError):
+        helicarm.bundle(tmp_path / "nowhere", out=tmp_path / "python.tar.gz")
+    assert not (tmp_path / "python.tar.gz").exists()
 
 
 @pytest.fixture(scope="module")

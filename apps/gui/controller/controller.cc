@@ -151,6 +151,7 @@ void Controller::finish(Phase phase, const Expected<Change>& done) {
   state_.busy.reset();
   state_.doing.clear();
   if (const auto open_next = std::exchange(next_source_, nullptr)) {
+    emit changed();  // the work has ended before the next one begins
     measures_again_ = false;
     return open_next();
   }

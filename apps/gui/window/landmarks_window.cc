@@ -298,8 +298,8 @@ void LandmarksWindow::propose() {
 
 void LandmarksWindow::show_state() {
   const ApplicationState& state = controller_.state();
-  const bool is_its_case = state.folder == folder_ && model_ < state.models.size() &&
-                           state.models[model_].name == files_.name;
+  const bool is_its_case =
+      state.folder == folder_ && model_ < state.models.size() && state.models[model_].name == files_.name;
   if (!is_its_case) {
     close();
     return;

@@ -182,8 +182,7 @@ void MainWindow::build_pages() {
   connect(rectify, &RectifyPage::layer_wanted, panels_, &XrayPanels::set_layer);
   connect(register_, &RegisterPage::slices_wanted, this, &MainWindow::open_ct_of);
   connect(register_, &RegisterPage::landmarks_wanted, this, [this](std::size_t model) {
-    if (model < controller_.state().models.size())
-      show_beside(new LandmarksWindow(controller_, model, this));
+    if (model < controller_.state().models.size()) show_beside(new LandmarksWindow(controller_, model, this));
   });
   connect(register_, &RegisterPage::held_changed, this, &MainWindow::show_handles);
   connect(plan_, &PlanPage::target_changed, this, &MainWindow::show_picks);

@@ -34,8 +34,7 @@ std::vector<RegisteredModel> listed_models(const ApplicationState& state) {
       }
     return models;
   }
-  for (const pipeline::CaseModel& model : state.models)
-    models.emplace_back().registration.name = model.name;
+  for (const pipeline::CaseModel& model : state.models) models.emplace_back().registration.name = model.name;
   return models;
 }
 
@@ -242,8 +241,7 @@ void RegisterPage::show_state(const ApplicationState& state) {
   confirm_->setEnabled(can && awaits_confirmation(state) && !state.nudged);
   from_here_->setEnabled(can && has_poses_by_hand(state));
   const std::size_t chosen = std::size_t(std::max(0, model_->currentIndex()));
-  ct_->setEnabled(state.registration && chosen < state.models.size() &&
-                  state.models[chosen].volume);
+  ct_->setEnabled(state.registration && chosen < state.models.size() && state.models[chosen].volume);
   says_->setText(with_landmark_words(words_of(state), state));
   std::vector<RegisteredModel> models = listed_models(state);
   models_->fill(table_of_models(state, models));

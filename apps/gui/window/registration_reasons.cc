@@ -35,7 +35,7 @@ QString without_placing(const ApplicationState& state, std::size_t model) {
   if (!is_by_hand || !found.failure) return {};
   return (has_start(state, model)
               ? reason_tr("%1 was searched for from the pose set by hand. \"Register models\" forgets that "
-                          "pose and begins where the case states.")
+                          "pose and begins at the start that is stated.")
               : reason_tr("%1 was searched for from the pose set by hand. \"Register models\" forgets that "
                           "pose and searches everywhere, in every orientation."))
       .arg(text(found.name));

@@ -298,7 +298,7 @@ TEST(RegisteredModels, OneRefusedFromAPoseByHandIsOfferedASearchWithoutIt) {
   state.starts_by_hand = {{"femur", {}}};
   EXPECT_TRUE(reasons_of(state).contains("\"Register models\" forgets that pose and searches everywhere"));
   state.models[0].landmarks = "points.csv";
-  EXPECT_TRUE(reasons_of(state).contains("\"Register models\" forgets that pose and begins where the case"));
+  EXPECT_TRUE(reasons_of(state).contains("\"Register models\" forgets that pose and begins at the start"));
   model.registration.failure.reset();
   state.registration = with_registration(model).registration;
   EXPECT_FALSE(reasons_of(state).contains("Register models"));

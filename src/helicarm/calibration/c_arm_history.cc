@@ -118,14 +118,27 @@ void forget_old_maps(CArmHistory& history) {
   }
 }
 
+namespace {
+
+/// Takes what an entry of an earlier version does not know from another one of its image.
+void complete(HistoryEntry& held, const HistoryEntry& same) {
+  if (!held.plate) held.plate = same.plate;
+  if (held.nominal_focal_mm || held.estimate_mm != same.estimate_mm) return;
+  held.nominal_focal_mm = same.nominal_focal_mm;
+  held.calibrator = same.calibrator;
+  held.by_calibrator = same.by_calibrator;
+}
+
+}  // namespace
+
 std::size_t add_entries(CArmHistory& history, std::span<const HistoryEntry> entries) {
   const std::size_t earlier = history.entries.size();
   for (const HistoryEntry& entry : entries) {
     const auto held = std::ranges::find(history.entries, entry.image, &HistoryEntry::image);
     if (held == history.entries.end())
       history.entries.push_back(entry);
-    else if (!held->plate)
-      held->plate = entry.plate;
+    else
+      complete(*held, entry);
   }
   return history.entries.size() - earlier;
 }

@@ -122,8 +122,8 @@ std::vector<std::size_t> entries_with_latest_maps(std::span<const HistoryEntry> 
 /// Takes the maps away that no longer count in their own field: a record would grow by them for ever.
 void forget_old_maps(CArmHistory& history);
 
-/// Adds the entries of images that the history does not hold, and the map of an image that it holds without
-/// one; returns how many entries.
+/// Adds the entries of images that the history does not hold, and to those that it holds what they lack;
+/// returns how many entries.
 std::size_t add_entries(CArmHistory& history, std::span<const HistoryEntry> entries);
 
 /// machine.json (docs/formats.md).

@@ -301,11 +301,11 @@ Expected<std::vector<HistoryEntry>> acquisitions_of_result(const Json& json, con
     FromJson codec(reader);
     describe_acquisitions(codec, "acquisitions", false, entries);
     if (entries.empty())
-      throw BadInput(
-          Reason::too_few_views,
-          origin +
-              ": holds no acquisitions: its residuals contradict the noise model, its images have no pixel "
-              "size or source distance, or an earlier version wrote it (measure again)");
+      throw BadInput(Reason::too_few_views,
+                     origin +
+                         ": holds no acquisitions: its residuals contradict the noise model, or the images "
+                         "the calibrator's file, they have no pixel "
+                         "size or source distance, or an earlier version wrote it (measure again)");
     return entries;
   });
 }

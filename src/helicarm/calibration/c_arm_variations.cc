@@ -95,7 +95,10 @@ CArmVariations c_arm_variations(const CArmModel& model) {
                             {}};
   std::vector<HistoryEntry> placed;
   for (const HistoryEntry& entry : model.entries)
-    if (entry.primary_deg) placed.push_back(entry);
+    if (entry.primary_deg) {
+      placed.push_back(entry);
+      placed.back().nominal_focal_mm.reset();  // of one source distance
+    }
   if (placed.empty()) return variations;
   const Eigen::VectorXd mean = predict_intrinsics(model, placed).mean_mm;
   const Eigen::Matrix3Xd by_axis = mean.reshaped(3, Eigen::Index(placed.size()));

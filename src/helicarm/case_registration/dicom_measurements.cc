@@ -10,8 +10,10 @@
 
 #include "helicarm/case_registration/dicom_registrations.h"
 #include "helicarm/core/statistics.h"
+#include "helicarm/pipeline/view_image.h"
 #include "helicarm/report/earlier_results.h"
 #include "helicarm/xray/dicom_tags.h"
+#include "helicarm/xray/read_dicom.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -211,6 +213,62 @@ void check_one_patient(const std::vector<xray::ReportImage>& images) {
     }
 }
 
+std::vector<std::string> names_of_views(const Measurement& measured) {
+  std::vector<std::string> names;
+  for (const pipeline::ViewResult& view : measured.result.views) names.push_back(view.name);
+  if (names.empty() && measured.registration)
+    for (const registration::RegistrationView& view : measured.registration->loaded.views)
+      names.push_back(view.name);
+  return names;
+}
+
+/// What shows that an image is not the one measured in view `index`; empty: nothing.
+std::string difference_from_measured(const xray::XrayImage& image, const Measurement& measured,
+                                     std::size_t index) {
+  const xray::Acquisition& a = image.acquisition;
+  if (measured.result.views.empty()) {
+    const LoadedViews& loaded = measured.registration->loaded;
+    if (!a.patient_key.empty() && a.patient_key != loaded.patient_key) return "patient";
+    const auto map = loaded.maps[index] ? *loaded.maps[index] : rectification::flat_panel_map(image);
+    const bool is_same =
+        xray::image_key(rectification::resample(image, map)) == xray::image_key(loaded.views[index].grey);
+    return is_same ? "" : "pixels";
+  }
+  const auto& of_result = measured.result.views[index].xray_image;
+  if (!of_result) return "";
+  const xray::Acquisition& b = of_result->acquisition;
+  if (a.patient_key != b.patient_key) return "patient";
+  if (a.study_key != b.study_key) return "study";
+  if (a.uid_key != b.uid_key) return "SOP Instance UID or frame";
+  return a.instance_key == b.instance_key ? "" : "pixels";
+}
+
+/// Patient and study are taken from the case's files, which must be what was measured.
+void check_is_measured(const pipeline::Case& the_case, const Measurement& measured) {
+  std::vector<std::string> names;
+  for (const pipeline::CaseView& view : the_case.views) names.push_back(view.name);
+  if (const auto found = names_of_views(measured); names != found)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("the case has the views {}, what was measured {}: it is another case",
+                               fmt::join(names, ", "), fmt::join(found, ", ")));
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const xray::XrayImage image = value_or_throw(pipeline::image_of(the_case.views[i]));
+    const std::string difference = difference_from_measured(image, measured, i);
+    if (difference.empty()) continue;
+    throw BadInput({difference == "patient" ? Reason::patient_mismatch : Reason::bad_value,
+                    fmt::format("{} is not the image that was measured: its {} differs",
+                                the_case.views[i].image.filename().string(), difference),
+                    names[i],
+                    {}});
+  }
+  if (!measured.registration) return;
+  const auto& models = measured.registration->models;
+  for (std::size_t i = 0; i < models.size(); ++i)
+    if (i >= the_case.models.size() || models[i].registration.name != the_case.models[i].name)
+      throw BadInput(Reason::bad_value, fmt::format("the case has not the model \"{}\" that was registered",
+                                                    models[i].registration.name));
+}
+
 std::string frame_uid_of_views(const Measurement& measured) {
   if (measured.registration) return calibrator_frame_uid(*measured.registration);
   std::vector<geometry::View> views;
@@ -252,6 +310,7 @@ Expected<std::optional<std::string>> write_dicom_measurements(const pipeline::Ca
                                                               const std::filesystem::path& file) {
   return guarded([&]() -> std::optional<std::string> {
     if (measured.result.failure) throw BadInput(*measured.result.failure);
+    check_is_measured(the_case, measured);
     xray::MeasurementReport report;
     std::vector<std::optional<std::size_t>> of_views;
     for (const pipeline::CaseView& view : the_case.views) {
@@ -274,6 +333,7 @@ Expected<DicomResults> write_available_dicom(const pipeline::Case& the_case, con
                                              const std::filesystem::path& registrations) {
   return guarded([&] {
     DicomResults results;
+    if (measured.result.failure && measured.registration) check_is_measured(the_case, measured);
     if (!measured.result.failure) {
       const std::filesystem::path file = folder / report::dicom_measurements_name;
       if (auto why = value_or_throw(write_dicom_measurements(the_case, measured, file)))

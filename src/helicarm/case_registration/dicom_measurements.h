@@ -16,8 +16,8 @@ std::vector<xray::ReportGroup> report_groups(const Measurement& measured,
 
 /// Writes a measurement report with the images that are DICOM files, whose patient and study it has. Returns
 /// why it was left out: no image is a DICOM file that names its study and series, or nothing was measured.
-/// Refuses as `write_measurement_report`, the refusal of a measurement that was refused, and patient_mismatch
-/// for images of two patients.
+/// Refuses as `write_measurement_report`, the refusal of a measurement that was refused, patient_mismatch for
+/// images of two patients or of another than was measured, and bad_value for views or images that were not.
 Expected<std::optional<std::string>> write_dicom_measurements(const pipeline::Case& the_case,
                                                               const Measurement& measured,
                                                               const std::filesystem::path& file);

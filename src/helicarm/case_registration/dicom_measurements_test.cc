@@ -6,6 +6,8 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
+#include "helicarm/image/png.h"
+#include "helicarm/pipeline/view_image.h"
 #include "helicarm/report/earlier_results.h"
 #include "helicarm/xray/dicom_builder.h"
 #include "helicarm/xray/dicom_tags.h"
@@ -42,6 +44,19 @@ struct Knee {
     measured.result.tunnels.push_back({"femoral", {}, {}, {}, 30.0});
     measured.result.tunnels.back().length_sigma_mm = 0.5;
     measured.result.tunnel_ends.push_back({0, 1});
+    take_images();
+  }
+
+  /// The case's images are what was measured.
+  void take_images() {
+    measured.result.views.clear();
+    for (const pipeline::CaseView& view : the_case.views) {
+      pipeline::ViewResult& taken = measured.result.views.emplace_back();
+      taken.name = view.name;
+      const auto image = pipeline::image_of(view);
+      EXPECT_TRUE(image) << image.error().message;
+      if (image) taken.xray_image = std::make_shared<const xray::XrayImage>(*image);
+    }
   }
 
   void write_image(const std::string& view, const char* patient) {
@@ -103,6 +118,49 @@ TEST(DicomMeasurements, AreWrittenBesideTheResult) {
 TEST(DicomMeasurements, ImagesOfTwoPatientsAreRefused) {
   Knee knee;
   knee.write_image("LAT", "2");
+  knee.take_images();
+  EXPECT_EQ(knee.written().error().reason, Reason::patient_mismatch);
+}
+
+TEST(DicomMeasurements, ImageOfAnotherPatientThanWasMeasuredIsRefused) {
+  Knee knee;
+  for (const char* view : {"AP", "LAT"}) knee.write_image(view, "2");
+  const auto results = knee.written();
+  ASSERT_FALSE(results);
+  EXPECT_EQ(results.error().reason, Reason::patient_mismatch);
+  EXPECT_EQ(results.error().view, "AP");
+  EXPECT_FALSE(std::filesystem::exists(knee.folder.path() / report::dicom_measurements_name));
+}
+
+TEST(DicomMeasurements, AnotherImageOfThePatientIsRefused) {
+  Knee knee;
+  std::swap(knee.the_case.views[0].image, knee.the_case.views[1].image);
+  EXPECT_EQ(knee.written().error().reason, Reason::bad_value);
+}
+
+TEST(DicomMeasurements, CaseOfOtherViewsIsRefused) {
+  Knee knee;
+  knee.the_case.views[1].name = "OBL";
+  EXPECT_THAT(knee.written().error().message, HasSubstr("AP, OBL"));
+  knee.the_case.views.pop_back();
+  EXPECT_EQ(knee.written().error().reason, Reason::bad_value);
+}
+
+TEST(DicomMeasurements, ImageOfARegistrationAloneIsComparedByItsPixels) {
+  Knee knee;
+  LoadedViews& loaded = knee.measured.registration.emplace().loaded;
+  for (const pipeline::ViewResult& view : knee.measured.result.views) {
+    loaded.patient_key = view.xray_image->acquisition.patient_key;
+    loaded.views.emplace_back().name = view.name;
+    loaded.views.back().grey =
+        rectification::resample(*view.xray_image, rectification::flat_panel_map(*view.xray_image));
+    loaded.maps.emplace_back();
+  }
+  knee.measured.result.views.clear();
+  EXPECT_TRUE(knee.written());
+  loaded.views[1].grey(0, 0) += 1;
+  EXPECT_THAT(knee.written().error().message, HasSubstr("pixels"));
+  loaded.patient_key = "another";
   EXPECT_EQ(knee.written().error().reason, Reason::patient_mismatch);
 }
 
@@ -116,8 +174,9 @@ TEST(DicomMeasurements, WithoutDicomImagesTheyAreRefused) {
   Knee knee;
   for (pipeline::CaseView& view : knee.the_case.views) {
     view.image = knee.folder.path() / "image.png";
-    ASSERT_TRUE(write_file(view.image, "\x89PNG"));
+    ASSERT_TRUE(write_file(view.image, image::encode_png(image::Image<std::uint16_t>(8, 6, 100))));
   }
+  knee.take_images();
   EXPECT_THAT(knee.written().error().message, HasSubstr("no view's image is a DICOM file"));
 }
 

@@ -7,10 +7,21 @@
 
 #include "helicarm/report/earlier_results.h"
 #include "helicarm/volume/read_volume.h"
+#include "helicarm/xray/dicom_text.h"
 #include "helicarm/xray/spatial_registration.h"
 #include "helicarm/xray/uid.h"
 
 namespace helicarm::case_registration {
+namespace {
+
+/// A long name is cut, not what is said of it.
+std::string description_of(const std::string& model) {
+  const std::string direction = " to calibrator";
+  return xray::whole_characters(model, xray::long_string_bytes - direction.size()) + direction;
+}
+
+}  // namespace
+
 std::string calibrator_frame_uid(const std::vector<geometry::View>& views) {
   std::string cameras = "frame of cameras";
   for (const geometry::View& view : views) {
@@ -39,10 +50,8 @@ Expected<std::optional<std::vector<std::filesystem::path>>> write_dicom_registra
       is_any_series = is_any_series || frame.has_value();
       const registration::Registration& found = result.models[i].registration;
       if (!frame || found.failure) continue;
-      xray::SpatialRegistration registration{*frame,
-                                             calibrator_frame_uid(result),
-                                             {},
-                                             fmt::format("{} to calibrator", found.name).substr(0, 64)};
+      xray::SpatialRegistration registration{
+          *frame, calibrator_frame_uid(result), {}, description_of(found.name)};
       const Eigen::Matrix4d matrix = found.world_from_model.matrix();
       Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(registration.frame_from_ct.data()) = matrix;
       files.push_back(folder / (report::dicom_registration_name(found.name, i)));

@@ -57,6 +57,15 @@ TEST(DicomRegistrations, AreOfTheModelsInADicomSeries) {
   EXPECT_THAT(bytes, HasSubstr("1\\0\\0\\1\\0\\1\\0\\2\\0\\0\\1\\3\\0\\0\\0\\1"));
 }
 
+TEST(DicomRegistrations, OfALongNameSayTheDirection) {
+  Knee knee;
+  const std::string before(49, 'f');
+  knee.result.models[0].registration.name = before + "\u00fc left femur";
+  const auto files = write_dicom_registrations(knee.the_case, knee.result, knee.folder.path());
+  ASSERT_TRUE(files && *files) << files.error().message;
+  EXPECT_THAT(*read_file((**files).front(), 1 << 20), HasSubstr(before + " to calibrator"));
+}
+
 TEST(DicomRegistrations, NameTheSeriesThatIsRead) {
   const Knee knee;
   xray::DicomBuilder localizer = Knee::slice(), other = Knee::slice();

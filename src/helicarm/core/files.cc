@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cerrno>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -125,10 +126,22 @@ Expected<void> replaced(FileAside& aside, const fs::path& path) {
   return {};
 }
 
-/// Atomic replacement: unnamed file, fsync, link or rename, fsync of the folder.
-Expected<void> replace_file(const fs::path& path, std::string_view bytes, mode_t mode = readable_by_all) {
-  FileAside aside(path, mode);
-  if (!aside.is_open() || !write_all(aside.number(), bytes))
+/// The mode of the file that it replaces: one that its owner made private stays so.
+bool takes_mode_of(const fs::path& path, const FileAside& aside) {
+  constexpr mode_t permissions = 0777, of_its_writer = 0600;
+  struct stat before {
+  }, now{};
+  if (::stat(path.c_str(), &before) != 0 || !S_ISREG(before.st_mode)) return true;
+  if (::fstat(aside.number(), &now) != 0) return false;
+  const mode_t mode = (before.st_mode & permissions) | of_its_writer;
+  return mode == (now.st_mode & permissions) || ::fchmod(aside.number(), mode) == 0;
+}
+
+/// Atomic replacement: unnamed file, fsync, link or rename, fsync of the folder. Without a mode: that of the
+/// file that is replaced, else readable by all.
+Expected<void> replace_file(const fs::path& path, std::string_view bytes, std::optional<mode_t> mode = {}) {
+  FileAside aside(path, mode.value_or(readable_by_all));
+  if (!aside.is_open() || (!mode && !takes_mode_of(path, aside)) || !write_all(aside.number(), bytes))
     return tl::unexpected<Failure>(cannot_write(path, errno));
   return replaced(aside, path);
 }
@@ -238,7 +251,8 @@ Expected<void> write_private_file(const fs::path& path, std::string_view bytes) 
 Expected<void> write_file_with(const fs::path& path, const Write& write) {
   if (auto created = make_folder(folder_of(path)); !created) return created;
   FileAside aside(path, readable_by_all);
-  if (!aside.is_open()) return tl::unexpected<Failure>(cannot_write(path, errno));
+  if (!aside.is_open() || !takes_mode_of(path, aside))
+    return tl::unexpected<Failure>(cannot_write(path, errno));
   return write(aside.open_as()).and_then([&] { return replaced(aside, path); });
 }
 

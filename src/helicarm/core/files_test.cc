@@ -38,6 +38,22 @@ TEST_F(Files, FailedWriteKeepsTheOldFileAndLeavesNoOther) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
 }
 
+TEST_F(Files, PrivateFileStaysPrivateWhenItIsReplaced) {
+  const fs::path file = folder_ / "b.txt";
+  const auto owner_only = fs::perms::owner_read | fs::perms::owner_write;
+  ASSERT_TRUE(write_file(file, "old"));
+  EXPECT_NE(fs::status(file).permissions(), owner_only);
+  fs::permissions(file, owner_only);
+  ASSERT_TRUE(write_file(file, "new"));
+  EXPECT_EQ(fs::status(file).permissions(), owner_only);
+  ASSERT_TRUE(write_file_with(file, [](const fs::path& aside) -> Expected<void> {
+    std::ofstream(aside) << "newer";
+    return {};
+  }));
+  EXPECT_EQ(fs::status(file).permissions(), owner_only);
+  EXPECT_EQ(*read_file(file, 10), "newer");
+}
+
 TEST_F(Files, KilledWriterLeavesNothing) {
   const pid_t writer = ::fork();
   if (writer == 0) {

@@ -19,6 +19,24 @@ constexpr std::string_view table_heading = "view,p11,p12,p13,p14,p21,p22,p23,p24
   throw BadInput(reason, fmt::format("{}: NumPy array: {}", origin, problem));
 }
 
+/// The first field of a line and what stands behind it, from the comma on; in quotes as RFC 4180 has it.
+std::pair<std::string, std::string_view> first_field(std::string_view line, const std::string& where) {
+  if (!line.starts_with('"')) {
+    const std::size_t comma = std::min(line.find(','), line.size());
+    return {std::string(line.substr(0, comma)), line.substr(comma)};
+  }
+  std::string field;
+  for (std::size_t at = 1;;) {
+    const std::size_t quote = line.find('"', at);
+    if (quote == line.npos)
+      throw BadInput(Reason::truncated, fmt::format("{}: a quoted view does not end", where));
+    field += line.substr(at, quote - at);
+    at = quote + 1;
+    if (!line.substr(at).starts_with('"')) return {field, line.substr(at)};
+    field += line[at++];
+  }
+}
+
 /// The value of a key in the header's Python dictionary, up to `end`.
 std::string dictionary_value(std::string_view header, std::string_view key, char end,
                              const std::string& origin) {
@@ -51,12 +69,12 @@ Cameras parse_matrix_table(std::string_view text, const std::string& origin) {
     at = end == text.size() ? text.npos : end;
     if (row.empty()) continue;
     const std::string where = fmt::format("{}: line {}", origin, line);
-    const std::size_t comma = row.find(',');
-    if (comma == row.npos || cameras.size() == most_cameras)
+    const auto [name, numbers] = first_field(row, where);
+    if (!numbers.starts_with(',') || cameras.size() == most_cameras)
       throw BadInput(Reason::bad_size,
                      fmt::format("{}: must be a view and 12 numbers, {} lines at most", where, most_cameras));
-    cameras.push_back(imported(numbers_in(std::string_view(row).substr(comma + 1), where), where));
-    cameras.back().name = without_control_characters(row.substr(0, comma));
+    cameras.push_back(imported(numbers_in(numbers.substr(1), where), where));
+    cameras.back().name = without_control_characters(name);
   }
   if (cameras.empty()) throw BadInput(Reason::truncated, fmt::format("{}: holds no matrix", origin));
   return cameras;

@@ -98,6 +98,20 @@ TEST(ImportRun, OneCameraOfSeveralIsChosenByItsColumn) {
   EXPECT_NEAR(third->view.intrinsics.fy, run.images[2].view.intrinsics.fy, 1e-6);
 }
 
+TEST(ImportRun, ANameOfATableMayHoldCommasAndQuotes) {
+  RunGeometry run = rotation_run(false);
+  run.images[0].name = "AP, 20 deg";
+  run.images[1].name = "the \"oblique\", one";
+  const std::string text = matrices_csv(run);
+  EXPECT_NE(text.find("\n\"AP, 20 deg\","), std::string::npos);
+  expect_read_back(cameras_in(text), run, "csv");
+  const auto read = cameras_in(text);
+  ASSERT_TRUE(read) << read.error().message;
+  for (std::size_t i = 0; i < run.images.size(); ++i) EXPECT_EQ(read->at(i).name, run.images[i].name);
+  EXPECT_EQ(cameras_in(text + "\"RUN/4,1,2\n").error().reason, Reason::truncated);
+  EXPECT_EQ(cameras_in(text + "\"RUN/4\" 1,2\n").error().reason, Reason::bad_size);
+}
+
 TEST(ImportRun, WhatAFormatDoesNotHoldIsAskedFor) {
   const RunGeometry run = rotation_run(false);
   EXPECT_EQ(cameras_in(astra_vectors(run)).error().reason, Reason::usage);

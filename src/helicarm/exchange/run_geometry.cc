@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/csv.h"
 #include "helicarm/core/json.h"
 #include "helicarm/exchange/rtk_projection.h"
 #include "helicarm/geometry/decomposition.h"
@@ -310,7 +311,7 @@ std::string matrices_csv(const RunGeometry& run) {
   for (int i = 0; i < 12; ++i) text += fmt::format(",p{}{}", i / 4 + 1, i % 4 + 1);
   text += "\n";
   for (const RunGeometry::Image& image : run.images)
-    text += fmt::format("{},{}\n", image.name, numbers_of(image.view.projection(), ",", ","));
+    text += fmt::format("{},{}\n", csv_field(image.name), numbers_of(image.view.projection(), ",", ","));
   return text;
 }
 

@@ -284,6 +284,15 @@ Labelling labelling_of(const LabelSearch& search, const Hypothesis& best,
 LabellingAttempt attempt_labels(const phantom::Calibrator& calibrator,
                                 const std::vector<BallCandidate>& candidates, const LabellingPrior& prior,
                                 const LabellingOptions& options) {
+  if (calibrator.balls.size() > most_labelled_balls)
+    return {
+        {},
+        Failure{Reason::unsupported,
+                fmt::format(
+                    "the calibrator has {} balls, labels are found of up to {}: state those of a part of it",
+                    calibrator.balls.size(), most_labelled_balls),
+                {},
+                {{"balls", double(calibrator.balls.size())}, {"limit", double(most_labelled_balls)}}}};
   constexpr int least_shown = 4;
   const int n = static_cast<int>(candidates.size());
   if (n < least_shown) return {{}, too_few(n, n).value()};

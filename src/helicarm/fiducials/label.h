@@ -54,6 +54,9 @@ struct LabellingAttempt {
   std::optional<Failure> failure;
 };
 
+/// Memory and time grow with the cube of the calibrator's balls.
+inline constexpr std::size_t most_labelled_balls = 200;
+
 /// As `label_balls`, with the best guess after a refusal: to be shown, never to be used.
 LabellingAttempt attempt_labels(const phantom::Calibrator& calibrator,
                                 const std::vector<BallCandidate>& candidates, const LabellingPrior& prior,
@@ -61,7 +64,8 @@ LabellingAttempt attempt_labels(const phantom::Calibrator& calibrator,
 
 /// Labels the fiducials among the candidates, in any orientation, without a starting pose, mirrored or not.
 /// Refuses too_few_fiducials (fewer than six are labelled), ambiguous_labels (another labelling, or the
-/// mirror image, explains the image almost as well) or calibrator_mismatch (no pose explains the candidates).
+/// mirror image, explains the image almost as well) or calibrator_mismatch (no pose explains the candidates);
+/// unsupported above `most_labelled_balls`.
 Expected<Labelling> label_balls(const phantom::Calibrator& calibrator,
                                 const std::vector<BallCandidate>& candidates, const LabellingPrior& prior,
                                 const LabellingOptions& options = {});

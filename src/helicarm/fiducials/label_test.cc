@@ -52,6 +52,15 @@ Expected<Labelling> label_one(const phantom::Calibrator& seen, const phantom::Ca
   return label_balls(file, view_image.candidates, nominal);
 }
 
+TEST(LabelBalls, ACalibratorOfTooManyBallsIsRefused) {
+  phantom::Calibrator many = helix();
+  const phantom::CalibratorBall ball = many.balls.front();
+  many.balls.resize(most_labelled_balls + 1, ball);
+  const auto labelling = label_one(helix(), many, {}, 1);
+  ASSERT_FALSE(labelling);
+  EXPECT_EQ(labelling.error().reason, Reason::unsupported);
+}
+
 TEST(LabelBalls, PreciseCentresAreNeverLabelledWrong) {
   const auto tally = monte_carlo(helix(), 120, 0.1);
   EXPECT_EQ(tally.wrong, 0);

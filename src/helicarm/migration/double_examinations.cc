@@ -56,8 +56,8 @@ void require_new_exams(const ExamPair& pair, const std::vector<ExamPair>& earlie
     const bool has_first = are_same(pair.first, first) || are_same(pair.second, first),
                has_second = are_same(pair.first, second) || are_same(pair.second, second);
     if (has_first && has_second)
-      throw BadInput(Reason::bad_value, fmt::format("the same pair as {} and {}: give each pair once",
-                                                    first.name, second.name));
+      throw BadInput(Reason::bad_value,
+                     fmt::format("the same pair as {} and {}: give each pair once", first.name, second.name));
     if (has_first || has_second)
       throw BadInput(Reason::bad_value,
                      fmt::format("has the examination {} of the pair {} and {}: each pair needs two "

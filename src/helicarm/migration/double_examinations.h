@@ -20,8 +20,8 @@ struct NamedMigration {
 /// One of the six numbers over the double examinations.
 struct ZeroMotion {
   double mean = 0;
-  double sd = 0;            ///< about the mean, n - 1
-  double limit_95 = 0;      ///< t(n - 1) standard deviations: of a patient's migration about zero, without bias
+  double sd = 0;        ///< about the mean, n - 1
+  double limit_95 = 0;  ///< t(n - 1) standard deviations: of a patient's migration about zero, without bias
   double stated_sigma = 0;  ///< root mean square of the standard deviations that the migrations state
 };
 

@@ -1,12 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/migration/double_examinations.h"
 
+#include <array>
+#include <random>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "helicarm/core/files.h"
+#include "helicarm/core/temporary_folder.h"
 #include "helicarm/migration/migration_files.h"
 
 namespace helicarm::migration {
-namespace {
+namespace double_examinations_test {
+
+using testing::HasSubstr;
 
 /// A migration whose translation along x is the number.
 NamedMigration moved_by(double shift) {
@@ -44,5 +53,92 @@ TEST(DoubleExaminations, AreRowsOfTheTable) {
   EXPECT_NE(migration_report(answer).find("tray"), std::string::npos);
 }
 
-}  // namespace
+struct DoubleFiles : testing::Test {
+  TemporaryFolder folder;
+  const std::vector<std::string> usual{"bone", "stem", "cup"};
+  std::pair<std::filesystem::path, std::filesystem::path> first_pair{exam("d1", 11), exam("d2", 12)},
+      second_pair{exam("e1", 13), exam("e2", 14)};
+  MigrationRequest request{exam("a", 1), exam("b", 2)};
+
+  /// A CSV of five markers of each segment with noise of 0.02 mm; `left_out` markers of the first are
+  /// missing.
+  std::filesystem::path exam(const std::string& name, unsigned seed, const std::vector<std::string>& order,
+                             int left_out = 0) const {
+    static constexpr std::array<std::array<double, 3>, 5> places{
+        {{-14, 3, -20}, {11, 9, -26}, {2, -13, -12}, {-6, 12, -8}, {13, -5, -15}}};
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0, 0.02);
+    std::string csv = "name,x_mm,y_mm,z_mm,segment\n";
+    for (const std::string& segment : order)
+      for (std::size_t i = segment == order[0] ? std::size_t(left_out) : 0; i < places.size(); ++i) {
+        const double share = 1 + 0.1 * double(segment[0] - 'b');
+        csv += fmt::format("{}{}", segment, i);
+        for (const double place : places[i])
+          csv += fmt::format(",{}", share * place + 40 * (share - 1) + noise(random));
+        csv += fmt::format(",{}\n", segment);
+      }
+    const std::filesystem::path path = folder.path() / (name + ".csv");
+    EXPECT_TRUE(write_file(path, csv));
+    return path;
+  }
+  std::filesystem::path exam(const std::string& name, unsigned seed) const { return exam(name, seed, usual); }
+};
+
+TEST_F(DoubleFiles, AreAgainstTheMigrationsReferenceWhateverTheirOrder) {
+  const std::vector<std::string> other{"cup", "bone", "stem"};
+  request.doubles = {first_pair, {exam("f1", 15, other), exam("f2", 16, other)}};
+  const auto found = answer(request);
+  ASSERT_TRUE(found) << found.error().message;
+  for (const NamedMigration& each : found->doubles) EXPECT_EQ(each.migration.segments.front().name, "bone");
+  ASSERT_EQ(found->precision.size(), 2u);
+  for (const Precision& each : found->precision) {
+    EXPECT_NE(each.body, "bone");
+    EXPECT_EQ(each.n, 2);
+  }
+}
+
+TEST_F(DoubleFiles, WithoutTheReferenceAreRefused) {
+  const std::vector<std::string> without{"stem", "cup"};
+  request.doubles = {first_pair, {exam("f1", 15, without), exam("f2", 16, without)}};
+  EXPECT_THAT(answer(request).error().message, HasSubstr("f1.csv and f2.csv: reference: \"bone\""));
+}
+
+TEST_F(DoubleFiles, CountOnceInEitherOrder) {
+  request.doubles = {first_pair, {first_pair.second, first_pair.first}};
+  EXPECT_THAT(answer(request).error().message, HasSubstr("the same pair as d1.csv and d2.csv"));
+}
+
+TEST_F(DoubleFiles, HaveExaminationsOfTheirOwn) {
+  const auto copy = folder.path() / "copy.csv";
+  std::filesystem::copy_file(first_pair.second, copy);
+  request.doubles = {first_pair, {copy, second_pair.second}};
+  EXPECT_THAT(answer(request).error().message, HasSubstr("has the examination d2.csv of the pair d1.csv"));
+  request.doubles = {first_pair, second_pair};
+  EXPECT_TRUE(answer(request));
+}
+
+TEST_F(DoubleFiles, WarningsNameThePair) {
+  request.doubles = {first_pair, {second_pair.first, exam("f", 15, usual, 1)}};
+  const auto found = answer(request);
+  ASSERT_TRUE(found) << found.error().message;
+  const auto says = HasSubstr("double examination e1.csv and f.csv: segment \"bone\"");
+  ASSERT_EQ(all_warnings(*found).size(), 1u);
+  EXPECT_THAT(to_json(*found)["warnings"][0]["message"].get<std::string>(), says);
+  EXPECT_THAT(migration_report(*found), HasSubstr("double examination e1.csv and f.csv"));
+}
+
+TEST_F(DoubleFiles, ARefusalReplacesWhatWasWrittenEarlier) {
+  const auto out = folder.path() / "out";
+  ASSERT_TRUE(answer_into(request, out));
+  ASSERT_TRUE(std::filesystem::exists(out / "report.html"));
+  request.second = exam("few", 3, usual, 3);
+  EXPECT_EQ(answer_into(request, out).error().reason, Reason::too_few_fiducials);
+  EXPECT_FALSE(std::filesystem::exists(out / "report.html"));
+  EXPECT_THAT(*read_file(out / "migration.json", 1 << 20), HasSubstr("\"refused\""));
+  request.second = request.first;
+  EXPECT_EQ(answer_into(request, out).error().reason, Reason::bad_value);
+  EXPECT_FALSE(std::filesystem::exists(out / "migration.json"));
+}
+
+}  // namespace double_examinations_test
 }  // namespace helicarm::migration

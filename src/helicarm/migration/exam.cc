@@ -176,9 +176,10 @@ std::vector<Marker> candidates_for(const Exam& exam, const std::string& segment)
 
 Expected<Segment> segment_of(std::string name, std::vector<std::string> markers) {
   if (name.empty() || markers.size() < 3 || std::ranges::any_of(markers, &std::string::empty))
-    return fail(Reason::bad_value, fmt::format("segment: \"{}={}\" is not NAME=M1,M2,M3 with three markers or "
-                                               "more",
-                                               name, fmt::join(markers, ",")));
+    return fail(Reason::bad_value,
+                fmt::format("segment: \"{}={}\" is not NAME=M1,M2,M3 with three markers or "
+                            "more",
+                            name, fmt::join(markers, ",")));
   return Segment{std::move(name), std::move(markers)};
 }
 

@@ -61,6 +61,32 @@ TEST_F(ExamFiles, OfTrackedMarkersOneFrameIsRead) {
   EXPECT_EQ(folder->segments.at(0).name, "jaw");
 }
 
+TEST_F(ExamFiles, AMarkerThatWasNotTrackedStaysInItsBodyWithoutAPlace) {
+  ASSERT_TRUE(write_file(folder_.path() / "track.json",
+                         R"({"bodies": [{"name": "jaw", "markers": [{"name": "P1", "in_body_mm": [0, 0, 0]},
+                             {"name": "P2", "in_body_mm": null}]}]})"));
+  const auto exam = read("markers.csv",
+                         "frame,name,x_mm,y_mm,z_mm,sx_mm,sy_mm,sz_mm,ray_gap_mm,views,status\n"
+                         "1,P1,1,2,3,0.1,0.1,0.1,0.05,cam1 cam2,tracked\n1,P2,,,,,,,,,lost\n");
+  ASSERT_TRUE(exam) << exam.error().message;
+  EXPECT_EQ(exam->segments.at(0).markers, (std::vector<std::string>{"P1", "P2"}));
+  EXPECT_EQ(markers_of(*exam, exam->segments[0]).size(), 1u);
+  EXPECT_EQ(candidates_for(*exam, "jaw").size(), 1u);
+}
+
+TEST_F(ExamFiles, TheHeaderTellsWhichTableItIs) {
+  const auto own = read("markers.csv", "name,x_mm,y_mm,z_mm,segment\nP1,1,2,3,jaw\n");
+  ASSERT_TRUE(own) << own.error().message;
+  EXPECT_EQ(own->segments.at(0).name, "jaw");
+  EXPECT_TRUE(read_exam(folder_.path()));
+  const auto renamed = read("baseline.csv",
+                            "frame,name,x_mm,y_mm,z_mm,sx_mm,sy_mm,sz_mm,ray_gap_mm,views,status\n"
+                            "7,P1,1,2,3,0.1,0.1,0.1,0.05,cam1 cam2,tracked\n",
+                            7);
+  ASSERT_TRUE(renamed) << renamed.error().message;
+  EXPECT_EQ(renamed->markers.size(), 1u);
+}
+
 TEST_F(ExamFiles, OfAResultTheLocatedPointsAreRead) {
   const auto exam = read("result.json",
                          R"({"points": [{"name": "P1", "xyz_mm": [1, 2, 3], "ray_gap_mm": 0.1,

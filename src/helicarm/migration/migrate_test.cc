@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/migration/migrate.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -175,6 +178,78 @@ TEST(Migration, AMissingMarkerIsNamed) {
   const auto made = migrate(exam_of("a", {}, {}, {}), second, {});
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(made->segments[0].missing, std::vector<std::string>{"a0"});
+}
+
+TEST(Migration, AMarkerWithoutAPlaceInTheFirstExaminationIsNamed) {
+  Exam first = exam_of("a", {}, {}, {});
+  first.markers.erase(first.markers.begin() + 5);
+  const auto made = migrate(first, later_exam({}), {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made->segments[1].missing, std::vector<std::string>{"a5"});
+  ASSERT_EQ(made->warnings.size(), 1u);
+  EXPECT_EQ(made->warnings[0].reason, Reason::marker_lost);
+  EXPECT_NE(made->warnings[0].message.find("1 of 4 markers have no place in a: a5"), std::string::npos);
+  const auto asked_for = migrate(first, later_exam({}), {.segments = first.segments});
+  ASSERT_FALSE(asked_for);
+  EXPECT_EQ(asked_for.error().reason, Reason::bad_value);
+  first.markers.erase(first.markers.begin() + 5);
+  EXPECT_NE(migrate(first, later_exam({}), {}).error().message.find("2 of its 4 markers have a place in a"),
+            std::string::npos);
+}
+
+/// Of 400 migrations without motion, those whose residuals are said to exceed the stated errors.
+int widened_of_400(const std::function<Eigen::Vector3d(std::size_t)>& sigma_of) {
+  int widened = 0;
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  const Exam exact = exam_of("m", {}, {}, {});
+  for (int trial = 0; trial < 400; ++trial) {
+    std::array<Exam, 2> exams{exact, exact};
+    for (Exam& exam : exams)
+      for (std::size_t i = 0; i < exam.markers.size(); ++i) {
+        const Eigen::Vector3d sigma = sigma_of(i);
+        exam.markers[i].covariance = sigma.cwiseAbs2().asDiagonal().toDenseMatrix();
+        exam.markers[i].place +=
+            sigma.cwiseProduct(Eigen::Vector3d(normal(random), normal(random), normal(random)));
+      }
+    const auto made = migrate(exams[0], exams[1], {.matching = Matching::name});
+    EXPECT_TRUE(made);
+    if (!made) continue;
+    widened += int(std::ranges::count(made->warnings, Reason::residual_too_large, &Warning::reason));
+  }
+  return widened;
+}
+
+TEST(Migration, UnequalErrorsThatAreStatedRightAreNotWidened) {
+  EXPECT_LE(widened_of_400([](std::size_t) { return Eigen::Vector3d(0.03, 0.03, 0.03); }), 2);
+  EXPECT_LE(widened_of_400([](std::size_t) { return Eigen::Vector3d(0.02, 0.02, 0.1); }), 2);
+  EXPECT_LE(widened_of_400([](std::size_t marker) {
+              return Eigen::Vector3d(Eigen::Vector3d::Constant(marker == 6 ? 0.2 : 0.02));
+            }),
+            2);
+}
+
+TEST(RigidFit, StatesMeanAndVarianceOfTheSquares) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  constexpr int trials = 20000;
+  double sum = 0, of_squares = 0;
+  RigidFit fit;
+  for (int trial = 0; trial < trials; ++trial) {
+    std::vector<Pair> pairs;
+    for (std::size_t i = 0; i < bone.size(); ++i) {
+      const Eigen::Vector3d sigma(0.02, 0.03, i == 1 ? 0.2 : 0.05);
+      pairs.push_back({bone[i], bone[i], sigma.cwiseAbs2().asDiagonal().toDenseMatrix()});
+      pairs.back().second +=
+          sigma.cwiseProduct(Eigen::Vector3d(normal(random), normal(random), normal(random)));
+    }
+    fit = fit_rigid(pairs);
+    sum += fit.squares_mm2;
+    of_squares += fit.squares_mm2 * fit.squares_mm2;
+  }
+  const double mean = sum / trials;
+  EXPECT_NEAR(mean / fit.expected_squares_mm2, 1, 0.03);
+  EXPECT_NEAR((of_squares / trials - mean * mean) / fit.squares_variance_mm4, 1, 0.1);
 }
 
 TEST(Migration, ResidualsBeyondTheStatedErrorsWidenThem) {

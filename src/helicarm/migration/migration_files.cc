@@ -197,18 +197,6 @@ std::string precision_table(const std::vector<Precision>& precisions) {
       rows));
 }
 
-/// Of the migration, then of each double examination, which they name.
-std::vector<Warning> all_warnings(const MigrationAnswer& answer) {
-  std::vector<Warning> all = answer.migration.migration.warnings;
-  for (const NamedMigration& each : answer.doubles)
-    for (Warning warning : each.migration.warnings) {
-      warning.message =
-          fmt::format("double examination {} and {}: {}", each.first, each.second, warning.message);
-      all.push_back(std::move(warning));
-    }
-  return all;
-}
-
 }  // namespace
 
 Expected<Eigen::Matrix3d> read_axes(const std::filesystem::path& path) {
@@ -237,17 +225,25 @@ Expected<MigrationAnswer> answer(const MigrationRequest& request) {
   return guarded([&] {
     MigrationOptions options = request.options;
     if (request.axes) options.axes = value_or_throw(read_axes(*request.axes));
-    const auto between = [&](const std::filesystem::path& first, const std::filesystem::path& second) {
-      const Exam a = value_or_throw(read_exam(first, request.frame)),
-                 b = value_or_throw(read_exam(second, request.frame));
-      return NamedMigration{a.name, b.name, value_or_throw(migrate(a, b, options))};
+    const auto exams = [&](const std::filesystem::path& first, const std::filesystem::path& second) {
+      return ExamPair{value_or_throw(read_exam(first, request.frame)),
+                      value_or_throw(read_exam(second, request.frame))};
     };
-    MigrationAnswer migration_answer{between(request.first, request.second), {}, {}, options.axes};
+    const auto between = [&](const ExamPair& pair) {
+      return NamedMigration{pair.first.name, pair.second.name,
+                            value_or_throw(migrate(pair.first, pair.second, options))};
+    };
+    MigrationAnswer migration_answer{between(exams(request.first, request.second)), {}, {}, options.axes};
+    // A file may list the segments in another order: all are against the same bone.
+    options.reference = migration_answer.migration.migration.segments.front().name;
+    std::vector<ExamPair> pairs;
     for (const auto& [first, second] : request.doubles) {
       auto one = guarded([&] {
-        NamedMigration pair = between(first, second);
-        require_new_pair(pair, migration_answer.doubles);
-        return pair;
+        ExamPair pair = exams(first, second);
+        NamedMigration migration = between(pair);
+        require_new_exams(pair, pairs);
+        pairs.push_back(std::move(pair));
+        return migration;
       });
       if (!one) {
         one.error().message = fmt::format("double examination {} and {}: {}", first.filename().string(),
@@ -259,6 +255,17 @@ Expected<MigrationAnswer> answer(const MigrationRequest& request) {
     migration_answer.precision = precision_of(migration_answer.doubles);
     return migration_answer;
   });
+}
+
+std::vector<Warning> all_warnings(const MigrationAnswer& answer) {
+  std::vector<Warning> all = answer.migration.migration.warnings;
+  for (const NamedMigration& each : answer.doubles)
+    for (Warning warning : each.migration.warnings) {
+      warning.message =
+          fmt::format("double examination {} and {}: {}", each.first, each.second, warning.message);
+      all.push_back(std::move(warning));
+    }
+  return all;
 }
 
 Json refused_json(const Failure& refusal) {
@@ -275,8 +282,7 @@ Json to_json(const MigrationAnswer& answer) {
                {"failure", nullptr},
                {"warnings", Json::array()},
                {"axes", json_rows(answer.axes)}};
-  for (const Warning& warning : all_warnings(answer))
-    json["warnings"].push_back(pipeline::to_json(warning));
+  for (const Warning& warning : all_warnings(answer)) json["warnings"].push_back(pipeline::to_json(warning));
   json.update(json_of(answer.migration));
   json["double"] = Json::array();
   for (const NamedMigration& each : answer.doubles) json["double"].push_back(json_of(each));
@@ -328,6 +334,18 @@ Expected<void> write_migration(const MigrationAnswer& answer, const std::filesys
   return write_file(folder / "migration.csv", migration_csv(answer))
       .and_then([&] { return write_file(folder / "report.html", migration_report(answer)); })
       .and_then([&] { return write_file(folder / "migration.json", to_text(to_json(answer)) + "\n"); });
+}
+
+Expected<MigrationAnswer> answer_into(const MigrationRequest& request, const std::filesystem::path& folder) {
+  return guarded([&] {
+    forget_migration(folder);
+    const auto found = answer(request);
+    if (!found && exit_code(found.error().reason) == 3)
+      value_or_throw(write_file(folder / "migration.json", to_text(refused_json(found.error())) + "\n"));
+    MigrationAnswer migration_answer = value_or_throw(found);
+    value_or_throw(write_migration(migration_answer, folder));
+    return migration_answer;
+  });
 }
 
 void forget_migration(const std::filesystem::path& folder) {

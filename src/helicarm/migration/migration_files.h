@@ -27,9 +27,16 @@ struct MigrationAnswer {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
 };
 
-/// Reads the examinations and computes everything. Fails as `read_exam` and `migrate`; a failure of a double
-/// examination names it.
+/// Reads the examinations and computes everything; the double examinations against the migration's reference.
+/// Fails as `read_exam`, `migrate` and `require_new_exams`; a failure of a double examination names it.
 Expected<MigrationAnswer> answer(const MigrationRequest& request);
+
+/// The same, written into the folder, from which what was written earlier is removed: the three files, of a
+/// refusal (exit code 3) migration.json alone, of unusable input none.
+Expected<MigrationAnswer> answer_into(const MigrationRequest& request, const std::filesystem::path& folder);
+
+/// Of the migration, then of each double examination, which they name.
+std::vector<Warning> all_warnings(const MigrationAnswer& answer);
 
 /// Columns x, y, z of a CSV `axis,x,y,z` whose rows are named x, y and z: unit vectors in the first
 /// examination's laboratory. bad_value where they are not perpendicular and right-handed.

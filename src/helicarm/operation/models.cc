@@ -241,7 +241,11 @@ Expected<void> check_error_at_tip(const OperationPlan& plan, const OperationTunn
       const guidance::Place* in_bone = located ? located->in(tunnel.bone) : nullptr;
       if (!in_bone)
         throw BadInput(Reason::not_seen, fmt::format("{}: is not located in its bone's frame", end));
-      return guidance::to_tool(in_bone->propagated, tunnel.bone, *tracker_from_bone, *now.tracker_from_tool);
+      // The tracker's errors grow with the distance from the marker: with the tip where it will be.
+      geometry::RigidTransform tracker_from_tool = *now.tracker_from_tool;
+      tracker_from_tool.translation += *tracker_from_bone * in_bone->propagated.point -
+                                       tracker_from_tool * tool.marker_from_tip.translation;
+      return guidance::to_tool(in_bone->propagated, tunnel.bone, *tracker_from_bone, tracker_from_tool);
     };
     const guidance::PropagatedPoint start = at_tip_now(tunnel.start), end = at_tip_now(tunnel.end);
     const double of_start = error_95_mm(start, plan.tracker.noise(), tool);

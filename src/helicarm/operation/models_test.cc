@@ -61,6 +61,17 @@ TEST(ErrorAtTip, RefusalNamesTheWorseEndItsErrorTheLimitAndTheCauses) {
   EXPECT_GT(figure("tool_95_mm"), 0);
 }
 
+TEST(ErrorAtTip, IsThatOfTheTipAtTheTunnelWhereverTheToolIs) {
+  const auto error_from = [](double away_mm) {
+    guidance::Poses now = poses();
+    now.tracker_from_tool->translation.z() -= away_mm;
+    const auto refused =
+        check_error_at_tip(plan(), plan().tunnels[0], registered(0.9, 1.2), now, tracked_tool(*plan().drill));
+    return refused.error().figures.at("error_95_mm");
+  };
+  EXPECT_NEAR(error_from(400), error_from(0), 1e-9);
+}
+
 TEST(ErrorAtTip, OfAPickedTunnelIsLimitedToo) {
   OperationPlan picked = plan();
   picked.tunnels[0].of_model.reset();

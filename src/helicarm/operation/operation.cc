@@ -68,6 +68,7 @@ Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const 
                                                       const tracker::PoseBoard& board,
                                                       robot::RobotLink* robot, Notify notify) {
   return guarded([&] {
+    value_or_throw(plan_from(to_json(plan), "plan", plan.folder));  // as its record will be read
     std::unique_ptr<Operation> operation(
         new Operation(std::move(plan), folder, board, robot, std::move(notify)));
     value_or_throw(make_private_folder(folder));

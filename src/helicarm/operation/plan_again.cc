@@ -59,7 +59,10 @@ bool Operation::answers_again() const {
 }
 
 void Operation::halt(const std::string& order, const Failure& why) {
-  record(record::Halted{order, std::string(code(why.reason)), why.message, why.figures});
+  // The first reason is reported, also where it cannot be recorded.
+  static_cast<void>(guarded([&] {
+    record(record::Halted{order, std::string(code(why.reason)), why.message, why.figures});
+  }));
   throw BadInput(why);
 }
 

@@ -30,12 +30,13 @@ constexpr Field<OperationPlan> search_field(std::string_view name) {
 /// The plan's options that a user may set, the limits of plan.json; those with a flag can be stated for one
 /// operation.
 inline constexpr std::array<Field<OperationPlan>, 17> plan_fields{
-    bound<&OperationPlan::max_error_mm>({.name = "max_error_mm",
-                                         .label = "Limit of a point's error",
-                                         .flag = "--max-error",
-                                         .unit = "mm",
-                                         .range = {1e-6, 1000},
-                                         .help = "The robot uses no point with a larger 95 % error"}),
+    bound<&OperationPlan::max_error_mm>(
+        {.name = "max_error_mm",
+         .label = "Limit of a point's error",
+         .flag = "--max-error",
+         .unit = "mm",
+         .range = {1e-6, 1000},
+         .help = "Neither robot nor drill is guided to a point with a larger 95 % error"}),
     description::run_field<&pipeline::RunOptions::method>("method"),
     description::run_field<&pipeline::RunOptions::motion_sigma_mm>("motion_sigma_mm"),
     description::search_field<&case_registration::SearchRange::shift_mm>("search_mm"),

@@ -44,7 +44,10 @@ struct ReplayReport {
   bool complete() const { return finished && !torn && differences.empty(); }
 };
 
-/// The report as the program and the Python package state it.
+/// replay_differs where the record is not complete; else nothing.
+std::optional<Failure> failure_of(const ReplayReport& report);
+
+/// The report, with status and failure, as the program and the Python package state it.
 Json to_json(const ReplayReport& report);
 
 /// Whether the operation took the recorded image, as its poses say: what was measured by earlier images

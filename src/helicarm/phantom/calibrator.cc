@@ -177,7 +177,8 @@ template <class Codec, class CalibratorValue>
 void describe_calibrator(Codec& codec, CalibratorValue& calibrator) {
   constexpr bool reads = !std::is_const_v<CalibratorValue>;
   codec.text("name", calibrator.name, "of the calibrator", name_limits);
-  codec.list("balls", calibrator.balls, true, most_balls, "the fiducials, 6 or more",
+  codec.list("balls", calibrator.balls, true, most_balls,
+             "the fiducials, 6 or more; their labels are found in images of up to 200",
              [](auto& entry, auto& ball) { describe_ball(entry, ball); });
   codec.list("targets", calibrator.targets, false, most_balls,
              "check points, never used for calibration: TRE is theirs",

@@ -24,7 +24,7 @@ inline std::vector<Eigen::Vector3d> helix_centres() {
 /// Views of a C-arm (f 1000 mm, 0.23 mm pixels) that differ by 20 degrees, turn about two axes, and vary in
 /// their intrinsics as `synthetic_c_arm` says.
 inline const calibration::CArmPrior synthetic_c_arm{calibration::IntrinsicsVariation{10, 1.4},
-                                                        calibration::IntrinsicsVariation{7, 4.2}};
+                                                    calibration::IntrinsicsVariation{7, 4.2}};
 
 inline geometry::View synthetic_view(int number, RandomStream& random) {
   constexpr double degree = std::numbers::pi / 180, unit = 1 / 0.23;

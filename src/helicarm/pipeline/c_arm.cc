@@ -2,6 +2,8 @@
 #include "helicarm/pipeline/c_arm.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -23,7 +25,8 @@ Expected<CArmAcquisitions> measured_acquisitions(const Case& the_case, unsigned 
     if (result.calibration->entries.empty())
       return fail(
           Reason::residual_too_large,
-          "the residuals contradict the noise model, or no view alone determines its camera: the case "
+          "the residuals contradict the noise model, the images contradict the calibrator's file, or no view "
+          "alone determines its camera: the case "
           "says nothing of the C-arm (exchanged plate images, wrong pixel size or calibrator's file: "
           "`helicarm run` of it names causes)");
     return CArmAcquisitions{result.calibration->entries, result.warnings, {}};
@@ -60,21 +63,43 @@ Expected<CArmAcquisitions> c_arm_acquisitions(const std::filesystem::path& from,
   });
 }
 
-Expected<calibration::CArmModel> model_of_record(const calibration::CArmHistory& record,
-                                                 const std::string& origin) {
+namespace {
+
+/// Source distance from which the entries that do not know what they stated count: the nearest of the others'
+/// near their own, else their own.
+double nominal_focal_mm(const std::vector<calibration::HistoryEntry>& entries) {
+  constexpr double near_mm = 30;  // three standard deviations of an unknown C-arm
+  std::vector<double> own, stated;
+  for (const calibration::HistoryEntry& entry : entries)
+    if (entry.nominal_focal_mm)
+      stated.push_back(*entry.nominal_focal_mm);
+    else
+      own.push_back(entry.estimate_mm.x());
+  if (own.empty()) return median(std::move(stated));
+  const double at = median(std::move(own));
+  const auto nearest =
+      std::ranges::min_element(stated, {}, [&](double focal_mm) { return std::abs(focal_mm - at); });
+  return nearest != stated.end() && std::abs(*nearest - at) <= near_mm ? *nearest : at;
+}
+
+Expected<calibration::CArmModel> model_about(std::optional<double> focal_mm,
+                                             const calibration::CArmHistory& record,
+                                             const std::string& origin) {
   if (record.entries.empty())
     return fail(
         Reason::too_few_views,
         fmt::format("{}: holds no acquisition beside these; add cases with `helicarm c-arm add`", origin));
-  std::vector<double> focal_mm;
-  for (const calibration::HistoryEntry& entry : record.entries)
-    if (entry.nominal_focal_mm) focal_mm.push_back(*entry.nominal_focal_mm);
-  if (focal_mm.empty())
-    for (const calibration::HistoryEntry& entry : record.entries) focal_mm.push_back(entry.estimate_mm.x());
-  calibration::CArmModel model =
-      calibration::c_arm_model(record.entries, {median(std::move(focal_mm)), 0, 0}, unknown_c_arm());
+  calibration::CArmModel model = calibration::c_arm_model(
+      record.entries, {focal_mm ? *focal_mm : nominal_focal_mm(record.entries), 0, 0}, unknown_c_arm());
   model.runs = record.runs;
   return model;
+}
+
+}  // namespace
+
+Expected<calibration::CArmModel> model_of_record(const calibration::CArmHistory& record,
+                                                 const std::string& origin) {
+  return model_about({}, record, origin);
 }
 
 Expected<calibration::CArmCheck> check_against_record(std::vector<calibration::HistoryEntry> acquired,
@@ -82,7 +107,9 @@ Expected<calibration::CArmCheck> check_against_record(std::vector<calibration::H
                                                       const std::string& origin) {
   std::erase_if(record.entries,
                 [&](const calibration::HistoryEntry& entry) { return is_among(acquired, entry); });
-  return model_of_record(record, origin).map([&](const calibration::CArmModel& model) {
+  // As the prior of `--machine`, which begins from what the first view states.
+  const auto stated = acquired.empty() ? std::nullopt : acquired.front().nominal_focal_mm;
+  return model_about(stated, record, origin).map([&](const calibration::CArmModel& model) {
     return calibration::check_c_arm(model, acquired, record.tolerances);
   });
 }

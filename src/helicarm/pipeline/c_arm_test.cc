@@ -56,6 +56,32 @@ TEST(CArm, AcquisitionsOfAnotherArmAreNotAdded) {
   EXPECT_EQ(add_to_record(file, CArmAcquisitions{{same, record.entries[0]}, {}})->added, 1u);
 }
 
+TEST(CArm, EntriesOfEarlierVersionsAreComparedFromWhatTheNewImagesState) {
+  calibration::CArmHistory record = record_of(10);
+  for (calibration::HistoryEntry& entry : record.entries) entry.estimate_mm.x() = 1011;
+  calibration::HistoryEntry next = record.entries[5];
+  next.image = "next";
+  next.nominal_focal_mm = 1000;
+  EXPECT_FALSE(check_against_record({next}, record, "arm.json")->changed);
+  next.estimate_mm.x() += 120;
+  next.nominal_focal_mm = 1120;  // whose deviation such a record does not know
+  EXPECT_TRUE(check_against_record({next}, record, "arm.json")->changed);
+  record.entries.push_back(next);
+  next.image = "another";
+  next.estimate_mm.x() -= 120;
+  next.nominal_focal_mm = 1000;
+  EXPECT_FALSE(check_against_record({next}, record, "arm.json")->changed);
+}
+
+TEST(CArm, AnEntryOfAnEarlierVersionTakesWhatItLacksFromItsImage) {
+  calibration::CArmHistory record = record_of(3);
+  calibration::HistoryEntry same = record.entries[1];
+  same.nominal_focal_mm = 990;
+  EXPECT_EQ(calibration::add_entries(record, std::vector{same}), 0u);
+  EXPECT_EQ(record.entries[1].nominal_focal_mm, 990);
+  EXPECT_FALSE(record.entries[0].nominal_focal_mm);
+}
+
 TEST(CArm, CheckWithoutAnglesSaysThatItSeesLittle) {
   const calibration::CArmHistory record = record_of(10);
   std::vector<calibration::HistoryEntry> acquired{record.entries[4], record.entries[5]};

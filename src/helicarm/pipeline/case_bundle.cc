@@ -62,6 +62,7 @@ class Bundler {
 
   void write() {
     leave_out_models();
+    leave_out_lines_of_models();
     keep_only(json_, packed_keys);
     for (Json& view : json_["views"]) keep_only(view, packed_view_keys);
     write_descriptions();
@@ -150,6 +151,16 @@ class Bundler {
         models_.emplace(models[i]["name"].get<std::string>(), name);
       bundle_.left_out.push_back(name + ": models are not packed");
     }
+  }
+
+  /// Their places are of the models' files.
+  void leave_out_lines_of_models() {
+    std::erase_if(json_["tunnels"].get_ref<Json::array_t&>(), [&](const Json& tunnel) {
+      if (!tunnel.contains("model")) return false;
+      bundle_.left_out.push_back(tunnels_.at(tunnel["name"].get<std::string>()) +
+                                 ": is a line of a model, which is not packed");
+      return true;
+    });
   }
 
   void write_descriptions() {
@@ -269,6 +280,32 @@ constexpr std::array always_kept{"format",  "helicarm-result/1", "status", "ok",
                                  "version", "options",           "method", "accuracy", "best",    "paper"};
 
 }  // namespace
+
+Expected<void> check_bundle_file(const fs::path& out, const fs::path& path,
+                                 const std::optional<fs::path>& result) {
+  std::error_code ignored;
+  if (!fs::exists(out, ignored)) return {};
+  const fs::path folder = folder_of_case(path), file = case_file(path);
+  std::vector<fs::path> read{file};
+  if (result) read.push_back(fs::is_directory(*result, ignored) ? *result / "result.json" : *result);
+  Renamed texts;
+  if (const auto json = read_json(file)) collect_texts(*json, texts);
+  for (const auto& [text, same] : texts) {
+    if (text.find('\0') != std::string::npos) continue;
+    read.push_back(folder / text);
+    read.push_back(folder / (text + ".json"));
+  }
+  const fs::path out_folder = out.has_parent_path() ? out.parent_path() : fs::path(".");
+  for (const fs::path& input : read)
+    if (fs::equivalent(out, input, ignored) ||
+        (fs::is_directory(input, ignored) && fs::equivalent(out_folder, input, ignored) &&
+         !fs::equivalent(out_folder, folder, ignored)))
+      return fail(
+          Reason::name_clash,
+          fmt::format("{}: is a file that the bundle is made of ({}); give another file for the bundle",
+                      out.string(), input.string()));
+  return {};
+}
 
 Expected<CaseBundle> bundle_case(const fs::path& path, const BundleOptions& options) {
   return guarded([&] {

@@ -43,10 +43,15 @@ struct BundleOptions {
 
 /// The case with everything removed that may identify a person: of the images only pixels and geometry, as
 /// DICOM; views, picks, tunnels, tool lines and bones numbered (V1, pick1, tunnel1, line1, bone1); models
-/// with their files and start, notes, names of files and dates left out. Text within the images' pixels
-/// stays. `log.txt` states what was read and measured. The same case gives the same bytes. Fails as
+/// with their files, start and tunnels, notes, names of files and dates left out. Text within the images'
+/// pixels stays. `log.txt` states what was read and measured. The same case gives the same bytes. Fails as
 /// `read_case`; an image that cannot be read is left out.
 Expected<CaseBundle> bundle_case(const std::filesystem::path& path, const BundleOptions& options);
+
+/// Refuses (name_clash) a file for the bundle that is one of its sources: case.json, a file that it names, or
+/// that of the result (a file or its folder).
+Expected<void> check_bundle_file(const std::filesystem::path& out, const std::filesystem::path& path,
+                                 const std::optional<std::filesystem::path>& result);
 
 /// The result with numbers, booleans and the texts that `known` holds; any other text is replaced.
 Json without_texts(const Json& result, const std::map<std::string, std::string>& known);

@@ -97,6 +97,44 @@ TEST_F(BundleOfNamedCase, HoldsNothingOfItsModels) {
   EXPECT_EQ(parse_json(packed->bytes, "case.json")->at("picks")[0]["bone"]["name"], "bone1");
 }
 
+TEST_F(BundleOfNamedCase, LeavesOutTunnelsOfModels) {
+  Json json = *read_json(folder_.path() / "case.json");
+  json["models"] = {{{"name", "doe_femur"},
+                     {"surface", "doe_femur.stl"},
+                     {"start", {{"landmarks", "doe_points.csv"}}},
+                     {"plan", "doe_plan.mrk.json"}}};
+  json["tunnels"].push_back({{"name", "doe_planned"}, {"model", "doe_femur"}, {"line", "doe_line"}});
+  const std::size_t tunnels = json["tunnels"].size();
+  ASSERT_TRUE(write_file(folder_.path() / "case.json", to_text(json)));
+  BundleOptions with_result;
+  with_result.result = Json{{"tunnels", {{{"name", "doe_planned"}}}}};
+  const CaseBundle made = bundle(with_result);
+  EXPECT_THAT(
+      made.left_out,
+      testing::ElementsAre("model1: models are not packed",
+                           fmt::format("tunnel{}: is a line of a model, which is not packed", tunnels)));
+  EXPECT_THAT(names(made), testing::Contains("result.json"));
+  const auto given = std::ranges::find(made.files, "given_result.json", &ArchivedFile::name);
+  ASSERT_NE(given, made.files.end());
+  EXPECT_THAT(given->bytes, testing::HasSubstr(fmt::format("tunnel{}", tunnels)));
+  for (const ArchivedFile& file : made.files)
+    EXPECT_EQ(file.bytes.find("doe"), std::string::npos) << file.name;
+}
+
+TEST_F(BundleOfNamedCase, IsNotWrittenOverItsOwnSources) {
+  const auto reason = [&](const std::filesystem::path& out) {
+    const auto checked = check_bundle_file(out, folder_.path(), folder_.path() / "result");
+    return checked ? std::optional<Reason>() : checked.error().reason;
+  };
+  ASSERT_TRUE(write_file(folder_.path() / "result" / "result.json", "{}"));
+  ASSERT_TRUE(write_file(folder_.path() / "earlier.tar.gz", "x"));
+  for (const char* source :
+       {"case.json", "doe_AP.dcm", "calibrator.json", "plate.json", "result/result.json"})
+    EXPECT_EQ(reason(folder_.path() / source), Reason::name_clash) << source;
+  EXPECT_EQ(reason(folder_.path() / "earlier.tar.gz"), std::nullopt);
+  EXPECT_EQ(reason(folder_.path() / "new.tar.gz"), std::nullopt);
+}
+
 TEST_F(BundleOfNamedCase, NumbersTheBonesThatTheCaseNames) {
   Json json = *read_json(folder_.path() / "case.json");
   json["bones"] = {"doe_bone", "tibia"};

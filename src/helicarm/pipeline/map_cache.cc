@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t most_image_bytes = std::uintmax_t{1} << 30, most_map_bytes = std::uintmax_t{1} << 26;
 constexpr std::size_t most_kept = 256;
+constexpr std::string_view kept_prefix = "map_", kept_ending = ".json";
 
 /// Of this build of the program: another may fit another map.
 std::string this_build() {
@@ -41,14 +42,24 @@ std::string map_name(const std::string& bytes, const xray::Acquisition& acquisit
                   {"method", int(method)},
                   {"pixel_mm", pixel_mm ? Json{pixel_mm->x(), pixel_mm->y()} : Json()},
                   {"source_detector_mm", source_detector_mm ? Json(*source_detector_mm) : Json()}};
-  return xray::digest(to_text(what)) + ".json";
+  return fmt::format("{}{}{}", kept_prefix, xray::digest(to_text(what)), kept_ending);
+}
+
+/// A file of `map_name`'s: the folder may hold others of its owner.
+bool is_kept_map(const fs::directory_entry& entry) {
+  static const std::size_t length = kept_prefix.size() + xray::digest("").size() + kept_ending.size();
+  const std::string name = entry.path().filename().string();
+  std::error_code ignored;
+  return name.size() == length && name.starts_with(kept_prefix) && name.ends_with(kept_ending) &&
+         name.find_first_not_of("0123456789abcdef", kept_prefix.size()) == length - kept_ending.size() &&
+         entry.is_regular_file(ignored);
 }
 
 void forget_oldest(const fs::path& folder) {
   std::error_code error;
   std::vector<std::pair<fs::file_time_type, fs::path>> files;
   for (const auto& entry : fs::directory_iterator(folder, error))
-    if (entry.path().extension() == ".json") files.emplace_back(entry.last_write_time(error), entry.path());
+    if (is_kept_map(entry)) files.emplace_back(entry.last_write_time(error), entry.path());
   if (files.size() <= most_kept) return;
   std::ranges::sort(files);
   for (std::size_t i = 0; i + most_kept < files.size(); ++i) fs::remove(files[i].second, error);

@@ -95,6 +95,18 @@ TEST_F(MapCache, OtherPlateImageOrGeometryHasAnotherMap) {
   EXPECT_EQ(files_in(cache()).size(), 3u);
 }
 
+TEST_F(MapCache, OldestMapsLeaveAndFilesOfOthersStay) {
+  const std::string digits(29, 'a');
+  fs::create_directories(cache());
+  for (int i = 0; i < 300; ++i) {
+    ASSERT_TRUE(write_file(cache() / fmt::format("map_{}{:03}.json", digits, i), "{}"));
+    ASSERT_TRUE(write_file(cache() / fmt::format("{}{:03}.json", digits, i), "{}"));
+    ASSERT_TRUE(write_file(cache() / fmt::format("map_{}.json", i), "{}"));
+  }
+  ASSERT_TRUE(map(view(), cache()));
+  EXPECT_EQ(files_in(cache()).size(), 256u + 600u);
+}
+
 TEST_F(MapCache, FolderThatCannotBeWrittenKeepsNothing) {
   const fs::path file = folder_->path() / "file";
   ASSERT_TRUE(write_file(file, "x"));

@@ -22,7 +22,9 @@ Expected<Result> in_total(Work work) {
 bool ask_for_one_calibration(const RunOptions& a, const RunOptions& b) {
   const auto same = [](const calibration::HistoryEntry& one, const calibration::HistoryEntry& other) {
     return one.image == other.image && one.estimate_mm == other.estimate_mm &&
-           one.information == other.information;
+           one.information == other.information && one.nominal_focal_mm == other.nominal_focal_mm &&
+           one.calibrator == other.calibrator && one.by_calibrator.cols() == other.by_calibrator.cols() &&
+           one.by_calibrator == other.by_calibrator;
   };
   return a.method == b.method && a.maps == b.maps && a.history.has_value() == b.history.has_value() &&
          (!a.history || std::ranges::equal(a.history->entries, b.history->entries, same));

@@ -318,7 +318,8 @@ Expected<void> write_new_case(const NewCase& draft, const fs::path& folder) {
       value_or_throw(
           write_private_file(folder / copy.to, value_or_throw(read_file(copy.from, most_copied_bytes))));
     }
-    value_or_throw(write_file(folder / "case.json", to_text(to_json(draft.the_case)) + "\n"));
+    value_or_throw(make_private_folder(folder));
+    value_or_throw(write_private_file(folder / "case.json", to_text(to_json(draft.the_case)) + "\n"));
     value_or_throw(read_case(folder));
   });
 }

@@ -43,8 +43,10 @@ void read_cameras(TrackCase& read, const pipeline::Case& the_case, const std::st
       read.warnings.insert(read.warnings.end(), camera.warnings.begin(), camera.warnings.end());
       continue;
     }
-    const fs::path& file = files[i] =
-        view.images.calibration ? *view.images.calibration : *the_case.calibration;
+    const fs::path& stated = view.images.calibration ? *view.images.calibration : *the_case.calibration;
+    std::error_code ignored;
+    const fs::path same = fs::weakly_canonical(stated, ignored);
+    const fs::path& file = files[i] = ignored ? stated : same;
     if (!calibrations.contains(file))
       calibrations[file] = value_or_throw(calibration::saved_calibration_from_json(
           value_or_throw(read_json(file)), file.filename().string()));

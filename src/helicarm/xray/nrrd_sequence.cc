@@ -113,11 +113,14 @@ SequenceLayout layout_of(std::string_view bytes, const std::string& origin) {
   };
   if (header->fields.contains("datafile")) throw unsupported("datafile");
   for (const char* name : {"byteskip", "lineskip"})
-    if (const std::string skip = header->field(name); !skip.empty() && skip != "0") throw unsupported(name);
+    if (const std::string skip = header->field(name);
+        !skip.empty() && skip != "0" && !(skip == "-1" && std::string_view(name) == "byteskip"))
+      throw unsupported(name);
   SequenceLayout layout{
       sizes[0], sizes[1], sizes.size() == 4 ? sizes[3] : 1, header->values_at,
       0,        false,    header->field("endian") == "big", header->field("encoding").starts_with("gz")};
   if (!layout.is_packed && header->field("encoding") != "raw") throw unsupported("encoding");
+  if (layout.is_packed && header->field("byteskip") == "-1") throw unsupported("byteskip");
   const std::string type = header->field("type");
   const auto is_one_of = [&](std::initializer_list<const char*> names) {
     return std::ranges::find(names, type) != names.end();

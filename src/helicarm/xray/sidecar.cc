@@ -64,12 +64,15 @@ void state_angle(std::optional<double>& own, std::optional<double> stated, const
   if (!own) own = stated;
 }
 
+/// Within the rounding of who wrote them.
+bool agree(double a, double b) { return std::abs(a - b) <= 1e-3 * std::max(std::abs(a), std::abs(b)); }
+
 /// Adds what another sidecar of the image states.
 void add_agreeing(StatedGeometry& stated, const StatedGeometry& other, const std::string& name,
                   const std::string& other_name) {
   const auto add = [&](std::optional<double> StatedGeometry::*value, const char* key) {
     if (!(stated.*value)) stated.*value = other.*value;
-    if (other.*value && stated.*value != other.*value)
+    if (other.*value && !agree(*(stated.*value), *(other.*value)))
       throw BadInput({Reason::bad_value,
                       fmt::format("{}: \"{}\" is {:g}, {} states {:g}: correct one of them, or remove it",
                                   name, key, *(stated.*value), other_name, *(other.*value)),

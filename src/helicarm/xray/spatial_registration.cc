@@ -13,6 +13,7 @@
 #include "helicarm/xray/dataset_writing.h"
 #include "helicarm/xray/dicom_check.h"
 #include "helicarm/xray/dicom_tags.h"
+#include "helicarm/xray/dicom_text.h"
 
 namespace helicarm::xray {
 namespace {
@@ -45,7 +46,8 @@ void check_rigid(const SpatialRegistration& registration) {
 }
 
 void put_registration(DcmDataset& dataset, const SpatialRegistration& registration) {
-  const std::string description = own_text(registration.ct.patient_study, registration.description);
+  const std::string description =
+      own_text(registration.ct.patient_study, whole_characters(registration.description));
   put_object(dataset, UID_SpatialRegistrationStorage, "REG",
              fmt::format("{} {} {} {}", registration.ct.patient_study.sop_instance_uid,
                          registration.frame_of_reference_uid, decimals_of(registration.frame_from_ct),

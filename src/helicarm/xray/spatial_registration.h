@@ -25,7 +25,7 @@ struct SpatialRegistration {
   CtFrame ct;
   std::string frame_of_reference_uid;    ///< of the other frame
   std::array<double, 16> frame_from_ct;  ///< 4 x 4 by rows, mm; CT: L, P, S
-  std::string description;               ///< at most 64 characters
+  std::string description;               ///< its first 64 bytes are written, without a backslash
 };
 
 /// Writes a Spatial Registration Storage object (PS3.3 A.39), atomically and readable by its owner alone: it

@@ -73,6 +73,17 @@ TEST(SpatialRegistration, ConformsToTheStandard) {
   EXPECT_EQ(*errors, "");
 }
 
+TEST(SpatialRegistration, TheDescriptionIsOneValueOfWholeCharacters) {
+  const TemporaryFolder folder;
+  const std::string before(63, 'a');
+  const auto file =
+      written({{"1.2.3.6", {}}, "1.2.3.7", quarter_turn, before + "\u00fc\\b"}, folder.path() / "reg.dcm");
+  EXPECT_EQ(file.elements.text({0x0008103E, ""}), before);
+  const auto other =
+      written({{"1.2.3.6", {}}, "1.2.3.7", quarter_turn, "left\\right"}, folder.path() / "reg.dcm");
+  EXPECT_EQ(other.elements.text({0x00700081, ""}), "left/right");
+}
+
 TEST(SpatialRegistration, TheSameContentHasTheSameUid) {
   const TemporaryFolder folder;
   SpatialRegistration registration{{"1.2", {}}, "1.3", quarter_turn, ""};

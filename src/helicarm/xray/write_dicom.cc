@@ -19,6 +19,7 @@
 #include "helicarm/core/private_files.h"
 #include "helicarm/core/system_message.h"
 #include "helicarm/image/grey_image.h"
+#include "helicarm/xray/dicom_text.h"
 #include "helicarm/xray/dicom_time.h"
 #include "helicarm/xray/uid.h"
 #include "helicarm/xray/write_run.h"
@@ -62,20 +63,18 @@ constexpr SopClass dx{"DX", UID_DigitalXRayImageStorageForPresentation};
 constexpr std::array sop_classes = {xa, SopClass{"RF", UID_XRayRadiofluoroscopicImageStorage},
                                     SopClass{"CR", UID_ComputedRadiographyImageStorage}, dx};
 
-SopClass class_of(const DerivedImage& image) {
-  const auto found = std::ranges::find(sop_classes, image.acquisition.modality, &SopClass::modality);
-  if (found == sop_classes.end() || (found->modality == dx.modality && !image.acquisition.pixel_mm))
-    return xa;
-  return *found;
+/// A CR image has no place for the positioner's angles, a flip or what the grey values are of.
+bool exceeds_cr(const Acquisition& a) {
+  return a.primary_angle_deg || a.secondary_angle_deg || a.flip_hint || a.logarithmic;
 }
 
-/// The first `most` bytes of a text in UTF-8, without a character that would be cut, nor a backslash.
-std::string whole_characters(std::string text, std::size_t most) {
-  std::ranges::replace(text, '\\', '/');
-  if (text.size() <= most) return text;
-  std::size_t end = most;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
-  return text.substr(0, end);
+SopClass class_of(const DerivedImage& image) {
+  const Acquisition& a = image.acquisition;
+  const auto found = std::ranges::find(sop_classes, a.modality, &SopClass::modality);
+  if (found == sop_classes.end() || (found->modality == dx.modality && !a.pixel_mm) ||
+      (found->modality == "CR" && exceeds_cr(a)))
+    return xa;
+  return *found;
 }
 
 DcmTagKey key_of(std::uint32_t number) {
@@ -126,7 +125,7 @@ void put_identity(DcmDataset& dataset, const DerivedImage& image, const SopClass
   put(dataset, DCM_Modality, std::string(sop_class.modality));
   put(dataset, DCM_Manufacturer, "helicarm");
   put(dataset, DCM_SoftwareVersions, HELICARM_VERSION);
-  put(dataset, DCM_SeriesDescription, image.series_description);
+  put(dataset, DCM_SeriesDescription, whole_characters(image.series_description));
   put(dataset, DCM_SeriesNumber, "1");
   put(dataset, DCM_InstanceNumber, "1");
   for (const auto& [number, value] : image.acquisition.technique) put(dataset, key_of(number), value);
@@ -182,11 +181,11 @@ void put_object_spacing(DcmDataset& dataset, const ObjectSpacing& at) {
   put(dataset, DCM_PixelSpacingCalibrationType, "GEOMETRY");
   const std::string figures =
       fmt::format("{:.1f} mm from the source, sigma {:.2g} %", at.source_object_mm, 100 * at.relative_sigma);
-  constexpr std::size_t most = 64;
   const std::string_view separator = at.object.empty() ? "" : ": ";
   put(dataset, DCM_PixelSpacingCalibrationDescription,
-      fmt::format("{}{}{}", whole_characters(at.object, most - separator.size() - figures.size()), separator,
-                  figures));
+      fmt::format("{}{}{}",
+                  whole_characters(at.object, long_string_bytes - separator.size() - figures.size()),
+                  separator, figures));
   put(dataset, DCM_DistanceSourceToPatient, decimal(at.source_object_mm));
   if (!at.source_detector_mm) return;
   put(dataset, DCM_DistanceSourceToDetector, decimal(*at.source_detector_mm));

@@ -12,6 +12,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/xray/derived_image.h"
 #include "helicarm/xray/dicom_builder.h"
+#include "helicarm/xray/dicom_text.h"
 #include "helicarm/xray/read_dicom.h"
 #include "helicarm/xray/read_xray_image.h"
 #include "helicarm/xray/uid.h"
@@ -36,6 +37,27 @@ DerivedImage grey_image(int bits) {
   for (std::uint16_t& pixel : image.pixels.pixels())
     pixel = static_cast<std::uint16_t>((value += 77) & ((1u << bits) - 1));
   return image;
+}
+
+TEST_F(WriteDicom, WhatAComputedRadiographCannotStateIsKept) {
+  using Change = void (*)(Acquisition&);
+  const std::initializer_list<Change> changes = {
+      [](Acquisition& a) { a.primary_angle_deg = 30; }, [](Acquisition& a) { a.secondary_angle_deg = -5; },
+      [](Acquisition& a) { a.flip_hint = true; }, [](Acquisition& a) { a.logarithmic = true; },
+      [](Acquisition& a) { a.logarithmic = false; }};
+  for (const Change change : changes) {
+    DerivedImage image = grey_image(12);
+    image.acquisition.modality = "CR";
+    image.acquisition.pixel_mm = Eigen::Vector2d(0.2, 0.2);
+    change(image.acquisition);
+    ASSERT_TRUE(write_dicom(folder_ / "cr.dcm", image));
+    const auto read = read_xray_image(folder_ / "cr.dcm", "AP", {});
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->acquisition.primary_angle_deg, image.acquisition.primary_angle_deg);
+    EXPECT_EQ(read->acquisition.secondary_angle_deg, image.acquisition.secondary_angle_deg);
+    EXPECT_EQ(read->acquisition.flip_hint, image.acquisition.flip_hint);
+    EXPECT_EQ(read->acquisition.logarithmic, image.acquisition.logarithmic);
+  }
 }
 
 TEST_F(WriteDicom, RoundTripKeepsImageAndTags) {
@@ -100,6 +122,12 @@ TEST_F(WriteDicom, FilesConformToTheStandard) {
         if (!errors) GTEST_SKIP() << "dciodvfy (dicom3tools) is not installed";
         EXPECT_EQ(*errors, "") << modality << derived;
       }
+}
+
+TEST(DicomText, IsOneValueOfWholeCharacters) {
+  EXPECT_EQ(whole_characters("a\\b"), "a/b");
+  EXPECT_EQ(whole_characters(std::string(63, 'a') + "\u00fc"), std::string(63, 'a'));
+  EXPECT_EQ(whole_characters(std::string(62, 'a') + "\u00fc"), std::string(62, 'a') + "\u00fc");
 }
 
 TEST_F(WriteDicom, ModalityIsKept) {

@@ -144,10 +144,10 @@ double angle_deg(const geometry::RigidTransform& a, const geometry::RigidTransfo
 
 }  // namespace
 
-std::array<Eigen::Vector3d, 7> arm_points(const RobotModel& model, const Joints& joints) {
+std::array<Eigen::Vector3d, 6> arm_points(const RobotModel& model, const Joints& joints) {
   const auto frames = joint_frames(model, joints);
   const Eigen::Vector3d beside(0, 0, model.shoulder_offset);
-  return {frames[0].translation, frames[0] * beside,    frames[1].translation, frames[1] * beside,
+  return {frames[0] * beside,    frames[1].translation, frames[1] * beside,
           frames[2].translation, frames[3].translation, frames[4].translation};
 }
 

@@ -24,8 +24,8 @@ struct RobotLimits {
 };
 
 /// Points of shoulder, elbow and wrists in the base, mm: the arm lies between them. The upper arm runs beside
-/// the frames of shoulder and elbow.
-std::array<Eigen::Vector3d, 7> arm_points(const RobotModel& model, const Joints& joints);
+/// the frames of shoulder and elbow, of which the shoulder's own does not move.
+std::array<Eigen::Vector3d, 6> arm_points(const RobotModel& model, const Joints& joints);
 
 /// Checks the order alone: numbers and limits, then reach, joint limits, configuration changes, singular
 /// poses, joint speeds and keep-out planes along the whole path, every 2 mm and half degree. Refuses with

@@ -62,8 +62,9 @@ struct LinkTimes {
 OrderNumber new_session();
 
 /// Decides what the link allows, without sockets, threads or a clock: callers pass the time. Every stop is
-/// counted. An order carries the count at which its token was redeemed, an unlock the count at which it
-/// began; they are refused if the count has changed. No motion continues or begins across a stop.
+/// counted. An order carries the count at which its token was redeemed, an unlock the count of the status
+/// that its user was shown; they are refused if the count has changed. No motion continues or begins across a
+/// stop.
 class LinkStateMachine {
  public:
   using Time = Confirmations::Clock::time_point;

@@ -43,7 +43,12 @@ tl::expected<PoseSample, PoseFault> PoseGate::pass(const RawPose& raw) {
 }
 
 tl::expected<PoseSample, PoseFault> PoseGate::judge(const RawPose& raw) {
-  if (!raw.visible) return tl::unexpected(PoseFault::hidden);
+  if (!raw.visible) {
+    // A clock that is set meanwhile is seen by its step.
+    if (std::isfinite(raw.device_s) && raw.device_s != 0)
+      static_cast<void>(clock_.local(raw.device_s, raw.arrival_s));
+    return tl::unexpected(PoseFault::hidden);
+  }
   if (!std::isfinite(raw.device_s)) return tl::unexpected(PoseFault::not_finite);
   const auto pose = rigid_pose(raw.matrix, options_.farthest_mm);
   if (!pose) return tl::unexpected(pose.error());

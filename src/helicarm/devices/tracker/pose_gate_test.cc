@@ -228,6 +228,17 @@ TEST(DeviceClock, ClockSetByLessThanHalfASecondDoesNotChangeTheAge) {
   }
 }
 
+TEST(DeviceClock, ClockSetWhileTheMarkerIsHiddenIsFollowed) {
+  Scene scene;
+  scene.rejected_of(100);
+  for (int i = 0; i < 250; ++i) {
+    if (i == 100) scene.device_ahead -= 2;
+    scene.next({}, false);
+  }
+  EXPECT_EQ(scene.rejected_of(100), 0);
+  EXPECT_NEAR(scene.last.time_s, scene.now + scene.delay, 1e-3);
+}
+
 TEST(DeviceClock, DelayOutlastsASettingOfTheClock) {
   for (const double step : {-1.0, -3600.0, 3600.0}) {
     Scene scene;
