@@ -37,7 +37,7 @@ std::optional<operation::Guidance> NewestGuidance::at(double now_s) const {
 }
 
 MeasuredImages measured_images(const operation::Operation& operation) {
-  return {operation.images(), operation.measured_case().has_value()};
+  return {operation.images(), operation.is_measured() || operation.newest_result().has_value()};
 }
 
 Expected<Images> images_of(const operation::Operation& operation) {

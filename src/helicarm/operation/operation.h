@@ -98,6 +98,7 @@ class Operation {
   /// no longer the one that was received. The calibration is kept until the next image.
   Expected<void> measure();
   const pipeline::Result& result() const { return *result_; }
+  bool is_measured() const { return result_.has_value(); }
   /// Of `result`; nothing without a measurement of the present images.
   const std::optional<pipeline::Case>& measured_case() const { return measured_case_; }
   /// The last measurement, also a refused one.
