@@ -98,12 +98,7 @@ TEST_F(ControllerCtRehearsal, AConfirmedRegistrationGuidesTheToolToTheTunnelsOfT
 }
 
 TEST_F(ControllerCtRehearsal, AnotherImageEndsTheRegistrationACancelledOneDoesNot) {
-  ASSERT_TRUE(idle());
-  ASSERT_TRUE(acquire());
-  ASSERT_TRUE(register_models());
-  controller_->confirm_registration();
-  ASSERT_TRUE(idle());
-  ASSERT_TRUE(state().is_confirmed);
+  ASSERT_TRUE(register_and_confirm());
   controller_->register_models();
   controller_->cancel();
   const auto said = QObject::connect(controller_.get(), &Controller::changed, [this] {
@@ -124,12 +119,7 @@ TEST_F(ControllerCtRehearsal, AnotherImageEndsTheRegistrationACancelledOneDoesNo
 }
 
 TEST_F(ControllerCtRehearsal, WhatTheOperationForgetsWhereItsRecordFailsIsNotShownAnyMore) {
-  ASSERT_TRUE(idle());
-  ASSERT_TRUE(acquire());
-  ASSERT_TRUE(register_models());
-  controller_->confirm_registration();
-  ASSERT_TRUE(idle());
-  ASSERT_TRUE(state().is_confirmed);
+  ASSERT_TRUE(register_and_confirm());
   std::filesystem::remove(state().folder / "session.log");
   controller_->measure();
   ASSERT_TRUE(idle());

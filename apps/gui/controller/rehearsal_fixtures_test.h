@@ -57,6 +57,11 @@ class ControllerCtRehearsal : public ControllerRehearsal {
   ControllerCtRehearsal() : ControllerRehearsal(true) {}
 
   const operation::OperationTunnel& tunnel() const { return state().tunnels.front(); }
+  bool register_and_confirm() {
+    if (!idle() || !acquire() || !register_models()) return false;
+    controller_->confirm_registration();
+    return idle() && state().is_confirmed;
+  }
   /// Until no pose or state of the robot came late.
   Reason refusal_of_plan() {
     for (int left = most_attempts; left > 0; --left) {

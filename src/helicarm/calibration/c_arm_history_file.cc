@@ -96,7 +96,7 @@ void describe_acquisition(Codec& codec, Entry& entry) {
   codec.matrix("information_per_mm2", entry.information, {-1e12, 1e12},
                "inverse covariance of these three, without any prior");
   codec.check([&](JsonReader& reader) { check_information(entry.information, reader); });
-  codec.number("nominal_focal_mm", entry.nominal_focal_mm, {200, 3000},
+  codec.number("nominal_focal_mm", entry.nominal_focal_mm, {1, 1e4},
                "source distance that the image or its case stated; `null` in files of earlier versions");
   describe_ball_errors(codec, entry);
   codec.number("primary_deg", entry.primary_deg, {-360, 360},

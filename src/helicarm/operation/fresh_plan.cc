@@ -63,7 +63,7 @@ Expected<void> Operation::check_plan(const robot::RobotOrder& order) {
                                     tracker::monotonic_seconds());
     if (!was_stale && gate_.is_stale(order.name)) {
       in_place_.clear();  // what moved may be a marker on its bone
-      record_halt(order, may.error());
+      record_halt(order.name, may.error());
     }
     value_or_throw(may);
   });

@@ -103,8 +103,8 @@ PoseWindow Operation::look(record::Look why) {
   return window;
 }
 
-void Operation::record_halt(const robot::RobotOrder& order, const Failure& why) {
-  record(record::Halted{order.name, std::string(code(why.reason)), why.message, why.figures});
+void Operation::record_halt(const std::string& order, const Failure& why) {
+  record(record::Halted{order, std::string(code(why.reason)), why.message, why.figures});
 }
 
 std::vector<robot::Miss> Operation::carry_out(const robot::RobotOrder& order, const std::string& token,
@@ -114,7 +114,7 @@ std::vector<robot::Miss> Operation::carry_out(const robot::RobotOrder& order, co
   auto misses = robot().execute(order, token, measure, watch);
   if (!misses) {
     // The first reason is reported, also where it cannot be recorded.
-    static_cast<void>(guarded([&] { record_halt(order, misses.error()); }));
+    static_cast<void>(guarded([&] { record_halt(order.name, misses.error()); }));
     throw BadInput(misses.error());
   }
   record(record::CarriedOut{confirmed});
@@ -358,7 +358,7 @@ Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std:
     record(record::Navigated{order.name, *loop});
     notify_(Step::verify, order.name);
     auto outcome = guarded([&] { return check(tunnel); });
-    if (!outcome) static_cast<void>(guarded([&] { record_halt(order, outcome.error()); }));
+    if (!outcome) static_cast<void>(guarded([&] { record_halt(order.name, outcome.error()); }));
     value_or_throw(outcome);
     outcome->loop = *loop;
     outcome->replans = replans_[order.name];

@@ -222,7 +222,7 @@ class Operation {
   TrackedTool tool() const;
   const OperationTunnel& tunnel_named(const std::string& name) const;
   void record(const Record& what);
-  void record_halt(const robot::RobotOrder& order, const Failure& why);
+  void record_halt(const std::string& order, const Failure& why);
   PoseWindow look(record::Look why);
   pipeline::Result run(const guidance::Poses& now, const std::vector<guidance::ToolLine>& tool_lines);
   // What is forgotten is not in force any more: its caller records last that the guidance has ended with it.

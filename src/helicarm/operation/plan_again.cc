@@ -60,9 +60,7 @@ bool Operation::answers_again() const {
 
 void Operation::halt(const std::string& order, const Failure& why) {
   // The first reason is reported, also where it cannot be recorded.
-  static_cast<void>(guarded([&] {
-    record(record::Halted{order, std::string(code(why.reason)), why.message, why.figures});
-  }));
+  static_cast<void>(guarded([&] { record_halt(order, why); }));
   throw BadInput(why);
 }
 
