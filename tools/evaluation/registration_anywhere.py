@@ -175,6 +175,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="build/bin/helicarm")
     parser.add_argument("--cases", type=int, default=10, help="of each kind (default: 10)")
+    parser.add_argument("--first", type=int, default=0, metavar="NUMBER", help="the first case's number (default: 0)")
     other = parser.add_mutually_exclusive_group()
     other.add_argument("--bones", action="store_true", help="vertebra, hip and wrist of examples/bones instead of the knees")
     other.add_argument("--head", nargs="?", const="", metavar="PATH",
@@ -189,6 +190,8 @@ def main():
         name, bodies = ", bones", [Bone(bone) for bone in bones.BODIES]
     else:
         name, bodies = "", [Knees()]
+    if arguments.first:
+        name += f" from {arguments.first}"
     own = [kind for body in bodies for kind in body.of_anywhere]
     kinds = arguments.kinds.split(",") if arguments.kinds else own
     if unknown := [kind for kind in kinds if kind not in own]:
@@ -196,7 +199,7 @@ def main():
     rows = evaluation_rows.Rows(arguments.rows, ("kind", "number"))
     with evaluation_rows.folder_of(arguments.keep) as folder:
         protocols = [protocol.Protocol(body, arguments, folder) for body in bodies]
-        for number, of_body in itertools.product(range(arguments.cases), protocols):
+        for number, of_body in itertools.product(range(arguments.first, arguments.first + arguments.cases), protocols):
             own = [(kind, number) for kind in of_body.body.of_anywhere if kind in kinds]
             rows.gather(functools.partial(row_of, of_body), own)
             of_body.discard(number)
