@@ -114,7 +114,9 @@ class EarlierResults(SimulatedCase):
         for name in ("calibrator.json", "result.json", "report.html", "notes.txt"):
             (out / name).write_text("{}")
         self.assertNotEqual(run("phantom", "measure", self.root / "case", "--out", out).returncode, 0)
-        self.assertNotIn("{}", [(out / name).read_text() for name in self.names(out) if name != "notes.txt"])
+        self.assertEqual((out / "calibrator.earlier.json").read_text(), "{}")  # what was measured is not lost
+        kept = ("notes.txt", "calibrator.earlier.json")
+        self.assertNotIn("{}", [(out / name).read_text() for name in self.names(out) if name not in kept])
         own = self.root / "own-case"
         shutil.copytree(self.root / "case", own)
         nominal = (own / "calibrator.json").read_bytes()

@@ -168,10 +168,46 @@ void design(const PhantomArguments& arguments, Console& console) {
     value_or_throw(write_file(*arguments.file, to_text(phantom::to_json(calibrator)) + "\n"));
 }
 
+/// Refuses what another action would need.
+void check_options(const PhantomArguments& a) {
+  using enum PhantomAction;
+  const PhantomArguments usual;
+  struct Option {
+    const char* name;
+    bool is_given;
+    std::vector<PhantomAction> of;
+  };
+  const std::array options{Option{"--plate", a.plate, {show, check, export_files}},
+                           Option{"--stl", a.stl.has_value(), {export_files}},
+                           Option{"--body", a.body.has_value(), {export_files}},
+                           Option{"--clearance", a.clearance_mm != usual.clearance_mm, {export_files}},
+                           Option{"--step", a.step_mm != usual.step_mm, {export_files}},
+                           Option{"--svg", a.svg.has_value(), {export_files, design}},
+                           Option{"--file", a.file.has_value(), {export_files, design}},
+                           Option{"--knee", !a.knee_mm.empty(), {design}},
+                           Option{"--out", a.out.has_value(), {measure, verify}},
+                           Option{"--from-scratch", a.from_scratch, {measure}},
+                           Option{"--distance", !a.distances.empty(), {measure}},
+                           Option{"--distance-sigma", a.distance_sigma_mm.has_value(), {measure}},
+                           Option{"--distance-is", a.distance_is != usual.distance_is, {measure}},
+                           Option{"--history", a.history.has_value(), {verify}}};
+  const auto word = [](PhantomAction action) {
+    return std::ranges::find(actions, action, [](const auto& one) { return one.second; })->first;
+  };
+  for (const Option& option : options) {
+    if (!option.is_given || std::ranges::find(option.of, a.action) != option.of.end()) continue;
+    std::vector<std::string_view> words;
+    for (const PhantomAction action : option.of) words.push_back(word(action));
+    throw BadInput(Reason::usage, fmt::format("phantom {}: {} belongs to {}", word(a.action), option.name,
+                                              fmt::join(words, ", ")));
+  }
+}
+
 }  // namespace
 
 CommandResult phantom_command(const PhantomArguments& arguments, Console& console) {
   return guarded([&] {
+    check_options(arguments);
     switch (arguments.action) {
       case PhantomAction::show:
         return arguments.plate ? show(plate_of(arguments), console) : show(calibrator_of(arguments), console);

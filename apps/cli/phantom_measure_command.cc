@@ -101,6 +101,17 @@ void print(const phantom_calibration::PhantomVerification& result, Console& cons
   for (const Warning& note : result.notes) console.out << fmt::format("  {}\n", note.message);
 }
 
+/// A calibrator that was measured is hours of work: a measurement that fails must not cost it.
+void set_aside(const std::filesystem::path& out, Console& console) {
+  const std::filesystem::path measured = out / "calibrator.json", kept = out / "calibrator.earlier.json";
+  std::error_code failed;
+  if (!std::filesystem::is_regular_file(std::filesystem::symlink_status(measured, failed))) return;
+  std::filesystem::rename(measured, kept, failed);
+  if (failed) throw BadInput(Reason::cannot_write, fmt::format("{}: {}", kept.string(), failed.message()));
+  if (!console.quiet)
+    console.progress << fmt::format("the calibrator measured before is now {}\n", kept.string());
+}
+
 }  // namespace
 
 void measure_phantom(const PhantomArguments& arguments, Console& console) {
@@ -108,6 +119,7 @@ void measure_phantom(const PhantomArguments& arguments, Console& console) {
   const std::filesystem::path& out = *arguments.out;
   refuse_own_calibrator(arguments.name_or_file, out);
   value_or_throw(check_can_write(out));
+  set_aside(out, console);
   forget_files(out, {"calibrator.json", "result.json", "report.html"});
   const phantom_calibration::PhantomResult result = measured(arguments, console);
   print_warnings(result.warnings, console);

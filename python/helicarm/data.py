@@ -204,7 +204,7 @@ def check_tunnels(model, tunnels, *, diameter_mm, bridge_mm=None):
     mm, drilled from the start. diameter_mm, bridge_mm (bone that the wall should keep; None: as of a case): of all, or {name:
     value}.
     Releases the GIL. Returns {name: bone_check} as in registration.json: "bridge_mm", "bridge_sigma_mm", "length_in_bone_mm",
-    "entry_mm", "exit_mm", "entry_angle_deg", "end_mm", "breach", "thin", "to_tunnels", ... The error of a registration is no part
+    "entry_mm", "exit_mm", "entry_angle_deg", "end_mm", "least_sure", "breach", "thin", "to_tunnels", ... The error of a registration is no part
     of it: "breach" is that of the surface's own error. Raises InputError: bad_value, usage, and as register of a model.
     """
     def of(name, value, what):

@@ -135,6 +135,8 @@ struct Summary {
           return TimelineWords::tr("images, measurement or registration are others now");
         case operation:
           return TimelineWords::tr("end of the operation");
+        case check_point:
+          return TimelineWords::tr("a check point of its bone was refused");
       }
       return QString();
     }();

@@ -19,8 +19,8 @@ std::string found_in(const pipeline::InspectedImage& image) {
   text += a.pixel_mm ? fmt::format(", {:.4g} mm", a.pixel_mm->x()) : ", pixel size unknown";
   text += a.source_detector_mm ? fmt::format(", source {:.4g} mm", *a.source_detector_mm)
                                : ", source distance unknown";
-  if (a.primary_angle_deg)
-    text += fmt::format(", {:.3g}° {:.3g}°", *a.primary_angle_deg, a.secondary_angle_deg.value_or(0));
+  if (a.primary_angle_deg) text += fmt::format(", {:.3g}°", *a.primary_angle_deg);
+  if (a.primary_angle_deg && a.secondary_angle_deg) text += fmt::format(" {:.3g}°", *a.secondary_angle_deg);
   return text + (image.field ? ", round field" : "");
 }
 
@@ -84,29 +84,30 @@ std::vector<pipeline::InspectedImage> DraftChecker::inspect(const CaseDraft& dra
   return images;
 }
 
+const pipeline::PlateChoice& DraftChecker::plate_by(const std::vector<pipeline::InspectedImage>& images) {
+  std::vector<Key> keys;
+  for (const auto& image : images) keys.emplace_back(image.file, image.frame.value_or(1));
+  if (std::exchange(chosen_for_, keys) != keys) choice_ = pipeline::choose_plate(images);
+  return choice_;
+}
+
 CheckedDraft DraftChecker::check(const CaseDraft& draft) {
   const std::lock_guard lock(mutex_);
   CheckedDraft checked;
   auto images = inspect(draft, checked);
-  if (images.size() == draft.images.size() && !images.empty()) {
-    std::vector<Key> keys;
-    for (const auto& image : images) keys.emplace_back(image.file, image.frame.value_or(1));
-    if (std::exchange(chosen_for_, keys) != keys) choice_ = pipeline::choose_plate(images);
-    checked.plate = choice_;
-  }
+  if (images.size() == draft.images.size() && !images.empty()) checked.plate = plate_by(images);
   name_missing_parts(draft, checked);
   const bool lacks = !checked.images_lack.empty() || !checked.calibrator_lacks.empty() ||
                      !checked.plate_lacks.empty() || !checked.folder_lacks.empty();
   if (lacks) return checked;
-  CaseDraft decided = draft;
-  if (!decided.plate && !has_all_maps(draft)) decided.plate = checked.plate.plate;
-  checked.made = make(decided, std::move(images));
+  checked.made = make(draft, checked.plate, std::move(images));
   return checked;
 }
 
-Expected<pipeline::NewCase> DraftChecker::make(const CaseDraft& draft,
+Expected<pipeline::NewCase> DraftChecker::make(const CaseDraft& draft, const pipeline::PlateChoice& choice,
                                                std::vector<pipeline::InspectedImage> images) {
-  pipeline::NewCaseOptions options{draft.calibrator, draft.plate, {}, {}};
+  const bool is_by_images = !draft.plate && !has_all_maps(draft);
+  pipeline::NewCaseOptions options{draft.calibrator, is_by_images ? choice.plate : draft.plate, {}, {}};
   for (std::size_t i = 0; i < images.size(); ++i) {
     const ViewPlate& plate = draft.images[i].plate;
     if (plate.map) options.maps.emplace_back(images[i].view, *plate.map);
@@ -123,7 +124,11 @@ Expected<pipeline::NewCase> DraftChecker::make(const CaseDraft& draft,
 Expected<void> DraftChecker::write(const CaseDraft& draft) {
   const std::lock_guard lock(mutex_);
   CheckedDraft checked;
-  return make(draft, inspect(draft, checked)).and_then([&](const pipeline::NewCase& made) {
+  auto images = inspect(draft, checked);
+  for (const CheckedDraft::Image& image : checked.images)
+    if (image.failure) return tl::unexpected(*image.failure);
+  const pipeline::PlateChoice& choice = plate_by(images);
+  return make(draft, choice, std::move(images)).and_then([&](const pipeline::NewCase& made) {
     return pipeline::write_new_case(made, draft.folder);
   });
 }

@@ -16,6 +16,7 @@ namespace helicarm::gui {
 struct CaseDraft {
   struct Image : pipeline::NewImage {
     ViewPlate plate = {};
+    int number = 0;  ///< stays its own when others are removed
   };
   std::vector<Image> images;
   std::string calibrator;                    ///< a built-in or a file; empty: not chosen
@@ -53,7 +54,10 @@ class DraftChecker {
   using Key = std::pair<std::filesystem::path, int>;  ///< file and frame
 
   std::vector<pipeline::InspectedImage> inspect(const CaseDraft& draft, CheckedDraft& checked);
-  Expected<pipeline::NewCase> make(const CaseDraft& draft, std::vector<pipeline::InspectedImage> images);
+  /// The plate that they show; they are asked once.
+  const pipeline::PlateChoice& plate_by(const std::vector<pipeline::InspectedImage>& images);
+  Expected<pipeline::NewCase> make(const CaseDraft& draft, const pipeline::PlateChoice& choice,
+                                   std::vector<pipeline::InspectedImage> images);
 
   std::mutex mutex_;
   std::map<std::filesystem::path, Expected<int>> frames_;

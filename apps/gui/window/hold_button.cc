@@ -54,6 +54,12 @@ void HoldButton::mousePressEvent(QMouseEvent* event) {
   if (isDown()) begin();
 }
 
+void HoldButton::mouseMoveEvent(QMouseEvent* event) {
+  QPushButton::mouseMoveEvent(event);
+  const bool by_pointer = event->buttons() & Qt::LeftButton;
+  if (by_pointer && !rect().contains(event->position().toPoint())) let_go();
+}
+
 void HoldButton::mouseReleaseEvent(QMouseEvent* event) {
   QPushButton::mouseReleaseEvent(event);
   let_go();

@@ -8,6 +8,7 @@
 namespace helicarm::gui {
 
 /// Prevents accidental clicks on robot motion: the button (or Enter) must be held until it is full.
+/// A pointer that leaves it lets it go.
 class HoldButton : public QPushButton {
   Q_OBJECT
 
@@ -24,6 +25,7 @@ class HoldButton : public QPushButton {
  protected:
   void paintEvent(QPaintEvent* event) override;
   void mousePressEvent(QMouseEvent* event) override;
+  void mouseMoveEvent(QMouseEvent* event) override;
   void mouseReleaseEvent(QMouseEvent* event) override;
   void keyPressEvent(QKeyEvent* event) override;
   void keyReleaseEvent(QKeyEvent* event) override;

@@ -20,6 +20,7 @@
 #include "helicarm/registration/flat_cut.h"
 #include "helicarm/registration/landmarks.h"
 #include "helicarm/registration/prominent_points.h"
+#include "helicarm/volume/tiff_stack.h"
 
 namespace helicarm::gui {
 
@@ -109,8 +110,9 @@ QWidget* LandmarksWindow::build_side() {
   column->addWidget(at_);
   table_ = list_table("modelLandmarkTable", tr("Landmarks in the model"));
   table_->setColumnCount(5);
-  const QStringList axes = files_.volume ? QStringList{tr("L, mm"), tr("P, mm"), tr("S, mm")}
-                                         : QStringList{tr("x, mm"), tr("y, mm"), tr("z, mm")};
+  const bool has_patient_frame = files_.volume && !volume::is_tiff_stack(*files_.volume);
+  const QStringList axes = has_patient_frame ? QStringList{tr("L, mm"), tr("P, mm"), tr("S, mm")}
+                                             : QStringList{tr("x, mm"), tr("y, mm"), tr("z, mm")};
   table_->setHorizontalHeaderLabels(QStringList{tr("Landmark")} + axes + QStringList{tr("picked in")});
   table_->setSelectionBehavior(QAbstractItemView::SelectRows);
   table_->setSelectionMode(QAbstractItemView::SingleSelection);

@@ -47,7 +47,7 @@ bool NewCaseDialog::event(QEvent* event) {
 void NewCaseDialog::add_images(const std::vector<pipeline::NewImage>& images) {
   for (const pipeline::NewImage& image : images) {
     const auto has = std::ranges::find(draft_.images, image.file, &CaseDraft::Image::file);
-    if (has == draft_.images.end()) draft_.images.push_back({image, {}});
+    if (has == draft_.images.end()) draft_.images.push_back({image, {}, ++last_number_});
   }
   changed();
 }
@@ -63,7 +63,8 @@ void NewCaseDialog::choose_frame(const fs::path& file, int frame) {
 void NewCaseDialog::ask_images() {
   ask_files(this, tr("X-ray images"), QFileDialog::ExistingFiles, {},
             [this](const std::vector<fs::path>& chosen) {
-              for (const fs::path& file : chosen) draft_.images.push_back({{file}, {}});  // or another frame
+              for (const fs::path& file : chosen)
+                draft_.images.push_back({{file}, {}, ++last_number_});  // or another frame
               changed();
             });
 }
@@ -188,20 +189,23 @@ QPushButton* NewCaseDialog::view_plate_button() {
   auto* button = new QPushButton;
   button->setStyleSheet("padding: 2px 8px;");
   button->setAutoDefault(false);
-  const auto row = [this, button] { return table_->indexAt(button->pos()).row(); };
+  const auto number = [this, button] {
+    const int row = table_->indexAt(button->pos()).row();
+    return row >= 0 && std::size_t(row) < draft_.images.size() ? draft_.images[std::size_t(row)].number : 0;
+  };
   auto* menu = new QMenu(button);
   menu->addAction(tr("The plate in the image, or no plate"), this,
-                  [this, row] { set_view_plate(row(), {}); });
-  menu->addAction(tr("An image of the plate alone..."), this, [this, row] {
+                  [this, number] { set_view_plate(number(), {}); });
+  menu->addAction(tr("An image of the plate alone..."), this, [this, number] {
     ask_files(this, tr("Image of the plate"), QFileDialog::ExistingFile, {},
-              [this, at = row()](const std::vector<fs::path>& chosen) {
-                set_view_plate(at, {chosen.front(), {}});
+              [this, of = number()](const std::vector<fs::path>& chosen) {
+                set_view_plate(of, {chosen.front(), {}});
               });
   });
-  menu->addAction(tr("A distortion map..."), this, [this, row] {
+  menu->addAction(tr("A distortion map..."), this, [this, number] {
     ask_files(this, tr("Distortion map"), QFileDialog::ExistingFile, tr("JSON (*.json)"),
-              [this, at = row()](const std::vector<fs::path>& chosen) {
-                set_view_plate(at, {{}, chosen.front()});
+              [this, of = number()](const std::vector<fs::path>& chosen) {
+                set_view_plate(of, {{}, chosen.front()});
               });
   });
   button->setMenu(menu);
@@ -214,9 +218,10 @@ void NewCaseDialog::show_view_plate(int row) {
   button->setText(words_of(draft_.images[std::size_t(row)].plate));
 }
 
-void NewCaseDialog::set_view_plate(int row, const ViewPlate& plate) {
-  if (row < 0 || std::size_t(row) >= draft_.images.size()) return;
-  draft_.images[std::size_t(row)].plate = plate;
+void NewCaseDialog::set_view_plate(int number, const ViewPlate& plate) {
+  const auto image = std::ranges::find(draft_.images, number, &CaseDraft::Image::number);
+  if (image == draft_.images.end()) return;  // removed meanwhile
+  image->plate = plate;
   changed();
 }
 

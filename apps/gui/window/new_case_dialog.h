@@ -64,11 +64,13 @@ class NewCaseDialog : public QDialog {
   void show_view_plate(int row);
   QPushButton* view_plate_button();
   void show_findings();
-  void set_view_plate(int row, const ViewPlate& plate);
+  /// Of the draft's image of this number, if it is still there.
+  void set_view_plate(int number, const ViewPlate& plate);
   void create();
 
   std::shared_ptr<DraftChecker> checker_ = std::make_shared<DraftChecker>();
   CaseDraft draft_;
+  int last_number_ = 0;  ///< of the draft's images
   CheckedDraft checked_;
   bool checking_ = false, again_ = false, writing_ = false, filling_ = false, own_folder_ = false;
 

@@ -69,6 +69,23 @@ PageTable::PageTable(const report::Table& content, const char* name, QWidget* pa
 }
 
 void PageTable::fill(const report::Table& content) {
+  const int selected = selectionModel()->hasSelection() ? currentRow() : -1;
+  const auto name_in = [&](int row) {
+    return row >= 0 && row < rowCount() && item(row, 0) ? item(row, 0)->text() : QString();
+  };
+  const QString chosen = name_in(selected);
+  put(content);
+  if (selected >= 0 && name_in(selected) != chosen) {
+    int row = 0;
+    while (row < rowCount() && name_in(row) != chosen) ++row;
+    if (row < rowCount())
+      selectRow(row);
+    else
+      clearSelection();
+  }
+}
+
+void PageTable::put(const report::Table& content) {
   setRowCount(int(content.rows.size()));
   for (int row = 0; row < rowCount(); ++row)
     for (int column = 0; column < columnCount(); ++column) {

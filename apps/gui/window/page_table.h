@@ -16,6 +16,7 @@ class PageTable : public QTableWidget {
 
  public:
   PageTable(const report::Table& content, const char* name, QWidget* parent = nullptr);
+  /// The selection stays on what it was made on, which the first cell names, and ends with it.
   void fill(const report::Table& content);
   /// Below the table: the selected row's values of the columns that do not fit.
   QLabel* others() { return others_; }
@@ -28,6 +29,7 @@ class PageTable : public QTableWidget {
   void wheelEvent(QWheelEvent* event) override { event->ignore(); }
 
  private:
+  void put(const report::Table& content);
   /// Columns, then rows.
   void arrange();
   void show_others();

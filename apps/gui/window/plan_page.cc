@@ -220,7 +220,7 @@ void PlanPage::show_state(const ApplicationState& state) {
     for (const case_registration::RegisteredPoint& point : model->points)
       points.push_back(
           {point.name, tr("plan of %1").arg(text(model->registration.name)), &point, out_of_date});
-  if (state.result)
+  if (state.result && stale(state, Phase::calibrate).isEmpty())
     for (const localization::TargetError& target : state.result->accuracy.targets)
       points.push_back({target.name, tr("target, error %1 mm").arg(number(target.error_mm, 3))});
   ends_->fill(ends_table(state, points));

@@ -37,7 +37,8 @@ std::string views_with(const ApplicationState& state, const std::string& point) 
 }
 
 pipeline::PointResult located(const ApplicationState& state, const PlannedPoint& planned) {
-  if (!planned.of_model && state.result && !is_stale(state, planned.name)) {
+  if (!planned.of_model && state.result && !is_stale(state, planned.name) &&
+      stale(state, Phase::calibrate).isEmpty()) {
     const auto& points = state.result->points;
     const auto found = std::ranges::find(points, planned.name, &pipeline::PointResult::name);
     if (found != points.end()) return *found;
@@ -67,9 +68,9 @@ QString remark_of(const ApplicationState& state, const PlannedPoint& planned) {
   if (planned.of_model) return planned.out_of_date;
   for (const std::string& view : state.views)
     if (const Failure* failed = failure_of(state, planned.name, view)) return sentence_of(*failed);
-  if (is_picked(state.picks, state.views, planned.name) && is_stale(state, planned.name))
-    return PlanPage::tr("not measured with these picks yet");
-  return {};
+  if (!state.result || !is_picked(state.picks, state.views, planned.name)) return {};
+  if (is_stale(state, planned.name)) return PlanPage::tr("not measured with these picks yet");
+  return stale(state, Phase::calibrate);
 }
 
 report::ColumnOf<PlanTunnelRow> number_column(const char* title, const char* definition,
@@ -119,7 +120,7 @@ std::vector<UsableModel> usable_models(const ApplicationState& state) {
 
 std::vector<PlanTunnelRow> plan_tunnels(const ApplicationState& state) {
   std::vector<PlanTunnelRow> rows;
-  if (state.result) {
+  if (state.result && stale(state, Phase::calibrate).isEmpty()) {
     const pipeline::Result& result = *state.result;
     for (std::size_t i = 0; i < std::min(result.tunnels.size(), result.tunnel_ends.size()); ++i) {
       const pipeline::PointResult &from = result.points[result.tunnel_ends[i].start],

@@ -143,13 +143,26 @@ int RunWindow::frame() const { return bar_->frame(); }
 void RunWindow::set_frame(int number) { bar_->set_frame(number); }
 
 void RunWindow::open_case(const fs::path& folder) {
-  folder_ = folder;
+  if (busy_) return;
+  show_nothing();
   setWindowTitle(tr("Run: %1").arg(text(folder.string())));
   start(tr("The case is read."), [folder]() -> Done {
     auto given = sweep::read_sweep_case(folder);
     if (!given) return tl::unexpected(given.error());
     return std::make_shared<const CalibratedRun>(CalibratedRun{*std::move(given), {}});
   });
+}
+
+/// Nothing of a run stays under the name of another one.
+void RunWindow::show_nothing() {
+  shown_.reset();
+  film_.reset();
+  displayed_ = -1;
+  bar_->stop();
+  if (view_->is_computing()) end_frame();
+  view_->clear({});
+  images_->setRowCount(0);
+  show_curves();
 }
 
 void RunWindow::start(const QString& doing, std::function<Done()> work) {
@@ -205,10 +218,9 @@ void RunWindow::calibrate() {
 }
 
 void RunWindow::allow() {
-  const bool is_calibrated = shown_ && shown_->sweep;
   calibrate_->setEnabled(!busy_ && shown_);
   cancel_->setEnabled(busy_);
-  write_->setEnabled(!busy_ && is_calibrated);
+  write_->setEnabled(can_write());
   save_film_->setEnabled(!busy_ && shown_ && !film_);
   bar_->setEnabled(shown_ != nullptr);
 }
@@ -249,6 +261,7 @@ void RunWindow::show_frame(int number, const Expected<xray::XrayImage>& image) {
       if (!found.fiducials.empty()) view.found.emplace().fiducials = found.fiducials;
       result->failure = found.failure;
     }
+    view_->set_given_pixels(sweep::has_distortion(frame, shown_->given) ? tr("rectified") : QString());
     view_->show_view(result, 0, true);
   }
 }
@@ -287,7 +300,7 @@ void RunWindow::show_curves() {
 void RunWindow::ask_and_write() {
   ask_files(this, tr("Folder for the geometry and the report"), QFileDialog::Directory, {},
             [this](const std::vector<fs::path>& chosen) {
-              if (!shown_ || !shown_->sweep) return;
+              if (!can_write()) return says_->setText(tr("There is nothing to be written now."));
               const auto written = sweep::write_sweep(*shown_->sweep, chosen.front());
               says_->setText(written ? tr("Written to %1.").arg(text(chosen.front().string()))
                                      : sentence_of(written.error()));
@@ -300,6 +313,7 @@ void RunWindow::ask_and_film() {
 }
 
 void RunWindow::save_film(const fs::path& folder) {
+  if (!shown_ || film_) return;
   film_ = folder;
   displayed_ = -1;
   set_frame(0);

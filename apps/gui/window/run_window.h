@@ -57,6 +57,8 @@ class RunWindow : public QDialog {
   void start(const QString& doing, std::function<Done()> work);
   void take(const Done& done);
   void calibrate();
+  void show_nothing();
+  bool can_write() const { return !busy_ && shown_ && shown_->sweep; }
   void allow();
   void read_frame();
   void show_frame(int number, const Expected<xray::XrayImage>& image);
@@ -67,7 +69,6 @@ class RunWindow : public QDialog {
   void ask_and_film();
   void film_frame(int number);
 
-  std::filesystem::path folder_;
   std::shared_ptr<const CalibratedRun> shown_;
   std::shared_ptr<std::atomic<bool>> stopped_ = std::make_shared<std::atomic<bool>>(false);
   std::optional<std::filesystem::path> film_;  ///< folder of the images that are written as they are shown

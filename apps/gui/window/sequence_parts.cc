@@ -227,12 +227,15 @@ void SequenceWindow::show_curves() {
   curves_->show_svg(chart_document(report::chart_svg(charts, charts.size())));
 }
 
+bool SequenceWindow::can_write() const {
+  return !busy_ && shown_ && shown_->sequence && !shown_->sequence->failure && !shown_->is_corrected();
+}
+
 void SequenceWindow::allow() {
-  const bool is_followed = shown_ && shown_->sequence;
   read_->setEnabled(!busy_);
   follow_->setEnabled(!busy_ && shown_);
   cancel_->setEnabled(busy_);
-  write_->setEnabled(!busy_ && is_followed && !shown_->sequence->failure && !shown_->is_corrected());
+  write_->setEnabled(can_write());
   undo_->setEnabled(!busy_ && corrections_.can_undo());
   for (XrayView* view : views_) view->set_picking(!busy_ && shown_ && markers_->currentRow() >= 0);
   save_film_->setEnabled(!busy_ && shown_ && !film_);

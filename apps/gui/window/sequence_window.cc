@@ -37,7 +37,7 @@ Expected<std::shared_ptr<const FollowedSequence>> read_sequence(const fs::path& 
     const std::vector<track::SequenceView> views(given.views.begin(), given.views.end());
     auto images = value_or_throw(track::SequenceImages::open(views, range));
     return std::make_shared<const FollowedSequence>(
-        FollowedSequence{std::move(given), std::move(images), range, {}});
+        FollowedSequence{folder, std::move(given), std::move(images), range, {}});
   });
 }
 
@@ -95,11 +95,28 @@ int SequenceWindow::frame() const { return bar_->frame(); }
 void SequenceWindow::set_frame(int number) { bar_->set_frame(number); }
 
 void SequenceWindow::open_case(const fs::path& folder, const QString& frames) {
+  if (busy_) return;
   folder_ = folder;
-  has_scene_ = false;
+  show_nothing();
   frames_->setText(frames);
   setWindowTitle(tr("Sequence: %1").arg(text(folder.string())));
   read();
+}
+
+/// Nothing of a case stays under the name of another one.
+void SequenceWindow::show_nothing() {
+  shown_.reset();
+  corrections_ = {};
+  film_.reset();
+  has_scene_ = false;
+  displayed_ = -1;
+  if (std::exchange(awaited_, 0) > 0) end_frame();
+  bar_->stop();
+  for (XrayView* view : views_) view->clear({});
+  markers_->setRowCount(0);
+  by_frames_->setRowCount(0);
+  show_curves();
+  show_scene();
 }
 
 void SequenceWindow::run(const QString& doing,
@@ -177,7 +194,7 @@ void SequenceWindow::take_picks() {
   auto changed = std::make_shared<FollowedSequence>(*shown_);
   corrections_.put_into(changed->given);
   shown_ = changed;
-  const auto saved = corrections_.save(folder_, shown_->given, shown_->range);
+  const auto saved = corrections_.save(shown_->folder, shown_->given, shown_->range);
   says_->setText(
       !saved ? sentence_of(saved.error())
       : shown_->sequence && !shown_->is_corrected()
@@ -297,6 +314,7 @@ std::vector<FreshPick> SequenceWindow::marks_in(std::size_t view) const {
 /// The images of a frame are displayed: now its marks are true of them.
 void SequenceWindow::end_frame() {
   reading_ = false;
+  awaited_ = 0;
   bar_->set_waiting(false);
   if (displayed_ >= 0) {
     for (std::size_t i = 0; i < views_.size(); ++i) views_[i]->set_picks(marks_in(i));
@@ -326,7 +344,7 @@ void SequenceWindow::film_frame() {
 void SequenceWindow::ask_and_write() {
   ask_files(this, tr("Folder for the tables and the report"), QFileDialog::Directory, {},
             [this](const std::vector<fs::path>& chosen) {
-              if (!shown_ || !shown_->sequence) return;
+              if (!can_write()) return says_->setText(tr("There is nothing to be written now."));
               const auto written = track::write_track(*shown_->sequence, shown_->given, chosen.front());
               says_->setText(written ? tr("Written to %1.").arg(text(chosen.front().string()))
                                      : sentence_of(written.error()));
@@ -339,6 +357,7 @@ void SequenceWindow::ask_and_film() {
 }
 
 void SequenceWindow::save_film(const fs::path& folder) {
+  if (!shown_ || film_) return;
   film_ = folder;
   displayed_ = -1;
   set_frame(0);

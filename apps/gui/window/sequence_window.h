@@ -34,6 +34,7 @@ class XrayView;
 
 /// A case of markers with its images, and what is known of the markers once they are followed.
 struct FollowedSequence {
+  std::filesystem::path folder;  ///< of the case
   track::TrackCase given;
   track::SequenceImages images;
   case_registration::FrameRange range;
@@ -106,6 +107,8 @@ class SequenceWindow : public QDialog {
   void show_views();
   void read_frame();
   void show_frame(int number, const Expected<std::vector<xray::XrayImage>>& images);
+  void show_nothing();
+  bool can_write() const;
   void fill_tables();
   void mark_frame();
   void ask_and_write();

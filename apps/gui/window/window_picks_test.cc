@@ -247,6 +247,23 @@ TEST_F(WindowWithTunnels, TunnelsThatAreNotWantedAreAskedForNoMore) {
   EXPECT_EQ(says().toStdString(), "Click notch in AP.");
 }
 
+TEST_F(WindowWithTunnels, TheSelectionStaysOnItsPointWhenRowsAboveItEnd) {
+  open_tunnels();
+  window_->strip().chosen(Phase::plan);
+  window_->controller().clear_picks();
+  ASSERT_TRUE(wait_idle());
+  for (const char* name : {"notch", "ridge"}) window_->controller().add_landmark(name);
+  auto* ends = find<QTableWidget>("endTable");
+  const auto row_of = [&](const QString& name) {
+    return ends->findItems(name, Qt::MatchExactly).front()->row();
+  };
+  ends->selectRow(row_of("notch"));
+  click("noTunnels");
+  EXPECT_EQ(ends->currentRow(), row_of("notch"));
+  EXPECT_TRUE(ends->item(row_of("notch"), 0)->isSelected());
+  EXPECT_THAT(says().toStdString(), HasSubstr("notch is selected"));
+}
+
 TEST_F(WindowWithTunnels, LandmarkOfATakenNameIsRefused) {
   open_tunnels();
   window_->controller().add_landmark("FS");

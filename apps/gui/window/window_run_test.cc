@@ -94,6 +94,23 @@ TEST_F(WindowRun, ACancelledCalibrationLeavesTheRunAsItWas) {
   EXPECT_TRUE(part<QPushButton>("runCalibrate")->isEnabled());
 }
 
+TEST_F(WindowRun, NothingOfARunStaysUnderTheNameOfOneThatCannotBeRead) {
+  ASSERT_NO_FATAL_FAILURE(open());
+  click("runCalibrate");
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  ASSERT_TRUE(run()->shown()->sweep) << says();
+  fs::copy(folder_ / "run", folder_ / "other", fs::copy_options::recursive);
+  Json given = *read_json(folder_ / "other" / "case.json");
+  given["calibrator"] = "missing.json";
+  ASSERT_TRUE(write_file(folder_ / "other" / "case.json", to_text(given)));
+  drop(*window_, {folder_ / "other"});
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  EXPECT_FALSE(run()->shown());
+  EXPECT_THAT(says(), HasSubstr("missing.json"));
+  EXPECT_EQ(part<QTableWidget>("runImages")->rowCount(), 0);
+  EXPECT_FALSE(part<QPushButton>("runWrite")->isEnabled());
+}
+
 TEST_F(WindowRun, AnImageThatIsNoImageIsNamed) {
   ASSERT_NO_FATAL_FAILURE(open());
   ASSERT_TRUE(write_file(folder_ / "run" / "run_002.png", "no image"));

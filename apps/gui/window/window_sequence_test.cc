@@ -189,6 +189,33 @@ TEST_F(WindowSequence, APickInALaterFrameIsKeptFollowedAndUndone) {
             before[corrected - 1].of[0][1]->uv_raw);
 }
 
+TEST_F(WindowSequence, NothingOfACaseStaysUnderTheNameOfOneThatCannotBeRead) {
+  ASSERT_NO_FATAL_FAILURE(write_sequence(folder_ / "run"));
+  ASSERT_NO_FATAL_FAILURE(write_sequence(folder_ / "other"));
+  fs::remove(folder_ / "other" / "B_0002.png");
+  const std::string kept = *read_file(folder_ / "other" / "case.json", 1 << 20);
+  window_->open_paths({folder_ / "run" / "case.json"});
+  ASSERT_TRUE(wait("the sequence is shown", [&] { return sequence() != nullptr; }));
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  QTest::mouseClick(sequence()->findChild<QPushButton*>("sequenceFollow"), Qt::LeftButton);
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  table("markerList")->selectRow(0);
+  sequence()->pick(1, project(1, beads(1)[0].at));
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  window_->open_paths({folder_ / "other" / "case.json"});
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  EXPECT_FALSE(sequence()->shown());
+  EXPECT_THAT(says(), HasSubstr("B_0002.png"));
+  EXPECT_EQ(table("markerList")->rowCount(), 0);
+  EXPECT_FALSE(sequence()->findChild<QPushButton*>("sequenceUndo")->isEnabled());
+  EXPECT_FALSE(sequence()->findChild<QPushButton*>("sequenceWrite")->isEnabled());
+  sequence()->pick(1, project(1, beads(1)[0].at));
+  EXPECT_EQ(*read_file(folder_ / "other" / "case.json", 1 << 20), kept);
+  window_->open_paths({folder_ / "run" / "case.json"});
+  ASSERT_NO_FATAL_FAILURE(wait_free());
+  EXPECT_TRUE(sequence()->shown()) << says();
+}
+
 TEST_F(WindowSequence, CurvesAreThoseOfTheReport) {
   ASSERT_NO_FATAL_FAILURE(write_sequence(folder_ / "run"));
   window_->open_paths({folder_ / "run" / "case.json"});

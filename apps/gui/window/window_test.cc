@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gui/window/window_test.h"
 
+#include <QMouseEvent>
 #include <QStandardPaths>
 
 #include "gui/window/bones_window.h"
@@ -340,6 +341,30 @@ TEST_F(Window, ShortPressOnAYellowButtonDoesNothing) {
   QTest::keyClick(unlock, Qt::Key_Return);
   QTest::qWait(HoldButton::hold_ms + 200);
   EXPECT_EQ(window_->controller().live().robot.phase, robot::LinkPhase::idle);
+}
+
+TEST_F(Window, APointerThatLeavesAYellowButtonLetsItGo) {
+  HoldButton button("go");
+  button.resize(120, 40);
+  button.show();
+  int orders = 0;
+  QObject::connect(&button, &HoldButton::held, &button, [&] { ++orders; });
+  const auto drag_to = [&](const QPoint& place) {
+    QMouseEvent move(QEvent::MouseMove, place, button.mapToGlobal(place), Qt::NoButton, Qt::LeftButton, {});
+    QApplication::sendEvent(&button, &move);
+  };
+  QTest::mousePress(&button, Qt::LeftButton, {}, {20, 20});
+  drag_to({40, 20});
+  EXPECT_TRUE(button.is_held());
+  drag_to({40, 90});
+  EXPECT_FALSE(button.is_held());
+  drag_to({40, 20});
+  QTest::qWait(HoldButton::hold_ms + 200);
+  EXPECT_EQ(orders, 0);
+  QTest::mouseRelease(&button, Qt::LeftButton, {}, {40, 20});
+  QTest::mousePress(&button, Qt::LeftButton, {}, {20, 20});
+  QTest::qWait(HoldButton::hold_ms + 200);
+  EXPECT_EQ(orders, 1);
 }
 
 }  // namespace

@@ -46,6 +46,7 @@ void XrayView::show_view(std::shared_ptr<const pipeline::Result> result, std::si
   if (stands) {
     shown_ = std::move(layer);
     grey_ = std::move(grey);
+    shows_earlier_ = !is_same;
     marks_ = is_same ? marks_of(*result_, view_, shown_->layer) : std::move(marks);
   }
   if (!stays) {
@@ -73,7 +74,7 @@ void XrayView::clear(const QString& why) {
   handle_in_layer_.reset();
   cursor_.reset();
   drag_ = {};
-  computing_ = false;
+  computing_ = shows_earlier_ = false;
   why_empty_ = why;
   setAccessibleName(tr("X-ray"));
   setAccessibleDescription(why);
@@ -93,7 +94,7 @@ void XrayView::set_layer(Layer layer) {
 }
 
 void XrayView::take(const std::shared_ptr<const LoadedLayer>& layer) {
-  computing_ = false;
+  computing_ = shows_earlier_ = false;
   if (!layer) return clear(tr("This layer cannot be computed"));
   if (cursor_ && shown_)
     if (const auto raw = raw_from_layer(view(), shown_->layer, *cursor_))
@@ -216,6 +217,10 @@ void XrayView::set_mark_groups(MarkGroups groups) {
   redraw_still();
 }
 
+void XrayView::set_given_pixels(const QString& words) {
+  if (std::exchange(given_pixels_, words) != words) update();
+}
+
 void XrayView::set_notice(const QString& notice) {
   if (std::exchange(notice_, notice) != notice) update();
 }
@@ -256,7 +261,7 @@ void XrayView::carry_live() {
 QSizeF XrayView::image_size() const { return shown_ ? QSizeF(grey_.size()) : QSizeF(1, 1); }
 
 std::optional<QPointF> XrayView::raw_at(const QPointF& place) const {
-  if (!shown_) return std::nullopt;
+  if (!shown_ || shows_earlier_) return std::nullopt;
   const auto raw = raw_from_layer(view(), shown_->layer, frame_.to_image(place));
   return raw ? std::optional(QPointF(raw->x(), raw->y())) : std::nullopt;
 }

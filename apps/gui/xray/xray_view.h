@@ -48,6 +48,8 @@ class XrayView : public QWidget {
   /// Whether the detections are drawn; live marks are always drawn.
   void set_marks_visible(bool visible);
   void set_mark_groups(MarkGroups groups);
+  /// The caption's word for pixels as they are given, where they are not an image's raw ones.
+  void set_given_pixels(const QString& words);
   /// Beside the caption, in amber; empty: none.
   void set_notice(const QString& notice);
   /// Points whose marks are not of their present picks: not drawn.
@@ -80,7 +82,8 @@ class XrayView : public QWidget {
   std::string image() const { return result_ ? view().xray_image->acquisition.instance_key : ""; }
   /// Whether the requested layer is still being computed; until then the previous one is displayed.
   bool is_computing() const { return computing_; }
-  /// Raw pixel at a widget position and back; empty outside the image.
+  /// Raw pixel at a widget position and back; empty outside the image. No pixel as long as the image of the
+  /// view before is displayed.
   std::optional<QPointF> raw_at(const QPointF& place) const;
   std::optional<QPointF> place_of(const QPointF& raw_pixel) const;
 
@@ -174,7 +177,7 @@ class XrayView : public QWidget {
   Layer wanted_ = Layer::rectified;
   std::optional<image::GreyWindow> window_;  ///< empty: the default one
   bool picking_ = false, measuring_ = false, magnifier_ = false, marks_visible_ = true, computing_ = false,
-       fits_ = true;
+       fits_ = true, shows_earlier_ = false;
 
   LayerLoader loader_;
   std::shared_ptr<const LoadedLayer> shown_;
@@ -184,7 +187,7 @@ class XrayView : public QWidget {
   std::vector<FreshPick> picks_;      ///< as given
   std::set<std::string> superseded_;  ///< points whose pick has moved since the result
   std::set<std::string> stale_;       ///< as given
-  QString notice_;
+  QString notice_, given_pixels_;
   std::optional<ResidualScale> residual_scale_;  ///< nothing: by this view alone
   std::optional<RefusalText> refusal_;
   bool details_visible_ = false;

@@ -139,7 +139,8 @@ void XrayView::paint_words(QPainter& painter) const {
                      computing_ ? tr("Computing …") : why_empty_);
     return;
   }
-  const QString layer = shown_->layer == Layer::raw         ? tr("raw")
+  const QString given = given_pixels_.isEmpty() ? tr("raw") : given_pixels_;
+  const QString layer = shown_->layer == Layer::raw         ? given
                         : shown_->layer == Layer::rectified ? tr("rectified")
                                                             : tr("rectified, plate removed");
   QString caption = QString::fromStdString(view().name) + "  ·  " + layer;

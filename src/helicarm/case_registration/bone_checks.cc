@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/case_registration/bone_checks.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -13,6 +14,22 @@ namespace {
 
 using registration::BoneCheck;
 
+/// A breach that neither the nearest place of the wall nor of the end shows.
+std::optional<guidance::WallPlace> surer_elsewhere(const BoneCheck& check) {
+  BoneCheck nearest = check;
+  nearest.wall.clear();
+  nearest.ahead.clear();
+  return check.is_breach() && !nearest.is_breach() ? check.least_sure() : std::nullopt;
+}
+
+/// Adds the registration's error across the place's surface.
+void add_registration(guidance::WallPlace& place, const registration::Registration& result) {
+  const Eigen::Vector3d outward = result.world_from_model.rotation * place.outward;
+  const Eigen::Matrix3d covariance =
+      registration::point_covariance(result, result.world_from_model * place.on_axis);
+  place.drilled_sigma_mm = std::sqrt(place.sigma_mm * place.sigma_mm + outward.dot(covariance * outward));
+}
+
 std::map<std::string, double> figures_of(const BoneCheck& check) {
   std::map<std::string, double> figures = {{"diameter_mm", check.diameter_mm.value_or(0)}};
   if (check.bridge_mm) {
@@ -21,6 +38,12 @@ std::map<std::string, double> figures_of(const BoneCheck& check) {
     figures["at_mm"] = *check.at_mm;
   }
   if (check.end_mm) figures["end_mm"] = *check.end_mm;
+  if (check.is_breach() && check.end_mm) figures["end_sigma_mm"] = check.drilled_end_sigma_mm.value_or(0);
+  if (const auto least = surer_elsewhere(check)) {
+    figures["least_sure_mm"] = least->distance_mm;
+    figures["least_sure_sigma_mm"] = least->drilled_sigma_mm;
+    figures["least_sure_at_mm"] = least->at_mm;
+  }
   if (check.required_mm) figures["limit_mm"] = *check.required_mm;
   return figures;
 }
@@ -36,6 +59,12 @@ std::string places_of(const BoneCheck& check) {
         *check.bridge_mm, check.drilled_sigma_mm.value_or(0), *check.at_mm);
   if (check.end_mm)
     text += fmt::format("{}{:.2f} mm of bone are ahead of its end", text.empty() ? "" : "; ", *check.end_mm);
+  if (check.end_mm && check.is_breach())
+    text += fmt::format(" (sigma {:.2f} mm)", check.drilled_end_sigma_mm.value_or(0));
+  if (const auto least = surer_elsewhere(check))
+    text += fmt::format(
+        "; it is least sure {:.1f} mm behind the entry, {:.2f} mm from the surface (sigma {:.2f} mm)",
+        least->at_mm, least->distance_mm, least->drilled_sigma_mm);
   return text;
 }
 
@@ -78,12 +107,15 @@ void judge_tunnels(const MarkupPlan& plan, std::vector<std::optional<BoneCheck>>
     if (!checks[i] || !checks[i]->diameter_mm) continue;
     BoneCheck& check = *checks[i];
     const MarkupLine& tunnel = plan.tunnels[i];
-    if (check.bridge_mm && result.is_determined()) {
-      const Eigen::Vector3d outward = result.world_from_model.rotation * check.outward;
-      const Eigen::Matrix3d covariance =
-          registration::point_covariance(result, result.world_from_model * check.thinnest);
-      check.drilled_sigma_mm =
-          std::sqrt(*check.sigma_mm * *check.sigma_mm + outward.dot(covariance * outward));
+    if (result.is_determined()) {
+      const auto nearest = [&](std::vector<guidance::WallPlace>& places) {
+        for (guidance::WallPlace& place : places) add_registration(place, result);
+        return std::ranges::min_element(places, {}, &guidance::WallPlace::distance_mm);
+      };
+      if (const auto least = nearest(check.wall); least != check.wall.end())
+        check.drilled_sigma_mm = least->drilled_sigma_mm;
+      if (const auto least = nearest(check.ahead); least != check.ahead.end())
+        check.drilled_end_sigma_mm = least->drilled_sigma_mm;
     }
     if (check.is_breach())
       add_finding(

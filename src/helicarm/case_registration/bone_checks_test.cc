@@ -81,6 +81,49 @@ TEST(JudgeTunnels, TheRegistrationsErrorCounts) {
   EXPECT_EQ(result.failure->reason, Reason::tunnel_breach);
 }
 
+/// Known to 0.1 mm, but along one axis of the model.
+Registration known_badly_along(const Vector3d& axis, double sigma_mm) {
+  Registration result = registered(0.1);
+  const Vector3d along = result.world_from_model.rotation * axis;
+  result.covariance.bottomRightCorner<3, 3>() += sigma_mm * sigma_mm * along * along.transpose();
+  return result;
+}
+
+Registration judged(const MarkupPlan& plan, Registration result,
+                    std::vector<std::optional<registration::BoneCheck>>& checks) {
+  checks = bone_checks(plan, block().get());
+  judge_tunnels(plan, checks, result);
+  return result;
+}
+
+TEST(JudgeTunnels, ABlindEndIsHeldToTheRegistrationsErrorAlongTheAxis) {
+  MarkupPlan plan = plan_at({0});
+  plan.points[1].in_model.z() = 18;  // 2 mm below the surface
+  std::vector<std::optional<registration::BoneCheck>> checks;
+  EXPECT_FALSE(judged(plan, known_badly_along(Vector3d::UnitX(), 1.5), checks).failure);
+  EXPECT_NEAR(*checks[0]->end_mm, 2, 0.05);
+  EXPECT_NEAR(*checks[0]->drilled_end_sigma_mm, std::hypot(0.1, *checks[0]->end_sigma_mm), 0.001);
+  const Registration refused = judged(plan, known_badly_along(Vector3d::UnitZ(), 1.5), checks);
+  ASSERT_TRUE(refused.failure);
+  EXPECT_EQ(refused.failure->reason, Reason::tunnel_breach);
+  EXPECT_NEAR(refused.failure->figures.at("end_sigma_mm"), 1.5, 0.05);
+  EXPECT_THAT(refused.failure->message, HasSubstr("mm of bone are ahead of its end (sigma 1.51 mm)"));
+}
+
+TEST(JudgeTunnels, AWallFartherOffCountsWhereTheRegistrationIsKnownWorse) {
+  MarkupPlan plan = plan_at({8});                                // 1 mm from the surface along x
+  for (PlanPoint& point : plan.points) point.in_model.y() = 15;  // and 2 mm along y
+  std::vector<std::optional<registration::BoneCheck>> checks;
+  EXPECT_FALSE(judged(plan, known_badly_along(Vector3d::UnitZ(), 1.5), checks).failure);
+  const Registration refused = judged(plan, known_badly_along(Vector3d::UnitY(), 1.5), checks);
+  ASSERT_TRUE(refused.failure);
+  EXPECT_EQ(refused.failure->reason, Reason::tunnel_breach);
+  EXPECT_NEAR(refused.failure->figures.at("bridge_mm"), 1, 0.1);
+  EXPECT_NEAR(refused.failure->figures.at("sigma_mm"), 0.1, 0.05);
+  EXPECT_NEAR(refused.failure->figures.at("least_sure_mm"), 2, 0.1);
+  EXPECT_NEAR(refused.failure->figures.at("least_sure_sigma_mm"), 1.5, 0.1);
+}
+
 TEST(JudgeTunnels, ALineBesideTheBoneIsRefused) {
   const Registration result = judged(plan_at({30}), 0.1);
   ASSERT_TRUE(result.failure);

@@ -134,7 +134,8 @@ RigidTransform pose_in(JsonReader& reader, const char* key) {
 
 PosedModel posed(const RegisteredModel& model) {
   const registration::Registration& found = model.registration;
-  PosedModel made{found.name, found.world_from_model, found.covariance, found.centre};
+  PosedModel made{found.name,   found.world_from_model, found.covariance,
+                  found.centre, found.scale_sigma,      found.by_scale};
   for (const RegisteredPoint& point : model.points)
     made.planned[point.name] = found.world_from_model.inverse() * point.place.in_calibrator;
   return made;
@@ -244,6 +245,10 @@ Expected<std::vector<PosedModel>> posed_models_from(const Json& registration, co
                        Eigen::Map<const registration::RigidCovariance>(
                            model.matrix("covariance", 6, 6, {-1e12, 1e12}).data()),
                        Vector3d(model.numbers("centre_mm", 3, world_mm).data())};
+      posed.scale_sigma = model.optional_number("scale_sigma", {0, 1}).value_or(0);
+      if (model.has("by_scale"))
+        posed.by_scale =
+            Eigen::Map<const registration::RigidStep>(model.numbers("by_scale", 6, {-1e6, 1e6}).data());
       for (JsonReader& point : model.objects("points", false))
         posed.planned[point.text("name")] =
             posed.world_from_model.inverse() * Vector3d(point.numbers("xyz_mm", 3, world_mm).data());
@@ -283,7 +288,8 @@ Landmark in_model(const std::string& name, const WorldPoint& point, const PosedM
   return {
       name, model.world_from_model.inverse() * point.at,
       to_model *
-          (point.covariance_mm2 + registration::point_covariance(model.covariance, model.centre, point.at)) *
+          (point.covariance_mm2 + registration::point_covariance(model.covariance, model.by_scale,
+                                                                 model.scale_sigma, model.centre, point.at)) *
           to_model.transpose()};
 }
 

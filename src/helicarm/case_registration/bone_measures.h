@@ -43,7 +43,11 @@ struct PosedModel {
   std::string name;
   geometry::RigidTransform world_from_model;
   registration::RigidCovariance covariance;
-  Eigen::Vector3d centre;                               ///< of the covariance, in the world
+  Eigen::Vector3d centre;  ///< of the covariance, in the world
+  double scale_sigma = 0;  ///< of the model's size
+  /// As in `registration::Registration`; zero of a file of an earlier version: its error of the pose is then
+  /// taken for independent of that of the size.
+  registration::RigidStep by_scale = registration::RigidStep::Zero();
   std::map<std::string, Eigen::Vector3d> planned = {};  ///< points of its plan, in the model, exact
   /// world_from_model at each view's acquisition, by the view's name; empty: the same in every view.
   std::map<std::string, geometry::RigidTransform> at_acquisitions = {};

@@ -78,6 +78,26 @@ TEST(BoneMeasures, APlannedPointIsExactAndALocatedOneHasBothErrors) {
   EXPECT_TRUE(found[0].laterals.at(0).is_lateral);
 }
 
+TEST(BoneMeasures, ALocatedPointHasTheErrorOfTheModelsSizeAsAPlannedOneHas) {
+  Tibia tibia(plateau);
+  registration::Registration& found = tibia.model.registration;
+  found.scale_sigma = 0.005;
+  found.by_scale << 0, 0, 0, 0.02, -0.05, 0.1;
+  found.covariance += found.by_scale * found.by_scale.transpose();
+  CaseRegistration result;
+  result.models.push_back(tibia.model);
+  const auto posed = *posed_models_from(to_json(result), "registration.json");
+  const Eigen::Vector3d at(10, 40, -20);
+  const measures::Landmark carried = in_model("L", {at, Eigen::Matrix3d::Zero()}, posed.at(0));
+  EXPECT_LT((carried.covariance_mm2 - registration::point_covariance(found, at)).norm(), 1e-9);
+  // Of a file that does not say how the pose answers to the size, the two count apart.
+  PosedModel earlier = posed.at(0);
+  earlier.by_scale.setZero();
+  const Eigen::Matrix3d apart = registration::point_covariance(found.covariance, found.centre, at) +
+                                0.005 * 0.005 * at * at.transpose();
+  EXPECT_LT((in_model("L", {at, Eigen::Matrix3d::Zero()}, earlier).covariance_mm2 - apart).norm(), 1e-9);
+}
+
 TEST(BoneMeasures, WhatWasNotLocatedIsNamed) {
   Tibia tibia(plateau + "t,tibia_ap,tibia,L,,,\n");
   tibia.pick("L", {500, 500});

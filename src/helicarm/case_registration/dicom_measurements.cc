@@ -111,7 +111,7 @@ void add_bone_check(const guidance::BoneCheck& check, std::vector<ReportValue>& 
                               check.drilled_sigma_mm ? check.drilled_sigma_mm : check.sigma_mm));
   if (check.end_mm)
     values.push_back(value_of(own_code("end", "Bone ahead of the tunnel's end"), in_mm(), *check.end_mm,
-                              check.end_sigma_mm));
+                              check.drilled_end_sigma_mm ? check.drilled_end_sigma_mm : check.end_sigma_mm));
   values.push_back(
       value_of(own_code("length_in_bone", "Length in the bone"), in_mm(), check.length_in_bone_mm));
   if (check.entry_angle_deg)

@@ -95,19 +95,12 @@ LoadedMask mask_of(const pipeline::CaseModel& case_model, const pipeline::CaseMa
   std::optional<volume::Volume> segment =
       value_or_throw(volume::read_segment(file, {mask.label, mask.segment, mask.threshold, key}));
   if (segment) return {*std::move(segment), true};
-  for (const auto& [is_given, part] :
-       {std::pair(mask.segment.has_value(), "segment"), std::pair(mask.threshold.has_value(), "threshold")})
-    if (is_given)
-      throw BadInput(Reason::bad_value,
-                     fmt::format("{} is no DICOM segmentation: it takes no \"{}_{}\"", origin, key, part));
+  if (mask.segment)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{} is no DICOM segmentation: it takes no \"{}_segment\"", origin, key));
   LoadedMask loaded{volume_at(file, case_model, 0)};
-  value_or_throw(volume::choose_label(loaded.volume, mask.label, origin, fmt::format("\"{}_label\"", key)));
+  value_or_throw(volume::choose_mask(loaded.volume, mask.label, mask.threshold, origin, key));
   return loaded;
-}
-
-bool has_voxels_of(const volume::Volume& volume, const Eigen::Vector3d& voxel_mm) {
-  const Eigen::Vector3d spacing = volume.patient_from_voxel.linear().colwise().norm();
-  return spacing.isApprox(voxel_mm, 1e-3);
 }
 
 /// The mask, if there is one, on the CT's grid; another grid is refused (bad_value).
@@ -116,7 +109,7 @@ std::optional<volume::Volume> mask_on(const volume::Volume& ct, const pipeline::
   if (!mask.file) return std::nullopt;
   LoadedMask loaded = mask_of(case_model, mask, key);
   // A stack has no frame of its own: a mask drawn on it in another program brings that program's.
-  if (case_model.voxel_mm && has_voxels_of(loaded.volume, *case_model.voxel_mm))
+  if (case_model.voxel_mm && volume::has_spacing(loaded.volume, *case_model.voxel_mm))
     loaded.volume.patient_from_voxel = ct.patient_from_voxel;
   // A segmentation's empty slices may be missing.
   volume::onto_grid(loaded.volume, ct, loaded.may_be_part);

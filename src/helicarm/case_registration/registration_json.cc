@@ -101,6 +101,11 @@ void describe_search(Output& output, const Registration& found) {
       "scale_sigma", found.scale_sigma,
       "relative standard deviation of the model's size, as stated or 0.005; part of `covariance` and of the "
       "points'");
+  output.value(
+      "by_scale", [&] { return found.is_determined() ? std::optional(found.by_scale) : std::nullopt; },
+      "how the pose errs, as a step of `covariance`, where the model is smaller than the body by "
+      "`scale_sigma`: "
+      "its part of `covariance`, which a point's own error by the size partly cancels");
   output.object("strain", true, "relative change of size along one direction that would fit best",
                 [&](auto& row) {
                   row.value("value", found.deformation.strain, "");

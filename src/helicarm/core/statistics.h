@@ -38,6 +38,18 @@ inline double chi2_quantile(double dof, double normal_quantile) {
   return dof * std::pow(1 - spread + normal_quantile * std::sqrt(spread), 3);
 }
 
+/// 97.5 % quantile of Student's t.
+inline double student_975(double freedom) {
+  if (freedom < 1.5) return 12.7062;
+  if (freedom < 2.5) return 4.30265;
+  if (freedom < 3.5) return 3.18245;
+  // Abramowitz and Stegun 26.7.5.
+  constexpr double z = normal_at_975;
+  const double z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
+  return z + (z3 + z) / (4 * freedom) + (5 * z5 + 16 * z3 + 3 * z) / (96 * std::pow(freedom, 2)) +
+         (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * std::pow(freedom, 3));
+}
+
 /// Standard deviations by which chi-square exceeds its degrees of freedom: the inverse of `chi2_quantile`.
 inline double chi2_excess(double chi2, double dof) {
   const double spread = 2 / (9 * dof);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/guidance/bone_check.h"
 
-#include <algorithm>
-
 namespace helicarm::guidance {
 namespace {
 
@@ -22,12 +20,23 @@ std::string_view words(NoEntry reason) {
   return "does not pass through the bone";
 }
 
+double WallPlace::margin_mm() const { return distance_mm - one_sided_95 * drilled_sigma_mm; }
+
+std::optional<WallPlace> BoneCheck::least_sure() const {
+  std::optional<WallPlace> least;
+  for (const auto* places : {&wall, &ahead})
+    for (const WallPlace& place : *places)
+      if (!least || place.margin_mm() < least->margin_mm()) least = place;
+  return least;
+}
+
 bool BoneCheck::is_breach() const {
   if (!diameter_mm) return false;
   if (!entry) return true;
-  const double spread = drilled_sigma_mm.value_or(0);
-  return (bridge_mm && *bridge_mm < one_sided_95 * spread) ||
-         (end_mm && *end_mm < one_sided_95 * std::max(spread, end_sigma_mm.value_or(0)));
+  const auto least = least_sure();
+  return (least && least->margin_mm() < 0) ||
+         (bridge_mm && *bridge_mm < one_sided_95 * drilled_sigma_mm.value_or(0)) ||
+         (end_mm && *end_mm < one_sided_95 * drilled_end_sigma_mm.value_or(0));
 }
 
 bool BoneCheck::is_thin() const {

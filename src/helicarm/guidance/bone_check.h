@@ -16,6 +16,21 @@ struct TunnelDistance {
   double distance_mm = 0;  ///< between the walls; negative: they meet
 };
 
+/// A place of a planned tunnel's wall, or of a blind tunnel's end, and the bone between it and the surface.
+struct WallPlace {
+  double distance_mm = 0;                             ///< negative: outside the bone
+  double sigma_mm = 0;                                ///< of the distance, by the surface's own error
+  double drilled_sigma_mm = 0;                        ///< likewise with the error of the registration
+  double at_mm = 0;                                   ///< depth along the axis from the entry
+  Eigen::Vector3d on_axis = Eigen::Vector3d::Zero();  ///< at that depth
+  /// How the distance grows as the surface moves against the tunnel: its normal, of a surface ahead of an end
+  /// divided by its cosine to the axis.
+  Eigen::Vector3d outward = Eigen::Vector3d::Zero();
+
+  /// Positive: that the place leaves the bone is excluded at 95 % (one-sided).
+  double margin_mm() const;
+};
+
 /// Why a line has no entry into the bone that can be compared.
 enum class NoEntry { beside_bone, beyond_ct, opens_nowhere };
 
@@ -40,13 +55,17 @@ struct BoneCheck {
   NoEntry no_entry = NoEntry::beside_bone;
   std::optional<Eigen::Vector3d> exit = {};  ///< likewise; nothing: a blind tunnel
   std::optional<double> entry_angle_deg = {},
-                        exit_angle_deg = {};      ///< between axis and surface; 90: perpendicular
-  std::optional<double> end_mm = {};              ///< bone ahead of a blind tunnel's end
-  std::optional<double> end_sigma_mm = {};        ///< likewise
-  Eigen::Vector3d end = Eigen::Vector3d::Zero();  ///< of the axis: its exit, or the blind end
+                        exit_angle_deg = {};        ///< between axis and surface; 90: perpendicular
+  std::optional<double> end_mm = {};                ///< bone ahead of a blind tunnel's end
+  std::optional<double> end_sigma_mm = {};          ///< likewise, by the surface's own error
+  std::optional<double> drilled_end_sigma_mm = {};  ///< likewise with the error of the registration
+  Eigen::Vector3d end = Eigen::Vector3d::Zero();    ///< of the axis: its exit, or the blind end
   std::vector<TunnelDistance> to_tunnels = {};
+  std::vector<WallPlace> wall = {}, ahead = {};  ///< nearest places around the axis, and ahead of a blind end
 
-  /// The wall, or the end of a blind tunnel, leaves the bone: not excluded at 95 % (one-sided).
+  /// Of `wall` and `ahead`, where a breach is least excluded; nothing without a surface nearby.
+  std::optional<WallPlace> least_sure() const;
+  /// The wall, or the end of a blind tunnel, leaves the bone somewhere: not excluded at 95 % (one-sided).
   bool is_breach() const;
   /// The bridge, or the bone ahead of the end, is below `required_mm`.
   bool is_thin() const;

@@ -32,6 +32,19 @@ void describe_bone_check(Output& output, const BoneCheck& check) {
                "between axis and surface there; 90 is perpendicular");
   output.value("exit_angle_deg", check.exit_angle_deg, "likewise");
   output.value("end_mm", check.end_mm, "bone ahead of a blind tunnel's end");
+  output.value("end_sigma_mm", check.end_sigma_mm,
+               "standard deviation of `end_mm` by the surface's own error");
+  output.value("drilled_end_sigma_mm", check.drilled_end_sigma_mm,
+               "likewise with the error of the registration across that surface, which decides");
+  output.object_of(
+      "least_sure", check.least_sure(),
+      "the place of the wall, or of a blind end, where a breach is least excluded; `null` without "
+      "a surface nearby",
+      [](auto& row, const WallPlace& place) {
+        row.value("distance_mm", place.distance_mm, "from the bone's surface");
+        row.value("drilled_sigma_mm", place.drilled_sigma_mm, "its standard deviation");
+        row.value("at_mm", place.at_mm, "depth along the axis behind the entry");
+      });
   output.value(
       "breach", [&] { return check.is_breach(); }, "whether it is refused (`tunnel_breach`)");
   output.value(

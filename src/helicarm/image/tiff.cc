@@ -156,9 +156,10 @@ Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::str
     check_layout(layout, file.get(), origin);
 
     const std::size_t word = layout.bits / 8u;
-    const unsigned top = layout.photometric == PHOTOMETRIC_MINISWHITE ? (1u << layout.bits) - 1 : 0;
-    GreyImage grey_image{
-        {static_cast<int>(layout.width), static_cast<int>(layout.height)}, layout.bits, layout.pixel_aspect};
+    GreyImage grey_image{{static_cast<int>(layout.width), static_cast<int>(layout.height)},
+                         layout.bits,
+                         layout.pixel_aspect,
+                         layout.photometric == PHOTOMETRIC_MINISWHITE};
     std::vector<unsigned char> row(
         std::max<std::size_t>(std::size_t{layout.width} * layout.channels * word,
                               static_cast<std::size_t>(TIFFScanlineSize(file.get()))));
@@ -172,8 +173,7 @@ Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::str
           throw BadInput(Reason::unsupported, fmt::format("{}: a colour image; convert it to grey", origin));
         std::uint16_t value = *at;
         if (word == 2) std::memcpy(&value, at, 2);
-        grey_image.pixels(static_cast<int>(u), static_cast<int>(v)) =
-            static_cast<std::uint16_t>(top ? top - value : value);
+        grey_image.pixels(static_cast<int>(u), static_cast<int>(v)) = value;
       }
     }
     return grey_image;

@@ -19,9 +19,9 @@ Expected<int> count_tiff_pages(std::string_view bytes, const std::string& origin
 Expected<std::array<int, 2>> tiff_size(std::string_view bytes, const std::string& origin);
 
 /// One page (0-based) of an unsigned 8 or 16-bit grey TIFF in strips, or RGB with three equal channels;
-/// uncompressed, PackBits, LZW or deflate; also as BigTIFF. WhiteIsZero is inverted. Refuses: bad_size,
-/// bad_value (damaged or truncated), unsupported (palette, alpha, tiles, other sample types and compressions,
-/// colour, an orientation other than 1).
+/// uncompressed, PackBits, LZW or deflate; also as BigTIFF. Values as stored, also of WhiteIsZero. Refuses:
+/// bad_size, bad_value (damaged or truncated), unsupported (palette, alpha, tiles, other sample types and
+/// compressions, colour, an orientation other than 1).
 Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::string& origin);
 
 }  // namespace helicarm::image

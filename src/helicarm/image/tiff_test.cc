@@ -81,9 +81,11 @@ TEST(Tiff, SizeIsReadWithoutThePixels) {
   EXPECT_EQ(tiff_size(encoded({}).substr(0, 9), "a.tif").error().reason, Reason::bad_value);
 }
 
-TEST(Tiff, WhiteIsZeroIsInverted) {
-  EXPECT_EQ(decode_tiff(encoded({.photometric = PHOTOMETRIC_MINISWHITE}), 0, "x.tif")->pixels(4, 2),
-            255 - 42);
+TEST(Tiff, WhiteIsZeroIsDeclaredOfTheStoredValues) {
+  const auto page = decode_tiff(encoded({.photometric = PHOTOMETRIC_MINISWHITE}), 0, "x.tif");
+  EXPECT_TRUE(page->white_is_zero);
+  EXPECT_EQ(page->pixels(4, 2), 42);
+  EXPECT_FALSE(decode_tiff(encoded({}), 0, "x.tif")->white_is_zero);
 }
 
 TEST(Tiff, UnsupportedKindsAreRefused) {

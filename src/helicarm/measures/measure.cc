@@ -51,7 +51,8 @@ Quantity angle(const Placed& placed, const Values& value) {
 
 Eigen::VectorXd one(double value) { return Eigen::VectorXd::Constant(1, value); }
 
-constexpr double least_length_px = 1;  // of what gives a length or a direction
+constexpr double least_length_px = 1;     // of what gives a length or a direction
+constexpr double least_line_share = 0.1;  // of two points that give a direction, of the span along it
 
 tl::unexpected<Failure> too_near(const KindInfo& info, std::string_view one, std::string_view other) {
   return fail(Reason::bad_value,
@@ -117,6 +118,17 @@ Expected<Measure> measured_percent(const KindInfo& info, const Placed& placed, c
                 fmt::format("{}: the landmarks for 0 and 100 % are {:.2g} px apart, must be {:g} px or more",
                             info.word, least, least_length_px),
                 {{"length_px", least}, {"limit_px", least_length_px}});
+  const double line = axes.line(pixels).norm();
+  const double shortest =
+      std::max(least_length_px, least_line_share * (axes.hundred(pixels) - axes.zero(pixels)).norm());
+  if (!(line >= shortest))
+    return fail(
+        Reason::bad_value,
+        fmt::format("{}: the two points of {} are {:.2g} px apart, must be {:.2g} px or more: they give "
+                    "its direction",
+                    info.word, info.kind == Kind::femoral_quadrants ? "Blumensaat's line" : "the plateau",
+                    line, shortest),
+        {{"length_px", line}, {"limit_px", shortest}});
   if (info.kind == Kind::femoral_quadrants && axes.has("posterior") &&
       (axes.hundred(pixels) - axes.zero(pixels)).dot(axes.direction(pixels)) < 0)
     return fail(

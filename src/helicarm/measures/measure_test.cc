@@ -262,6 +262,13 @@ TEST(Measure, RefusesClicksThatDetermineNothing) {
   std::vector<Click> flat = femur();
   flat[2].uv = {380, 340};
   EXPECT_THAT(refusal(Kind::femoral_quadrants, flat), HasSubstr("0 and 100 %"));
+  // Seen along the plateau's line: it has no direction in the image.
+  EXPECT_THAT(refusal(Kind::tibia_ap, {{"anterior", {100, 200}, half_px},
+                                       {"posterior", {300, 200}, half_px},
+                                       {"plateau1", {150, 190}, half_px},
+                                       {"plateau2", {152, 203}, half_px},
+                                       {"TE", {180, 210}, half_px}}),
+              HasSubstr("the plateau are 13 px apart, must be 20 px or more"));
 }
 
 /// Anterior and posterior margin 100 px apart, a point at 20 %.

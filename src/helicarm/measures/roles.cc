@@ -55,14 +55,13 @@ Eigen::Vector2d PercentAxes::hundred(const PlanarPoints& points) const {
   }
 }
 
-Eigen::Vector2d PercentAxes::direction(const PlanarPoints& points) const {
-  const bool is_femur = kind == Kind::femoral_quadrants;
-  const Eigen::Vector2d along = is_femur
-                                    ? at(points, "blumensaat_anterior") - at(points, "blumensaat_posterior")
-                                : has("plateau1") ? at(points, "plateau2") - at(points, "plateau1")
-                                                  : hundred(points) - zero(points);
-  return along.normalized();
+Eigen::Vector2d PercentAxes::line(const PlanarPoints& points) const {
+  if (kind == Kind::femoral_quadrants)
+    return at(points, "blumensaat_anterior") - at(points, "blumensaat_posterior");
+  return has("plateau1") ? at(points, "plateau2") - at(points, "plateau1") : hundred(points) - zero(points);
 }
+
+Eigen::Vector2d PercentAxes::direction(const PlanarPoints& points) const { return line(points).normalized(); }
 
 Eigen::VectorXd PercentAxes::percent(const PlanarPoints& points, const Eigen::Vector2d& point) const {
   const Eigen::Vector2d way = direction(points);

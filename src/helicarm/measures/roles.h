@@ -31,6 +31,8 @@ struct PercentAxes {
   /// From 0 to 100 % of the first component, along its direction.
   Eigen::Vector2d zero(const PlanarPoints& points) const;
   Eigen::Vector2d hundred(const PlanarPoints& points) const;
+  /// Between the two points that give the direction.
+  Eigen::Vector2d line(const PlanarPoints& points) const;
   Eigen::Vector2d direction(const PlanarPoints& points) const;
   Eigen::VectorXd percent(const PlanarPoints& points, const Eigen::Vector2d& point) const;
   /// Lengths of 100 % of each component.

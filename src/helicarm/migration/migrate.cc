@@ -206,17 +206,6 @@ BodyMigration migration_of(const std::vector<Matched>& all, std::size_t index, c
 
 }  // namespace
 
-double student_975(double freedom) {
-  if (freedom < 1.5) return 12.7062;
-  if (freedom < 2.5) return 4.30265;
-  if (freedom < 3.5) return 3.18245;
-  // Abramowitz and Stegun 26.7.5.
-  constexpr double z = normal_at_975;
-  const double z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
-  return z + (z3 + z) / (4 * freedom) + (5 * z5 + 16 * z3 + 3 * z) / (96 * std::pow(freedom, 2)) +
-         (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * std::pow(freedom, 3));
-}
-
 Expected<Migration> migrate(const Exam& first, const Exam& second, const MigrationOptions& options) {
   return guarded([&] {
     if (!(options.axes.transpose() * options.axes).isIdentity(1e-6) || !(options.axes.determinant() > 0))

@@ -71,7 +71,4 @@ struct Migration {
 /// loose marker explains it.
 Expected<Migration> migrate(const Exam& first, const Exam& second, const MigrationOptions& options);
 
-/// 97.5 % quantile of Student's t.
-double student_975(double freedom);
-
 }  // namespace helicarm::migration

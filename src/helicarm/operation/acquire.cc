@@ -140,6 +140,7 @@ Expected<void> Operation::take(const std::string& wanted, const receiver::Arriva
     std::erase_if(views_, [&](const View& other) { return other.name == view; });
     views_.push_back({view, arrival.path, arrival.digest, *acquisition, arrival_s, poses});
     std::ranges::sort(views_, {}, [&](const View& v) { return std::ranges::find(plan_.views, v.name); });
+    in_place_.clear();
     record_ended(forget_measurement());
   });
 }

@@ -16,11 +16,33 @@ std::vector<std::string> Operation::checks_to_come(const guidance::Bone& bone) c
   return names;
 }
 
+void Operation::end_plans_to(const guidance::Bone& bone, const Failure& why) {
+  std::vector<std::string> ended;
+  for (const OperationTunnel& tunnel : plan_.tunnels)
+    if (tunnel.bone == bone && gate_.planned(tunnel.name) && !gate_.is_stale(tunnel.name)) {
+      gate_.found_stale(tunnel.name, why);
+      ended.push_back(tunnel.name);
+    }
+  const bool is_guided = gate_.guide() && gate_.guide()->tunnel().bone == bone;
+  const auto guidance = is_guided ? guidance_ended(record::GuidanceEndedBy::check_point) : std::nullopt;
+  if (is_guided) gate_.end_guidance();
+  // The first reason is reported, also where it cannot be recorded.
+  static_cast<void>(guarded([&] {
+    for (const std::string& tunnel : ended) record_halt(tunnel, why);
+    record_ended(guidance);
+  }));
+}
+
+void Operation::check_not_displaced(const guidance::Bone& bone) const {
+  if (const auto moved = displaced_.find(bone); moved != displaced_.end()) throw BadInput(moved->second);
+}
+
 Expected<double> Operation::touch(const std::string& name) {
   return guarded([&]() -> double {
     const auto check = std::ranges::find(plan_.check_points, name, &PlannedCheck::name);
     if (check == plan_.check_points.end())
       throw BadInput(Reason::bad_value, fmt::format("{}: is not a check point of the plan", name));
+    check_not_displaced(check->bone);
     const auto first = touched_in_bone_.find(name);
     if (first == touched_in_bone_.end() && !views_.empty())
       throw BadInput(Reason::usage, fmt::format("{}: must be touched before the first image", name));
@@ -40,9 +62,12 @@ Expected<double> Operation::touch(const std::string& name) {
           "{}: is {:.2f} mm from its position in the frame of the {} marker, limit {:g} mm: the marker moved "
           "on the bone or was assigned to the wrong bone; begin a new operation",
           name, moved.figures.at("off_mm"), plan_.tracker.marker_of(check->bone), check->limit_mm);
+      displaced_.emplace(check->bone, moved);
+      end_plans_to(check->bone, moved);
       throw BadInput(std::move(moved));
     }
-    in_place_.insert(name);
+    // A marker may move until the last image: its tunnels are then located where it was.
+    if (views_to_come().empty()) in_place_.insert(name);
     return *off;
   });
 }

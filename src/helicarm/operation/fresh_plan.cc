@@ -58,6 +58,7 @@ Expected<PlanWatch> Operation::plan_watch(const robot::RobotOrder& order) const 
 Expected<void> Operation::check_plan(const robot::RobotOrder& order) {
   return guarded([&] {
     value_or_throw(recorded());
+    check_not_displaced(tunnel_named(order.name).bone);
     const bool was_stale = gate_.is_stale(order.name);
     const auto may = gate_.may_move(order, tunnel_named(order.name), board_, robot().track(),
                                     tracker::monotonic_seconds());

@@ -42,6 +42,7 @@ Expected<void> Operation::guide(const std::string& name, std::optional<double> o
     const double oldest_pose_s = oldest.value_or(plan_.tracker.oldest_pose_s());
     end_guidance(gate_.is_guidance_stale() ? plan_stale : new_guidance);
     const OperationTunnel& tunnel = tunnel_named(name);
+    check_not_displaced(tunnel.bone);
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
       throw BadInput(Reason::usage, missing.front() + ": touch this check point first");
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");

@@ -95,17 +95,16 @@ guidance::LineError error_of(const guidance::PointInFrames& located, const guida
                              const pipeline::Result& result, const pipeline::Case& the_case,
                              const guidance::ToolLine& line) {
   guidance::PlannedPoint planned{located.in_calibrator, {}};
-  std::vector<geometry::View> views;
   for (std::size_t i = 0; i < result.views.size(); ++i) {
-    views.push_back(result.views[i].calibrated.value().view);
     // Where the bone was at this view's acquisition, as a pick would show it.
     const auto calibrator_from_bone = guidance::calibrator_from(bone, the_case.views[i].poses);
     const guidance::Place* in_bone = located.in(bone);
     planned.uv.push_back(calibrator_from_bone && in_bone
-                             ? std::optional(views.back().project(*calibrator_from_bone * in_bone->point()))
+                             ? std::optional(result.views[i].calibrated.value().view.project(
+                                   *calibrator_from_bone * in_bone->point()))
                              : std::nullopt);
   }
-  return value_or_throw(guidance::distance_to_line(views, planned, line));
+  return value_or_throw(guidance::distance_to_line(pipeline::views_of_bone(result, bone), planned, line));
 }
 
 /// Of a tunnel's end in the tool's frame.
@@ -194,8 +193,12 @@ Json recorded(const CaseRegistration& registration) {
   for (Json& view : json["views"]) view.erase("camera_from_world");
   for (Json& model : json["models"]) {
     model.erase("seconds");
-    for (const char* key : {"acquisitions", "moves_with", "bone_from_model"})
-      model.erase(key);  // follow from other records; sessions of earlier versions lack them
+    // Follow from other records; sessions of earlier versions lack them.
+    for (const char* key : {"acquisitions", "moves_with", "bone_from_model", "by_scale"}) model.erase(key);
+    for (Json& tunnel : model["tunnels"])
+      if (tunnel["bone_check"].is_object())
+        for (const char* key : {"end_sigma_mm", "drilled_end_sigma_mm", "least_sure"})
+          tunnel["bone_check"].erase(key);
   }
   return json;
 }

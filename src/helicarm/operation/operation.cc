@@ -251,6 +251,7 @@ const OperationTunnel& Operation::tunnel_named(const std::string& name) const {
 Expected<robot::RobotOrder> Operation::plan_order(const std::string& name) {
   return guarded([&] {
     const OperationTunnel& tunnel = tunnel_named(name);
+    check_not_displaced(tunnel.bone);
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
       throw BadInput(Reason::usage, fmt::format("{}: touch this check point first", missing.front()));
     if (!result_) throw BadInput(Reason::usage, "no measurement yet");

@@ -74,8 +74,9 @@ class Operation {
 
   /// A check point is touched before the first image and again before each order to a tunnel in its bone. The
   /// first touch records its position; later ones return the tip's distance from it, mm, and refuse
-  /// residual_too_large above its limit: marker and bone no longer correspond, and a new operation is
-  /// required. Refuses as `touched_in_bone`, and a first touch after an image (usage).
+  /// residual_too_large above its limit: marker and bone no longer correspond; plans and guidance to the bone
+  /// end, and a new operation is required. Refuses as `touched_in_bone`, and a first touch after an image
+  /// (usage).
   Expected<double> touch(const std::string& check_point);
   /// Check points to touch before this tunnel is planned.
   std::vector<std::string> checks_to_come(const guidance::Bone& bone) const;
@@ -254,6 +255,9 @@ class Operation {
   // fresh_plan.cc, plan_again.cc
   robot::Watch sees_tool() const;
   robot::Watch in_place(PlanWatch watch) const;
+  void end_plans_to(const guidance::Bone& bone, const Failure& why);
+  /// Throws as the check point that was refused.
+  void check_not_displaced(const guidance::Bone& bone) const;
   /// Without `points_in_bone`.
   PlanBasis basis_of(const OperationTunnel& tunnel, const PoseWindow& window,
                      const robot::RobotState& present) const;
@@ -276,8 +280,9 @@ class Operation {
   ImageDelays delays_;
   std::set<std::string> reported_;
   std::map<std::string, Eigen::Vector3d> touched_in_bone_;  ///< first touch of each check point
-  std::set<std::string> in_place_;                          ///< check points touched since the last order
-  int case_folders_ = 0;                                    ///< written so far
+  std::set<std::string> in_place_;               ///< check points touched since the last image and order
+  std::map<guidance::Bone, Failure> displaced_;  ///< whose marker a check point has refused
+  int case_folders_ = 0;                         ///< written so far
   PlanFiles files_;
   std::optional<pipeline::Result> by_images_;  ///< of the present images
   int calibrations_ = 0, registrations_ = 0;

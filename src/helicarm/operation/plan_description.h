@@ -177,7 +177,8 @@ void describe_lists(Codec& codec, Plan& plan, const std::string& origin) {
       });
   codec.list(
       "check_points", plan.check_points, false, most_tunnels,
-      "points to be touched before the first image and before each order to that bone; they need "
+      "points to be touched before the first image, and after the last one before each order to that bone; "
+      "they need "
       "`tracker.pointer`",
       [&](auto& entry, auto& check) {
         entry.text("name", check.name, "unique");

@@ -28,8 +28,8 @@ inline constexpr std::size_t most_starts = 100;  // one for each model
 inline constexpr std::array<std::string_view, 6> look_words{"plan",   "hand-eye", "correct",
                                                             "verify", "withdraw", "guide"};
 
-inline constexpr std::array<std::string_view, 6> guidance_end_words{"verified",     "person",   "plan_stale",
-                                                                    "new_guidance", "new_plan", "operation"};
+inline constexpr std::array<std::string_view, 7> guidance_end_words{
+    "verified", "person", "plan_stale", "new_guidance", "new_plan", "operation", "check_point"};
 
 template <class Codec, class Text>
 void describe_name(Codec& codec, const char* key, Text& name, const char* help) {
@@ -306,10 +306,11 @@ void describe(Codec& codec, Value& guided, Of<record::Guided>) {
 template <class Codec, class Value>
 void describe(Codec& codec, Value& ended, Of<record::GuidanceEnded>) {
   describe_name(codec, "tunnel", ended.tunnel, "its name");
-  codec.required_choice("by", ended.by, guidance_end_words,
-                        "`verified`; `person`; `plan_stale`: it began again after that decision; "
-                        "`new_guidance`: another began; `new_plan`: images, measurement or registration are "
-                        "others now; `operation`: the operation ended");
+  codec.required_choice(
+      "by", ended.by, guidance_end_words,
+      "`verified`; `person`; `plan_stale`: it began again after that decision; "
+      "`new_guidance`: another began; `new_plan`: images, measurement or registration are "
+      "others now; `operation`: the operation ended; `check_point`: one of its bone was refused");
 }
 
 template <class Codec, class Value>

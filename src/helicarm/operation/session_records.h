@@ -204,7 +204,8 @@ struct Guided {
 };
 
 /// What ended the guidance of a drill. new_plan: images, measurement or registration are others now.
-enum class GuidanceEndedBy { verified, person, plan_stale, new_guidance, new_plan, operation };
+/// check_point: one of its bone was refused.
+enum class GuidanceEndedBy { verified, person, plan_stale, new_guidance, new_plan, operation, check_point };
 std::string_view word_of(GuidanceEndedBy by);
 
 struct GuidanceEnded {

@@ -131,6 +131,11 @@ std::vector<Groove> grooves_of(const Calibrator& calibrator) {
   return grooves;
 }
 
+/// Of the plastic about a ball.
+double seat_radius(const CalibratorBall& ball, const BodyOptions& options) {
+  return ball.diameter_mm / 2 + options.wall_mm / 2;
+}
+
 double azimuth_of(const Eigen::Vector3d& p) { return std::atan2(p.y(), p.x()); }
 
 Expected<void> check_wall(const Calibrator& calibrator, const BodyOptions& options) {
@@ -171,8 +176,7 @@ SignedDistance body_distance(const Calibrator& calibrator, const BodyOptions& op
     double distance = polygon_distance(profile, {p.head<2>().norm(), p.z()});
     if (std::abs(distance) > 25) return distance;
     for (const auto& ball : balls)
-      distance = std::min(
-          distance, (p - ball.centre_in_calibrator).norm() - ball.diameter_mm / 2 - options.wall_mm / 2);
+      distance = std::min(distance, (p - ball.centre_in_calibrator).norm() - seat_radius(ball, options));
     for (const auto& facet : facets) distance = std::min(distance, facet.distance(p));
     for (const auto& groove : grooves) distance = std::max(distance, -groove.distance(p, cone, options));
     for (const auto& ball : balls)
@@ -186,24 +190,47 @@ BodyShape suitable_shape(const Calibrator& calibrator, const BodyOptions& option
   return check_wall(calibrator, options) ? BodyShape::cone : BodyShape::rings;
 }
 
+namespace {
+
+/// The surface is followed through a grid of so many points: minutes.
+constexpr double most_grid_points = 5e8;
+
+Eigen::AlignedBox3d cone_box(const Calibrator& calibrator, const BodyOptions& options) {
+  const double reach = Cone(options).radius(-options.flange_depth_mm) + options.flange_width_mm;
+  Eigen::AlignedBox3d box(Eigen::Vector3d(-reach, -reach, -options.flange_depth_mm),
+                          Eigen::Vector3d(reach, reach, options.height_mm));
+  for (const CalibratorBall& ball : calibrator.balls) {
+    const Eigen::Vector3d seat = Eigen::Vector3d::Constant(seat_radius(ball, options));
+    box.extend(ball.centre_in_calibrator - seat);
+    box.extend(ball.centre_in_calibrator + seat);
+  }
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(2 * options.step_mm);
+  return {box.min() - margin, box.max() + margin};
+}
+
+}  // namespace
+
 Expected<TriangleMesh> printable_body(const Calibrator& calibrator, const BodyOptions& options) {
   const auto checked =
       check_range("step_mm", options.step_mm, 0.2, 3)
           .and_then([&] { return check_range("clearance_mm", options.clearance_mm, -0.5, 2); })
           .and_then([&]() -> Expected<void> {
             if (options.shape == BodyShape::cone) return check_wall(calibrator, options);
-            return options.shape == BodyShape::plate ? check_posts(calibrator, options) : Expected<void>();
+            return options.shape == BodyShape::plate ? check_posts(calibrator, options)
+                                                     : check_pockets(calibrator, options);
           });
   if (!checked) return tl::unexpected<Failure>(checked.error());
-  if (options.shape != BodyShape::cone)
-    return simplified(
-        surface_of(body_distance(calibrator, options), open_body_box(calibrator, options), options.step_mm),
-        simplified_within_mm);
-  const Cone cone(options);
-  const double reach = cone.radius(-options.flange_depth_mm) + options.flange_width_mm + 2 * options.step_mm;
-  const Eigen::AlignedBox3d box(
-      Eigen::Vector3d(-reach, -reach, -options.flange_depth_mm - 2 * options.step_mm),
-      Eigen::Vector3d(reach, reach, options.height_mm + 2 * options.step_mm));
+  const Eigen::AlignedBox3d box =
+      options.shape == BodyShape::cone ? cone_box(calibrator, options) : open_body_box(calibrator, options);
+  const double points = (box.sizes() / options.step_mm).prod();
+  if (points > most_grid_points)
+    return fail(
+        Reason::bad_value,
+        fmt::format("{}: a body of {:.0f} x {:.0f} x {:.0f} mm in steps of {:g} mm is too large: a step "
+                    "of {:.2g} mm or more would do",
+                    calibrator.name, box.sizes().x(), box.sizes().y(), box.sizes().z(), options.step_mm,
+                    std::ceil(100 * std::cbrt(box.volume() / most_grid_points)) / 100),
+        {{"step_mm", options.step_mm}});
   return simplified(surface_of(body_distance(calibrator, options), box, options.step_mm),
                     simplified_within_mm);
 }

@@ -155,6 +155,24 @@ Eigen::AlignedBox3d open_body_box(const Calibrator& calibrator, const BodyOption
   return {box.min() - margin, box.max() + margin};
 }
 
+Expected<void> check_pockets(const Calibrator& calibrator, const BodyOptions& options) {
+  const Axis axis(calibrator);
+  for (const CalibratorBall& pocketed : calibrator.balls)
+    for (const CalibratorBall& seated : calibrator.balls) {
+      if (&pocketed == &seated) continue;
+      const double apart = pocket_distance(pocketed, axis.outward(pocketed.centre_in_calibrator),
+                                           options.clearance_mm, seated.centre_in_calibrator);
+      if (apart < seated.diameter_mm / 2)
+        return fail(
+            Reason::bad_value,
+            fmt::format("{}: the pocket of {} passes {} within {:.1f} mm of its centre, at least {:.1f} "
+                        "mm are needed: choose --body plate, or move a ball",
+                        calibrator.name, pocketed.label, seated.label, apart, seated.diameter_mm / 2),
+            {{"apart_mm", apart}, {"needed_mm", seated.diameter_mm / 2}});
+    }
+  return {};
+}
+
 Expected<void> check_posts(const Calibrator& calibrator, const BodyOptions& options) {
   for (const CalibratorBall& upper : calibrator.balls)
     for (const CalibratorBall& lower : calibrator.balls) {

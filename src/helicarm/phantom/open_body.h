@@ -13,6 +13,9 @@ SignedDistance open_body_distance(const Calibrator& calibrator, const BodyOption
 /// Around such a body, with two steps of margin.
 Eigen::AlignedBox3d open_body_box(const Calibrator& calibrator, const BodyOptions& options);
 
+/// Refuses (bad_value) a ball of rings into whose seat another one's pocket reaches.
+Expected<void> check_pockets(const Calibrator& calibrator, const BodyOptions& options);
+
 /// Refuses (bad_value) a ball that a post of the plate would pass or block.
 Expected<void> check_posts(const Calibrator& calibrator, const BodyOptions& options);
 

@@ -120,7 +120,8 @@ std::vector<std::optional<Observed>> observe(const pipeline::RectifiedView& dete
       const double px_per_mm = std::abs(pose.intrinsics.fy) / depth;
       detection::Dot start;
       start.centre_px = map.raw_from_rectified(predicted);
-      start.radius_px = diameters_mm[ball] / 2 * px_per_mm;
+      const double raw_px_per_mm = px_per_mm * std::sqrt(std::abs(map.jacobian(predicted).determinant()));
+      start.radius_px = diameters_mm[ball] / 2 * raw_px_per_mm;
       const detection::Dot expected = start;
       const bool has_candidate = candidate_of[ball] >= 0;
       if (has_candidate) start = prepared.dots[std::size_t(candidate_of[ball])];
@@ -134,7 +135,7 @@ std::vector<std::optional<Observed>> observe(const pipeline::RectifiedView& dete
       if (!uv) continue;
       const auto error = pipeline::diameter_error(fitted[0].radius_px, xray_image.acquisition.logarithmic);
       observed[ball] = Observed{raw, *uv, std::hypot(fitted[0].error_px(), sigma_floor_px),
-                                2 * fitted[0].radius_px / (1 + error.bias) / px_per_mm, error.sigma};
+                                2 * fitted[0].radius_px / (1 + error.bias) / raw_px_per_mm, error.sigma};
     }
   }
   return observed;

@@ -45,9 +45,11 @@ double nominal_rms(const PhantomResult& result) {
   return std::sqrt(sum / double(result.balls.size()));
 }
 
+/// Without the scale, which is common to all balls.
 double measured_rms(const PhantomResult& result) {
   double sum = 0;
-  for (const MeasuredBall& ball : result.balls) sum += ball.covariance_mm2.trace();
+  for (const Eigen::Matrix3d& covariance : phantom::ball_covariances(result.calibrator))
+    sum += covariance.trace();
   return std::sqrt(sum / double(result.balls.size()));
 }
 

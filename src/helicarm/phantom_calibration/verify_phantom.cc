@@ -119,10 +119,12 @@ std::optional<Place> place_of(const BundleProblem& problem, std::size_t ball, st
 }
 
 /// Balls that are off, and those whose images are of something else, are taken out one by one, the farthest
-/// first, so that they do not disturb the others.
+/// first, so that they do not disturb the others. `kept_though_moved`: one that contradicts the others, which
+/// are too few to tell it from them.
 std::vector<std::optional<Place>> places_of(const BundleProblem& problem, const AdjustedViews& found,
                                             const std::vector<Eigen::Matrix3d>& covariances,
-                                            std::vector<bool>& out, unsigned threads) {
+                                            std::vector<bool>& out,
+                                            std::optional<std::size_t>& kept_though_moved, unsigned threads) {
   const std::size_t n = problem.centres.size();
   std::vector<std::optional<Place>> places(n);
   const auto contradiction = [&](std::size_t ball) {
@@ -141,7 +143,11 @@ std::vector<std::optional<Place>> places_of(const BundleProblem& problem, const 
       if (!out[ball] && places[ball] && contradiction(ball) > std::pair(0.0, 0.0) &&
           (!worst || contradiction(ball) > contradiction(*worst)))
         worst = ball;
-    if (!worst || n - std::size_t(std::ranges::count(out, true)) <= least_kept) break;
+    if (!worst) break;
+    if (n - std::size_t(std::ranges::count(out, true)) <= least_kept) {
+      if (places[*worst]->is_moved) kept_though_moved = worst;
+      break;
+    }
     out[*worst] = true;
   }
   return places;
@@ -188,13 +194,14 @@ bool is_swapped(const phantom::CalibratorBall& ball, const phantom::Calibrator& 
     const pipeline::RectifiedView& image = detected[view_of_case[v]];
     const rectification::DistortionMap& map = image.rectification.map;
     const Eigen::Vector2d uv = views[v].project(ball.centre_in_calibrator);
-    const double px_per_mm = views[v].intrinsics.fy / views[v].depth(ball.centre_in_calibrator);
+    const double px_per_mm = std::abs(views[v].intrinsics.fy) / views[v].depth(ball.centre_in_calibrator);
     for (const detection::Dot& dot : fiducials::ball_candidates(image.dots, image.rectification)) {
       const auto at = map.rectified_from_raw(dot.centre_px);
       if (!at || (*at - uv).norm() > reach_px) continue;
+      const double raw_px_per_mm = px_per_mm * std::sqrt(std::abs(map.jacobian(*at).determinant()));
       seen += std::ranges::any_of(file.balls, [&](const phantom::CalibratorBall& other) {
         return other.diameter_mm != ball.diameter_mm &&
-               std::abs(std::log(2 * dot.radius_px / px_per_mm / other.diameter_mm)) < alike;
+               std::abs(std::log(2 * dot.radius_px / raw_px_per_mm / other.diameter_mm)) < alike;
       });
     }
   }
@@ -284,7 +291,8 @@ void describe(const AdjustedViews& found, const pipeline::Case& the_case,
   const auto covariances = phantom::ball_covariances(the_case.calibrator);
   BundleProblem problem = with_file_centres(found, the_case.calibrator, covariances);
   std::vector<bool> out(problem.centres.size(), false);
-  const auto places = places_of(problem, found, covariances, out, threads);
+  std::optional<std::size_t> kept_though_moved;
+  const auto places = places_of(problem, found, covariances, out, kept_though_moved, threads);
   BundleOptions fixed;
   fixed.fixed_centres = true;
   const auto fit = adjust(without(problem, out), fixed);
@@ -313,6 +321,18 @@ void describe(const AdjustedViews& found, const pipeline::Case& the_case,
     result.balls.push_back(std::move(verified));
   }
   judge(result);
+  if (kept_though_moved && !result.failure) {
+    const VerifiedBall& ball = result.balls[found.ball_of_nominal[*kept_though_moved]];
+    const std::string by = ball.distance_mm ? fmt::format(" (by {:.2f} mm)", *ball.distance_mm) : "";
+    result.failure = Failure{
+        Reason::calibrator_mismatch,
+        fmt::format(
+            "a ball is not at its position in the file, most likely {}{}: the others, {}, are too few "
+            "to tell which one; measure the phantom again with `helicarm phantom measure`",
+            ball.label, by, std::ranges::count(out, false) - 1),
+        {},
+        {{"distance_mm", ball.distance_mm.value_or(0)}}};
+  }
 }
 
 }  // namespace

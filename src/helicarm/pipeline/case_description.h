@@ -60,7 +60,9 @@ template <class Codec, class Line>
 void describe_tool_line(Codec& codec, Line& line) {
   codec.text("name", line.name, "unique");
   codec.text("tunnel", line.tunnel, "name of a tunnel");
-  codec.vector("p1_in_calibrator", line.p1_in_calibrator, place_range, "point on the instrument's axis");
+  codec.vector("p1_in_calibrator", line.p1_in_calibrator, place_range,
+               "point on the instrument's axis; of one that was measured beside a bone, where it was at the "
+               "first view's acquisition");
   codec.vector("p2_in_calibrator", line.p2_in_calibrator, place_range, "another, at least 1 mm apart");
 }
 

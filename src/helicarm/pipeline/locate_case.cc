@@ -130,7 +130,7 @@ Expected<Result> locate_case(const Case& the_case, std::shared_ptr<const CaseCal
                         .and_then([&] { return plan_tunnels(the_case, result); })  // Eq. 16
                         .and_then([&](std::vector<guidance::Tunnel> tunnels) {
                           result.tunnels = std::move(tunnels);
-                          return verify_tool_lines(the_case, calibration.views, result);  // Eq. 17
+                          return verify_tool_lines(the_case, result);  // Eq. 17
                         })
                         .and_then([&](std::vector<guidance::Verification> verifications) {
                           append(result.warnings, lines_off_plan(verifications), Stage::locate);

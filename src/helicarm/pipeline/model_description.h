@@ -74,10 +74,11 @@ void describe_mask(Codec& codec, const std::string& key, Mask& mask, const std::
                     .c_str());
   codec.text(segment.c_str(), mask.segment,
              "the same by the segment's label in a DICOM segmentation, such as `\"Femur\"`");
-  codec.number(threshold.c_str(), mask.threshold, {0.01, 1},
-               ("share from which a voxel of a fractional DICOM segmentation is of " + what +
-                ". It must be given of such a one, and only of it")
-                   .c_str());
+  codec.number(
+      threshold.c_str(), mask.threshold, {0.01, 1},
+      ("share from which a voxel of a fractional DICOM segmentation, or of a mask that holds shares, is of " +
+       what + ". It must be given of such a one, and only of it")
+          .c_str());
   codec.check([&](JsonReader& reader) {
     for (const auto& [is_given, part] :
          {std::pair(mask.label.has_value(), label), std::pair(mask.segment.has_value(), segment),

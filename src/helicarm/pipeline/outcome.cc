@@ -78,18 +78,18 @@ Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& the_case, const
   });
 }
 
-Expected<std::vector<guidance::Verification>> verify_tool_lines(
-    const Case& the_case, const std::vector<calibration::CalibratedView>& calibrated, const Result& result) {
-  std::vector<geometry::View> views;
-  for (const calibration::CalibratedView& view : calibrated) views.push_back(view.view);
+Expected<std::vector<guidance::Verification>> verify_tool_lines(const Case& the_case, const Result& result) {
   return guarded([&] {
     std::vector<guidance::Verification> verifications;
     for (const guidance::ToolLine& line : the_case.tool_lines) {
       const auto plan =
           std::ranges::find(the_case.tunnels, line.tunnel, &CaseTunnel::name) - the_case.tunnels.begin();
       const TunnelEnds& ends = result.tunnel_ends[static_cast<std::size_t>(plan)];
-      verifications.push_back({line.name, error_at(result.points[ends.start], views, line),
-                               error_at(result.points[ends.end], views, line)});
+      const auto error_of = [&](std::size_t end) {
+        const PointResult& point = result.points[end];
+        return error_at(point, views_of_bone(result, point.moves_with), line);
+      };
+      verifications.push_back({line.name, error_of(ends.start), error_of(ends.end)});
     }
     return verifications;
   });

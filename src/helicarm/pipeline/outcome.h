@@ -22,9 +22,9 @@ std::vector<TunnelEnds> tunnel_ends(const std::vector<CaseTunnel>& plans,
 /// Eq. 16; a tunnel with an unlocated end has only a name. Refuses as `plan_tunnel`.
 Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& the_case, const Result& result);
 
-/// Eq. 17; unlocated ends are omitted. Refuses as `distance_to_line`.
-Expected<std::vector<guidance::Verification>> verify_tool_lines(
-    const Case& the_case, const std::vector<calibration::CalibratedView>& views, const Result& result);
+/// Eq. 17, with the line where it was beside the bone at each view's acquisition; unlocated ends are omitted.
+/// Refuses as `distance_to_line`.
+Expected<std::vector<guidance::Verification>> verify_tool_lines(const Case& the_case, const Result& result);
 
 /// Tool lines that pass an end of their tunnel at more than `most_off_plan_mm` (off_target).
 std::vector<Warning> lines_off_plan(const std::vector<guidance::Verification>& verifications);

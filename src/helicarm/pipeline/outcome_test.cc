@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "helicarm/geometry/rotation.h"
+
 namespace helicarm::pipeline {
 namespace {
 
@@ -76,6 +78,26 @@ TEST(CheckCertain, ScaleSigmaIsNamedWhereItCausesMostOfTheError) {
   ASSERT_TRUE(otherwise);
   ASSERT_EQ(otherwise->size(), 1U);
   EXPECT_EQ((*otherwise)[0].message.find("scale_sigma"), std::string::npos);
+}
+
+TEST(ViewsOfBone, ShowWhatMovesWithTheBoneWhereItWasAtTheFirstView) {
+  Result result;
+  result.views.resize(2);
+  const geometry::RigidTransform poses[] = {{geometry::rotation_from_vector({0.1, 0, 0}), {0, 0, 5}},
+                                            {geometry::rotation_from_vector({0, 0.2, 0.1}), {3, -4, 6}}};
+  for (int i = 0; i < 2; ++i) {
+    ViewResult& view = result.views[std::size_t(i)];
+    view.calibrated.emplace().view = {{4000, 4000, 500, 500, 0},
+                                      {geometry::rotation_from_vector({0, 1.5 * i, 0}), {0, 0, 900}}};
+    view.calibrator_from_bone["femur"] = poses[i];
+  }
+  const Eigen::Vector3d in_bone(10, -20, 15);
+  const auto views = views_of_bone(result, "femur");
+  const Eigen::Vector2d seen = result.views[1].calibrated->view.project(poses[1] * in_bone);
+  EXPECT_LT((views[1].project(poses[0] * in_bone) - seen).norm(), 1e-9);
+  EXPECT_GT((views_of_bone(result, {})[1].project(poses[0] * in_bone) - seen).norm(), 5);
+  EXPECT_EQ(views_of_bone(result, "tibia")[1].camera_from_world.matrix(),
+            result.views[1].calibrated->view.camera_from_world.matrix());
 }
 
 }  // namespace

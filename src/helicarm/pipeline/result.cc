@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/pipeline/result.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -294,6 +295,23 @@ void describe_result(Output& output, const Result& result) {
 }
 
 }  // namespace
+
+geometry::View view_of_bone(const Result& result, std::size_t index,
+                            const std::optional<guidance::Bone>& bone) {
+  geometry::View view = result.views[index].calibrated.value().view;
+  if (index == 0 || !bone) return view;
+  const auto &first = result.views.front().calibrator_from_bone,
+             &seen = result.views[index].calibrator_from_bone;
+  if (const auto then = first.find(*bone), now = seen.find(*bone); then != first.end() && now != seen.end())
+    view.camera_from_world = view.camera_from_world * now->second * then->second.inverse();
+  return view;
+}
+
+std::vector<geometry::View> views_of_bone(const Result& result, const std::optional<guidance::Bone>& bone) {
+  std::vector<geometry::View> views;
+  for (std::size_t i = 0; i < result.views.size(); ++i) views.push_back(view_of_bone(result, i, bone));
+  return views;
+}
 
 Eigen::MatrixXd joint_covariance(const Result& result) {
   return result.calibration ? result.calibration->joint_covariance : Eigen::MatrixXd();

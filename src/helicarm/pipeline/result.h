@@ -148,6 +148,13 @@ struct Result {
 /// Of all views' parameters (`Calibration::joint_covariance`); empty: not computed.
 Eigen::MatrixXd joint_covariance(const Result& result);
 
+/// A calibrated view as if what moves with this bone had stayed where it was at the first view's acquisition,
+/// where points and tool lines are given. Without a bone, or its pose in both views: the view itself.
+geometry::View view_of_bone(const Result& result, std::size_t index,
+                            const std::optional<guidance::Bone>& bone);
+/// All of them, which must be calibrated.
+std::vector<geometry::View> views_of_bone(const Result& result, const std::optional<guidance::Bone>& bone);
+
 /// result.json (docs/formats.md): all keys, null if not computed.
 Json to_json(const Result& result);
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <numbers>
 
 #include <Eigen/Geometry>
@@ -20,6 +22,8 @@ constexpr int sectors = 72;
 constexpr double reach_mm = 60;    // of the wall's surroundings
 constexpr double beyond_mm = 300;  // the line is followed behind its ends
 constexpr double open_start_mm = 5, open_end_mm = 1;
+constexpr double axis_part_mm = 10;  // of the axis, whose nearest place is kept in each direction
+constexpr double least_ahead_cosine = 0.5;
 constexpr double interruption_mm = 1.5;  // of an opening's face, by steps of a mask
 const double one_face_cosine = std::cos(30 * std::numbers::pi / 180);  // within the section
 const double same_face_cosine = std::cos(60 * std::numbers::pi / 180);
@@ -185,22 +189,41 @@ class Check {
         if (is_face(hits[std::size_t(i)], *entry_, frame_.axis)) first = i + 1;
       for (int i = n - 1; exit_ && i >= 0 && last - i <= interruption; --i)
         if (is_face(hits[std::size_t(i)], *exit_, -frame_.axis)) last = i - 1;
+      std::map<int, Hit> nearest;
       for (int i = first; i <= last; ++i)
         if (const auto& hit = hits[std::size_t(i)])
-          take(check, hit->radius_mm - radius(), depth(i),
-               at(from + depth(i)) + hit->radius_mm * frame_.spoke(sector),
-               hit->normal.value_or(frame_.spoke(sector)));
+          keep_nearer(nearest[int(depth(i) / axis_part_mm)],
+                      {hit->radius_mm - radius(), depth(i),
+                       at(from + depth(i)) + hit->radius_mm * frame_.spoke(sector),
+                       hit->normal.value_or(frame_.spoke(sector))});
+      for (const auto& [part, hit] : nearest) take(check, hit);
     }
   }
 
-  void take(BoneCheck& check, double bridge, double depth, const Vector3d& place,
-            const Vector3d& normal) const {
-    if (check.bridge_mm && bridge >= *check.bridge_mm) return;
-    check.bridge_mm = bridge;
-    check.sigma_mm = check.drilled_sigma_mm = bone_.sigma_mm(place);
-    check.at_mm = depth;
-    check.thinnest = at(entry_->at_mm + depth);
-    check.outward = normal;
+  /// Surface beside the wall or ahead of the end.
+  struct Hit {
+    double distance_mm = std::numeric_limits<double>::infinity(), at_mm = 0;
+    Vector3d place = Vector3d::Zero(), outward = Vector3d::Zero();
+  };
+
+  static void keep_nearer(Hit& nearest, const Hit& hit) {
+    if (hit.distance_mm < nearest.distance_mm) nearest = hit;
+  }
+
+  guidance::WallPlace place_of(const Hit& hit) const {
+    const double sigma = bone_.sigma_mm(hit.place);
+    return {hit.distance_mm, sigma, sigma, hit.at_mm, at(entry_->at_mm + hit.at_mm), hit.outward};
+  }
+
+  void take(BoneCheck& check, const Hit& hit) const {
+    if (!std::isfinite(hit.distance_mm)) return;
+    const guidance::WallPlace& place = check.wall.emplace_back(place_of(hit));
+    if (check.bridge_mm && place.distance_mm >= *check.bridge_mm) return;
+    check.bridge_mm = place.distance_mm;
+    check.sigma_mm = check.drilled_sigma_mm = place.sigma_mm;
+    check.at_mm = place.at_mm;
+    check.thinnest = place.on_axis;
+    check.outward = place.outward;
   }
 
   /// Bone ahead of a blind end, and walls that close in beyond it.
@@ -211,12 +234,19 @@ class Check {
         const Vector3d from = at(to) + share * radius() * frame_.spoke(i, around);
         const auto found = bone_.crossings(from, frame_.axis, reach_mm, 1);
         if (found.empty()) continue;
-        const double ahead = found.front().leaves ? found.front().at_mm : 0;
-        if (check.end_mm && ahead >= *check.end_mm) continue;
-        check.end_mm = ahead;
-        check.end_sigma_mm = bone_.sigma_mm(from + found.front().at_mm * frame_.axis);
+        const Crossing& surface = found.front();
+        const double cosine = std::max(std::abs(surface.normal.dot(frame_.axis)), least_ahead_cosine);
+        guidance::WallPlace& place =
+            check.ahead.emplace_back(place_of({surface.leaves ? surface.at_mm : 0, to - entry_->at_mm,
+                                               from + surface.at_mm * frame_.axis, surface.normal / cosine}));
+        place.sigma_mm /= cosine;
+        place.drilled_sigma_mm /= cosine;
+        if (check.end_mm && place.distance_mm >= *check.end_mm) continue;
+        check.end_mm = place.distance_mm;
+        check.end_sigma_mm = check.drilled_end_sigma_mm = place.sigma_mm;
       }
-    for (int sector = 0; sector < sectors; sector += 2)
+    for (int sector = 0; sector < sectors; sector += 2) {
+      Hit nearest;
       for (double angle = 5; angle < 90; angle += 5) {
         const Vector3d way =
             std::sin(angle / deg) * frame_.spoke(sector) + std::cos(angle / deg) * frame_.axis;
@@ -224,9 +254,11 @@ class Check {
         if (!hit || !hit->normal || hit->normal->dot(frame_.axis) > std::numbers::sqrt2 / 2) continue;
         const double across = hit->radius_mm * std::sin(angle / deg) - radius();
         if (across > 0)
-          take(check, std::hypot(across, hit->radius_mm * std::cos(angle / deg)), to - entry_->at_mm,
-               at(to) + hit->radius_mm * way, *hit->normal);
+          keep_nearer(nearest, {std::hypot(across, hit->radius_mm * std::cos(angle / deg)),
+                                to - entry_->at_mm, at(to) + hit->radius_mm * way, *hit->normal});
       }
+      take(check, nearest);
+    }
   }
 
   const BoneSurface& bone_;

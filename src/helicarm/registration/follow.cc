@@ -81,7 +81,8 @@ Registration Follower::next(const std::vector<RegistrationView>& views, double t
   }
   if (part_not_explained_ && !result.failure && !result.anywhere &&
       std::ranges::none_of(result.warnings, is_of_part_not_explained)) {
-    result.warnings.push_back(*part_not_explained_);
+    result.warnings.push_back(part_not_explained_->first);
+    result.not_explained = part_not_explained_->second;
     result.decision = Decision::warn;
   }
   take(result, time);
@@ -96,7 +97,7 @@ void Follower::take(const Registration& result, double time) {
   refused_ = 0;
   if (const auto warning = std::ranges::find_if(result.warnings, is_of_part_not_explained);
       warning != result.warnings.end())
-    part_not_explained_ = *warning;
+    part_not_explained_ = {*warning, result.not_explained};
   else
     part_not_explained_.reset();
   before_ = result.anywhere ? std::nullopt : last_;

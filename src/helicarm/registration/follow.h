@@ -39,9 +39,10 @@ class Follower {
   Registration near(const std::vector<RegistrationView>& views,
                     const geometry::RigidTransform& expected) const;
 
-  std::optional<Timed> last_, before_;         ///< the newest two that were not refused, of one motion
-  unsigned refused_ = 0;                       ///< in a row
-  std::optional<Warning> part_not_explained_;  ///< of the motion: later images tell less of it
+  std::optional<Timed> last_, before_;  ///< the newest two that were not refused, of one motion
+  unsigned refused_ = 0;                ///< in a row
+  /// Of the motion: later images tell less of it.
+  std::optional<std::pair<Warning, std::optional<NotExplained>>> part_not_explained_;
 };
 
 /// A body's pose in the coordinates of another, the reference.

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/small_matrix.h"
@@ -56,7 +57,7 @@ Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& l
   result.world_from_model.translation = world_mean - result.world_from_model.rotation * model_mean;
   result.centre = world_mean;
   double stated = 0;
-  RigidCovariance information = RigidCovariance::Zero();
+  RigidCovariance information = RigidCovariance::Zero(), by_picks = RigidCovariance::Zero();
   Eigen::MatrixXd by_cameras = Eigen::MatrixXd::Zero(6, camera_covariance.cols());
   for (const Landmark& landmark : landmarks) {
     const Vector3d at = result.world_from_model * landmark.in_model;
@@ -67,15 +68,19 @@ Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& l
     Eigen::Matrix<double, 3, 6> by_step;
     by_step << -geometry::cross_matrix(at - world_mean), Matrix3d::Identity();
     information += by_step.transpose() * by_step;
+    by_picks += by_step.transpose() * landmark.covariance_in_world * by_step;
     if (landmark.by_cameras.size() > 0) by_cameras += by_step.transpose() * landmark.by_cameras;
   }
   result.fre_mm = std::sqrt(result.fre_mm);
   // <FRE^2> = (1 - 2/n) <FLE^2>.
   result.fle_mm = std::sqrt(std::max(stated, result.fre_mm * result.fre_mm / (1 - 2 / n)));
+  // What the picks do not account for is known by few residuals.
+  const double few = std::pow(student_975(3 * n - 6) / normal_at_975, 2);
+  const double placing = few * (result.fle_mm * result.fle_mm - stated) / 3;
   const RigidCovariance inverse = geometry::inverse(information);
   const Eigen::MatrixXd gain = inverse * by_cameras;
   result.covariance =
-      result.fle_mm * result.fle_mm / 3 * inverse + gain * camera_covariance * gain.transpose();
+      inverse * (by_picks + placing * information) * inverse + gain * camera_covariance * gain.transpose();
   return result;
 }
 

@@ -27,8 +27,9 @@ struct LandmarkRegistration {
   std::vector<double> residuals_mm;     ///< FRE of each
   double fre_mm = 0;                    ///< rms
   double fle_mm = 0;                    ///< rms; from the residuals or from the covariances, the larger
-  /// About `centre`: gives the TRE of Fitzpatrick, West and Maurer (1998); with the errors of the cameras
-  /// that the landmarks share.
+  /// About `centre`: of the picks' own covariances, and of what these leave unexplained of the residuals
+  /// (Fitzpatrick, West and Maurer 1998), widened so that 95 % limits are Student's of 3 n - 6 degrees of
+  /// freedom; with the errors of the cameras that the landmarks share.
   RigidCovariance covariance;
 };
 

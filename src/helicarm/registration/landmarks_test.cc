@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "helicarm/core/random.h"
+#include "helicarm/core/statistics.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::registration {
@@ -32,18 +33,51 @@ TEST(Landmarks, ExactOnesGiveTheExactPose) {
   EXPECT_LT(result->fre_mm, 1e-9);
 }
 
-TEST(Landmarks, PredictedTreIsTheScatterAtATarget) {
-  const Vector3d target(20, 20, -60);
-  double actual = 0, predicted = 0, fle = 0;
+TEST(Landmarks, StatedErrorAtATargetCoversItsScatterThoughResidualsAreFew) {
+  const Vector3d target(20, 20, -60), at = true_landmark_pose * target;
+  double actual = 0, predicted = 0, fle = 0, within = 0;
   constexpr int trials = 2000;
   for (std::uint64_t trial = 0; trial < trials; ++trial) {
     const auto result = register_landmarks(landmarks(0.5, trial));
-    actual += (result->world_from_model * target - true_landmark_pose * target).squaredNorm() / trials;
-    predicted += std::pow(predicted_tre_mm(*result, true_landmark_pose * target), 2) / trials;
+    const Vector3d error = result->world_from_model * target - at;
+    actual += error.squaredNorm() / trials;
+    predicted += std::pow(predicted_tre_mm(*result, at), 2) / trials;
     fle += result->fle_mm * result->fle_mm / trials;
+    const Eigen::Matrix3d stated = point_covariance(result->covariance, result->centre, at);
+    for (int axis = 0; axis < 3; ++axis)
+      within += (std::abs(error[axis]) < normal_at_975 * std::sqrt(stated(axis, axis))) / (3.0 * trials);
   }
   EXPECT_NEAR(std::sqrt(fle), 0.5 * std::sqrt(3.0), 0.03);
-  EXPECT_NEAR(std::sqrt(predicted), std::sqrt(actual), 0.06 * std::sqrt(actual));
+  // Four landmarks leave six degrees of freedom.
+  const double few = student_975(6) / normal_at_975;
+  EXPECT_NEAR(std::sqrt(predicted), few * std::sqrt(actual), 0.06 * std::sqrt(actual));
+  EXPECT_NEAR(within, 0.95, 0.01);
+}
+
+/// Rays that cross at a small angle: each pick is known worse along the depth.
+TEST(Landmarks, CovarianceHasTheDirectionsOfThePicks) {
+  const Eigen::Matrix3d of_pick = Vector3d(0.05, 0.05, 0.64).asDiagonal();
+  std::vector<Landmark> exact = landmarks(0, 0);
+  RigidCovariance drawn = RigidCovariance::Zero(), stated = RigidCovariance::Zero();
+  constexpr int trials = 4000;
+  RandomStream stream(5, 1);
+  for (int trial = 0; trial < trials; ++trial) {
+    std::vector<Landmark> picked = exact;
+    for (Landmark& landmark : picked) {
+      landmark.covariance_in_world = of_pick;
+      for (int axis = 0; axis < 3; ++axis)
+        landmark.in_world[axis] += std::sqrt(of_pick(axis, axis)) * stream.normal();
+    }
+    const auto found = register_landmarks(picked);
+    const RigidStep error = step_about(true_landmark_pose, found->world_from_model, found->centre);
+    drawn += error * error.transpose() / trials;
+    stated += found->covariance / trials;
+  }
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_GT(stated(i, i), 0.93 * drawn(i, i)) << i;  // and what few residuals cannot exclude
+    EXPECT_LT(stated(i, i), 4 * drawn(i, i)) << i;
+  }
+  EXPECT_GT(stated(5, 5), 3 * stated(3, 3));
 }
 
 TEST(Landmarks, TwoAreRefused) {

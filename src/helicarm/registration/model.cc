@@ -173,7 +173,7 @@ Density filled(const phantom::TriangleMesh& mesh, double voxel_mm) {
 }  // namespace
 
 Expected<void> check_mask(const std::string& name, const volume::Volume& volume, const volume::Volume& mask) {
-  if (mask.size != volume.size || !mask.patient_from_voxel.isApprox(volume.patient_from_voxel, 1e-3))
+  if (!volume::is_same_grid(mask, volume))
     return fail(Reason::bad_value,
                 fmt::format("{}: the mask has {} x {} x {} voxels, the volume {} x {} x {}, or they lie "
                             "elsewhere; resample the mask to the volume",

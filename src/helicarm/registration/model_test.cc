@@ -55,6 +55,17 @@ TEST(ModelFrom, MaskOfAnotherGridIsRefused) {
   EXPECT_EQ(model.error().reason, Reason::bad_value);
 }
 
+TEST(ModelFrom, MaskOfAnotherGridIsRefusedFarFromTheOriginToo) {
+  volume::Volume volume = block({1, 1, 1});
+  volume.patient_from_voxel.translation() << -250, -250, -900;
+  volume::Volume shifted = volume, stretched = volume;
+  shifted.patient_from_voxel.translation().x() += 0.5;
+  stretched.patient_from_voxel.linear().col(2) *= 1.5;
+  for (const volume::Volume& mask : {shifted, stretched})
+    EXPECT_THAT(model_from("block", volume, mask, std::nullopt).error().message,
+                testing::HasSubstr("or they lie elsewhere"));
+}
+
 TEST(ModelFrom, ACtAsItsOwnMaskIsRefused) {
   const volume::Volume volume = block({1, 1, 1});
   EXPECT_THAT(model_from("block", volume, volume, std::nullopt).error().message,

@@ -141,6 +141,11 @@ SurfaceFile ply_surface(std::string_view bytes, const std::string& origin) {
   SurfaceFile file;
   file.declares = header.comments;
   for (const PlyElement& element : header.elements) {
+    if (element.properties.empty() && element.count > 0)
+      throw BadInput(Reason::bad_value, fmt::format("{}: {} elements \"{}\" without a property", origin,
+                                                    element.count, element.name));
+    if (element.name == "vertex")
+      check_triangles(double(file.mesh.corners.size() + element.count) / 3, origin);
     if (element.name == "tristrips" && element.count > 0)
       throw BadInput(Reason::unsupported,
                      fmt::format("{}: triangle strips; save the surface as triangles", origin));

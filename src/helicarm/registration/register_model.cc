@@ -214,6 +214,14 @@ Search searched_anywhere(RegistrationProblem& scene, const Everywhere& everywher
   return made;
 }
 
+/// Whether the errors of every camera are.
+bool are_known(const MatrixXd& cameras) {
+  constexpr Eigen::Index n = calibration::view_parameters;
+  for (Eigen::Index i = 0; i < cameras.rows(); i += n)
+    if (cameras.block(i, i, n, n).isZero(0)) return false;
+  return true;
+}
+
 Search searched_about(RegistrationProblem& scene, const std::vector<RigidTransform>& starts,
                       const SearchOptions& options) {
   Search made{stages_for(scene, starts.front() * scene.model().centre), {}};
@@ -311,8 +319,10 @@ Registration registered(const Model& model, const std::vector<RegistrationView>&
     result.mirrored_ratio =
         mirrored_cost_ratio(scene, best, stages, with_part(options, share_of_search, 1).search, same_mm);
   }
-  if (cameras.isZero(0)) result.warnings.push_back(cameras_without_covariance(model.name));
-  decide(model, starts, options, result);
+  RegistrationOptions judged = options;
+  judged.camera_covariance = are_known(cameras) ? cameras : MatrixXd();
+  if (judged.camera_covariance.size() == 0) result.warnings.push_back(cameras_without_covariance(model.name));
+  decide(model, starts, judged, result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return result;
 }

@@ -136,6 +136,10 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
                             const RegistrationOptions& options);
 
 /// Covariance (mm^2) of a point of the body at a place of the world: of the pose and of the body's size.
+/// `by_scale`: of the pose's error, as in `Registration`.
+Eigen::Matrix3d point_covariance(const RigidCovariance& covariance, const RigidStep& by_scale,
+                                 double scale_sigma, const Eigen::Vector3d& centre,
+                                 const Eigen::Vector3d& in_world);
 Eigen::Matrix3d point_covariance(const Registration& registration, const Eigen::Vector3d& in_world);
 
 /// 95 % length of the error of the worst of the model's samples, mm.

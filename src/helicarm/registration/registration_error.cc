@@ -10,15 +10,18 @@ namespace helicarm::registration {
 
 using Eigen::Vector3d;
 
-Eigen::Matrix3d point_covariance(const Registration& registration, const Vector3d& in_world) {
-  const auto at = [&](const RigidCovariance& covariance) {
-    return point_covariance(covariance, registration.centre, in_world);
-  };
-  const RigidStep& step = registration.by_scale;
-  const Vector3d arm = in_world - registration.centre;
+Eigen::Matrix3d point_covariance(const RigidCovariance& covariance, const RigidStep& by_scale,
+                                 double scale_sigma, const Vector3d& centre, const Vector3d& in_world) {
+  const Vector3d arm = in_world - centre;
   // A body that is larger lies elsewhere, and its points farther out.
-  const Vector3d error = step.tail<3>() + step.head<3>().cross(arm) - registration.scale_sigma * arm;
-  return at(registration.covariance - step * step.transpose()) + error * error.transpose();
+  const Vector3d error = by_scale.tail<3>() + by_scale.head<3>().cross(arm) - scale_sigma * arm;
+  return point_covariance(RigidCovariance(covariance - by_scale * by_scale.transpose()), centre, in_world) +
+         error * error.transpose();
+}
+
+Eigen::Matrix3d point_covariance(const Registration& registration, const Vector3d& in_world) {
+  return point_covariance(registration.covariance, registration.by_scale, registration.scale_sigma,
+                          registration.centre, in_world);
 }
 
 double worst_error_mm(const Model& model, const Registration& registration) {

@@ -72,7 +72,8 @@ std::vector<Descent> first_poses(const RegistrationProblem& scene, const SearchS
                                  TellShare share) {
   std::vector<Descent> first;
   const auto add = [&](const RigidTransform& pose) { first.push_back({pose, {first.size()}}); };
-  if (starts.size() <= most_given || options.candidates == 0) std::ranges::for_each(starts, add);
+  const bool all_go = starts.size() <= most_given || options.candidates == 0;
+  if (all_go) std::ranges::for_each(starts, add);
   if (options.candidates == 0) return first;
   const auto candidates = candidates_about(scene.model(), starts, options);
   std::vector<double> scores(candidates.size());
@@ -83,7 +84,7 @@ std::vector<Descent> first_poses(const RegistrationProblem& scene, const SearchS
     done.one();
   });
   for (const std::size_t i : best_of(scene.model(), candidates, scores, stage.keep, stage.level.spacing_mm))
-    add(candidates[i]);
+    if (!all_go || i >= starts.size()) add(candidates[i]);  // the first candidates are the starts
   return first;
 }
 

@@ -33,6 +33,16 @@ class Search : public testing::Test {
   const std::vector<RegistrationView> views_ = two_views(volume_);
 };
 
+TEST_F(Search, AStartDoesNotAgreeWithItself) {
+  RegistrationProblem scene(model_, views_, 1);
+  SearchOptions options;
+  options.candidates = 1;  // the first is the start
+  const auto result =
+      search(scene, {{{false, 4}, 4}, {{false, 1}}}, {moved(2, 0, 0, 1, 1, 0)}, options, same_mm);
+  EXPECT_EQ(result.starts, 1);
+  EXPECT_EQ(result.agree, 1);
+}
+
 TEST_F(Search, PoseThatMergesWithTheBestIsNoRival) {
   const auto result = found({moved(3, 0, -2, 2, 1, 0), moved(-2, 3, 0, -1, 0, 2)}, 3);
   EXPECT_EQ(result.agree, 2);

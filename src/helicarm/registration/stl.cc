@@ -65,6 +65,9 @@ SurfaceFile text_stl(std::string_view bytes, const std::string& origin) {
       words.line();
       ended = true;
     } else if (word == "facet") {
+      if (open)
+        throw BadInput(Reason::bad_value, fmt::format("{}: facet {} has no \"endfacet\"", origin,
+                                                      file.mesh.triangles.size() + 1));
       open = true, ended = false;
       facet.clear();
     } else if (word == "vertex") {

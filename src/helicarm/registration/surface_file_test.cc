@@ -94,6 +94,18 @@ TEST(StlText, CutFileIsRefusedOrWarnedOf) {
   EXPECT_EQ(unended.warnings[0].reason, Reason::irregular_file);
 }
 
+TEST(StlText, FacetWithoutItsEndIsRefused) {
+  std::string whole = tetrahedron_text();
+  whole.erase(whole.find("endfacet"), 8);
+  EXPECT_THAT(refusal_of(whole).message, testing::HasSubstr("facet 1 has no \"endfacet\""));
+}
+
+TEST(Ply, ElementsWithoutAPropertyAreRefused) {
+  std::string header = "ply\nformat ascii 1.0\n";
+  for (int i = 0; i < 40; ++i) header += "element vertex 5000000\n";
+  EXPECT_EQ(refusal_of(header + "end_header\n").reason, Reason::bad_value);
+}
+
 TEST(StlBinary, WhoseHeaderBeginsWithSolid) {
   EXPECT_TRUE(read_all(tetrahedron_binary("solid bone")).warnings.empty());
   EXPECT_EQ(read_all(tetrahedron_binary("solid facet normal") + "x").warnings.size(), 1U);

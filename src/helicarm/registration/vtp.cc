@@ -192,7 +192,7 @@ class VtpReader {
 
   void begin_piece(const Attributes& attributes) {
     arrays_.clear();
-    points_ = count(attributes, "NumberOfPoints", most_values);
+    points_ = count(attributes, "NumberOfPoints", most_values - mesh_.corners.size());
     polygons_ = count(attributes, "NumberOfPolys", max_triangles);
     if (count(attributes, "NumberOfStrips", most_values) > 0)
       refuse(Reason::unsupported, "triangle strips; save the surface as triangles");

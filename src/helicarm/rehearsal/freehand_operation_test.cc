@@ -258,6 +258,8 @@ TEST_F(GuidedDrill, RecordSaysByWhatGuidanceEnded) {
   guide();
   repeat([&] { return take("AP"); });
   EXPECT_TRUE(operation_->measure());
+  EXPECT_EQ(operation_->guide("femur", oldest_s).error().reason, Reason::usage);
+  repeat([&] { return operation_->touch("femur notch").has_value(); });  // since the last image
   guide();
   EXPECT_TRUE(operation_->finish());
   const auto replayed = operation::replay(folder_.path() / "session");

@@ -280,5 +280,34 @@ TEST_F(StalePlanToACheckedBone, IsMadeAgainOnlyAfterTouchingTheCheckPointAgain) 
   EXPECT_EQ(touch().error().reason, Reason::residual_too_large);
 }
 
+TEST_F(StalePlanToACheckedBone, EndsWithACheckPointThatIsRefused) {
+  ASSERT_TRUE(touch());
+  virtual_or_->simulated_scene().bump_marker("femur", {3, 0, 0});
+  const robot::RobotOrder order = plan();  // to the displaced marker, which then rests
+  const Failure refused = touch().error();
+  EXPECT_EQ(refused.reason, Reason::residual_too_large) << refused.message;
+  EXPECT_EQ(operation_->check_plan(order).error().reason, Reason::residual_too_large);
+  unlock();
+  const robot::Joints before = virtual_or_->robot().truth().state.joints;
+  EXPECT_EQ(operation_->go(order, robot().confirm(order)).error().reason, Reason::residual_too_large);
+  EXPECT_EQ(virtual_or_->robot().truth().state.joints, before);
+  // A luckier touch does not begin a new operation.
+  virtual_or_->simulated_scene().bump_marker("femur", {-3, 0, 0});
+  EXPECT_EQ(touch().error().message, refused.message);
+  EXPECT_EQ(operation_->plan_order("femur").error().reason, Reason::residual_too_large);
+  ASSERT_TRUE(operation_->finish());
+  operation_.reset();
+  const auto replayed = operation::replay(folder_.path() / "session");
+  ASSERT_TRUE(replayed) << replayed.error().message;
+  EXPECT_THAT(replayed->differences, testing::IsEmpty());
+}
+
+TEST_F(StalePlanToACheckedBone, IsTouchedAfterTheLastImage) {
+  ASSERT_TRUE(touch());
+  EXPECT_TRUE(operation_->checks_to_come("femur").empty());
+  expose("AP");
+  EXPECT_EQ(operation_->checks_to_come("femur"), std::vector<std::string>{"femur notch"});
+}
+
 }  // namespace
 }  // namespace helicarm::rehearsal

@@ -48,13 +48,21 @@ std::vector<PointMark> points_of(const pipeline::Result& result, std::size_t vie
   return marks;
 }
 
+/// That the line's tunnel moves with, if it is known.
+std::optional<guidance::Bone> bone_of(const guidance::ToolLine& line, const pipeline::Result& result) {
+  const auto tunnel = std::ranges::find(result.tunnels, line.tunnel, &guidance::Tunnel::name);
+  if (tunnel == result.tunnels.end()) return std::nullopt;
+  return result.points[result.tunnel_ends[std::size_t(tunnel - result.tunnels.begin())].start].moves_with;
+}
+
 void add_lines(ViewMarks& marks, const pipeline::Result& result, std::size_t view) {
   for (const auto& [start, end] : result.tunnel_ends) {
     const auto &from = result.points[start].seen[view], &to = result.points[end].seen[view];
     if (from && to) marks.tunnels.push_back({from->uv, to->uv});
   }
   for (const guidance::ToolLine& tool : result.tool_lines)
-    if (const auto line = guidance::line_in_xray(result.views[view].calibrated->view, tool)) {
+    if (const auto line =
+            guidance::line_in_xray(pipeline::view_of_bone(result, view, bone_of(tool, result)), tool)) {
       const Vector2d beyond = 3 * (line->tip - line->back);
       marks.tool_lines.push_back({line->back - beyond, line->tip + beyond});
     }

@@ -82,7 +82,9 @@ Table bone_table(const std::vector<TunnelInBoneRow>& tunnels) {
         figure(&BoneCheck::entry_angle_deg, 0)},
        {number("Exit, °", "Angle between axis and bone surface at the exit, degrees"),
         figure(&BoneCheck::exit_angle_deg, 0)},
-       {number("Ahead, mm", "Bone ahead of a blind tunnel's end, mm"), figure(&BoneCheck::end_mm, 2)}},
+       {number("Ahead, mm", "Bone ahead of a blind tunnel's end, mm"), figure(&BoneCheck::end_mm, 2)},
+       {number("Ahead σ, mm", "Its standard deviation as drilled, with the registration, mm"),
+        figure(&BoneCheck::drilled_end_sigma_mm, 2)}},
       tunnels);
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <set>
 
 #include <Eigen/LU>
@@ -100,14 +101,17 @@ void add_narrow_joins(Segmentation& made, Parts& parts, const std::vector<std::u
 
 namespace {
 
-/// Sizes of the pieces of what reaches the threshold in one bone, in voxels that touch, also by corners.
-std::vector<std::size_t> dense_pieces(const volume::Volume& ct, const Segmentation& made, std::uint8_t label,
-                                      std::vector<bool>& seen) {
+/// Sizes of the pieces of what reaches the threshold in each bone, by its label, in voxels that touch, also
+/// by corners.
+std::map<std::uint8_t, std::vector<std::size_t>> dense_pieces(const volume::Volume& ct,
+                                                              const Segmentation& made) {
   const Eigen::Vector3i& size = made.size;
+  std::vector<bool> seen(made.labels.size(), false);
   const auto is_dense = [&](std::size_t i) {
-    return made.labels[i] == label && double(ct.voxels[i]) >= made.threshold_hu;
+    return made.labels[i] != 0 && double(ct.voxels[i]) >= made.threshold_hu;
   };
-  std::vector<std::size_t> sizes, open;
+  std::map<std::uint8_t, std::vector<std::size_t>> sizes;
+  std::vector<std::size_t> open;
   for (std::size_t first = 0; first < made.labels.size(); ++first) {
     if (seen[first] || !is_dense(first)) continue;
     std::size_t count = 0;
@@ -122,14 +126,14 @@ std::vector<std::size_t> dense_pieces(const volume::Volume& ct, const Segmentati
         for (int y = low.y(); y <= high.y(); ++y)
           for (int x = low.x(); x <= high.x(); ++x) {
             const std::size_t next = index_in(ct, {x, y, z});
-            if (seen[next] || !is_dense(next)) continue;
+            if (seen[next] || made.labels[next] != made.labels[first] || !is_dense(next)) continue;
             seen[next] = true;
             open.push_back(next);
           }
     }
-    sizes.push_back(count);
+    sizes[made.labels[first]].push_back(count);
   }
-  std::ranges::sort(sizes, std::greater());
+  for (auto& [label, of_bone] : sizes) std::ranges::sort(of_bone, std::greater());
   return sizes;
 }
 
@@ -138,9 +142,9 @@ std::vector<std::size_t> dense_pieces(const volume::Volume& ct, const Segmentati
 void add_held_by_gaps(const volume::Volume& ct, Segmentation& made) {
   constexpr double least_part = 0.05, least_cm3 = 0.5;  // of what is said
   const double voxel_cm3 = std::abs(made.patient_from_voxel.linear().determinant()) / 1000;
-  std::vector<bool> seen(made.labels.size(), false);
+  auto all_pieces = dense_pieces(ct, made);
   for (const Bone& bone : made.bones) {
-    const std::vector<std::size_t> pieces = dense_pieces(ct, made, bone.label, seen);
+    const std::vector<std::size_t>& pieces = all_pieces[bone.label];
     if (pieces.size() < 2) continue;
     const double first = double(pieces[0]) * voxel_cm3, second = double(pieces[1]) * voxel_cm3;
     if (second < std::max(least_cm3, least_part * first)) continue;

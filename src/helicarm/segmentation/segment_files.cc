@@ -105,7 +105,9 @@ Expected<SegmentAnswer> answer(const SegmentRequest& request, const pipeline::Pr
     made.of_label_map = request.label_map.has_value();
     if (request.label_map) {
       volume::Volume map = volume_of(*request.label_map, request, 0);
-      if (request.voxel_mm) map.patient_from_voxel = made.ct.patient_from_voxel;
+      // A stack has no frame of its own: a map drawn on it in another program brings that program's.
+      if (request.voxel_mm && volume::has_spacing(map, *request.voxel_mm))
+        map.patient_from_voxel = made.ct.patient_from_voxel;
       made.segmentation = value_or_throw(
           segmentation_from(made.ct, std::move(map), request.labels, request.label_map->filename().string()));
     } else {

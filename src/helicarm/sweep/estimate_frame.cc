@@ -112,10 +112,14 @@ Failure with_cause(Failure failure, const Frame& frame, const SweepCase& the_cas
   return explained ? *explained : failure;
 }
 
+bool has_distortion(const Frame& frame, const SweepCase& the_case) {
+  return the_case.base.plate || frame.view.map || frame.view.plate_image || the_case.maps;
+}
+
 Expected<xray::XrayImage> rectified_image_of(const Frame& frame, const SweepCase& the_case) {
   return guarded([&] {
     xray::XrayImage image = image_of(frame, file_of(frame, the_case));
-    if (!the_case.base.plate && !frame.view.map && !frame.view.plate_image && !the_case.maps) return image;
+    if (!has_distortion(frame, the_case)) return image;
     pipeline::RunOptions options;
     options.maps = the_case.maps;
     options.threads = 1;

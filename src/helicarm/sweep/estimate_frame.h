@@ -47,6 +47,9 @@ const xray::ImageFile* file_of(const Frame& frame, const SweepCase& the_case);
 /// diameter of the balls explains it (`pipeline::with_cause`).
 Failure with_cause(Failure failure, const Frame& frame, const SweepCase& the_case, unsigned threads);
 
+/// Whether a plate or a map of the frame, or a C-arm's record, says how its image is distorted.
+bool has_distortion(const Frame& frame, const SweepCase& the_case);
+
 /// The frame's image with rectified pixels, as its camera has them. Fails as `estimate_frame`, or with why it
 /// cannot be rectified.
 Expected<xray::XrayImage> rectified_image_of(const Frame& frame, const SweepCase& the_case);

@@ -44,7 +44,6 @@ std::optional<std::map<int, std::size_t>> labels_in(const Volume& volume) {
 }
 
 bool onto_grid(Volume& map, const Volume& ct, bool may_be_part) {
-  constexpr double same_place = 0.1;  // of a voxel
   const Eigen::Affine3d ct_from_map = ct.patient_from_voxel.inverse() * map.patient_from_voxel;
   const Eigen::Matrix3d turn = ct_from_map.linear().array().round().matrix();
   const Eigen::Vector3d first = ct_from_map.translation().array().round().matrix();
@@ -54,7 +53,7 @@ bool onto_grid(Volume& map, const Volume& ct, bool may_be_part) {
   const Eigen::Vector3d last = (map.size.cast<double>().array() - 1).matrix();
   for (int corner = 0; corner < 8; ++corner) {
     const Eigen::Vector3d at = last.cwiseProduct(Eigen::Vector3d(corner & 1, corner >> 1 & 1, corner >> 2));
-    if (!((ct_from_map * at - (turn * at + first)).cwiseAbs().maxCoeff() < same_place)) return false;
+    if (!((ct_from_map * at - (turn * at + first)).cwiseAbs().maxCoeff() < same_place_voxels)) return false;
   }
   // Between the first and the last voxel, which are corners of the CT or, of a part, lie within it.
   const Eigen::Vector3d low = first.cwiseMin(turn * last + first), high = first.cwiseMax(turn * last + first);
@@ -92,16 +91,37 @@ Expected<void> one_label(const std::map<int, std::size_t>& labels, const std::st
                                              labels.size(), list_of_labels(labels), key));
 }
 
-Expected<void> choose_label(Volume& mask, std::optional<int> label, const std::string& origin,
-                            const std::string& key) {
+Expected<void> choose_mask(Volume& mask, std::optional<int> label, std::optional<double> threshold,
+                           const std::string& origin, const std::string& key) {
+  const auto labels = labels_in(mask);
+  if (threshold && labels)
+    return fail(Reason::bad_value,
+                fmt::format("{}: holds no shares: it takes no \"{}_threshold\"", origin, key));
   if (label) {
     const auto checked = check_labels(mask, std::span(&*label, 1), origin);
     if (checked)
       for (float& voxel : mask.voxels) voxel = voxel == static_cast<float>(*label) ? 1.0F : 0.0F;
     return checked;
   }
-  const auto labels = labels_in(mask);
-  return labels ? one_label(*labels, origin, key) : Expected<void>{};
+  if (labels) return one_label(*labels, origin, fmt::format("\"{}_label\"", key));
+  const auto [least, greatest] = std::ranges::minmax(mask.voxels);
+  const auto is_whole = [](float value) { return value == std::floor(value); };
+  const bool are_shares = greatest <= 1 || std::ranges::all_of(mask.voxels, is_whole);
+  if (!(least >= 0) || !(greatest <= largest_label) || !are_shares)
+    return fail(
+        Reason::bad_value,
+        fmt::format("{}: its values, {:g} to {:g}, are neither labels nor shares; resample a label map "
+                    "by its nearest voxel, which keeps its labels",
+                    origin, least, greatest));
+  if (!threshold)
+    return fail(
+        Reason::bad_value,
+        fmt::format("{}: holds shares, as an interpolated mask: state from which one on a voxel is of "
+                    "the body with \"{}_threshold\", such as 0.5",
+                    origin, key));
+  const double whole = greatest <= 1 ? 1 : greatest <= 255 ? 255 : double(largest_label);
+  for (float& voxel : mask.voxels) voxel = double(voxel) >= *threshold * whole ? 1.0F : 0.0F;
+  return {};
 }
 
 }  // namespace helicarm::volume

@@ -28,9 +28,12 @@ Expected<void> check_labels(const Volume& map, std::span<const int> labels, cons
 Expected<void> one_label(const std::map<int, std::size_t>& labels, const std::string& origin,
                          const std::string& key);
 
-/// The mask that is meant by a volume: of the stated label, or all that is not 0 where there is one label or
-/// the volume is no label map. Fails as `check_labels` and `one_label`.
-Expected<void> choose_label(Volume& mask, std::optional<int> label, const std::string& origin,
-                            const std::string& key);
+/// The mask that is meant by a volume: of the stated label, or all that is not 0 where there is one label; of
+/// a mask of shares (0 to 1, or over 150 whole numbers up to 255 or 65535) what reaches the stated share.
+/// Refuses (bad_value) shares without one and one without shares, and values between whole numbers over 1: an
+/// interpolated label map; else fails as `check_labels` and `one_label`. `key`: "mask", whose "mask_label"
+/// and "mask_threshold" the messages name.
+Expected<void> choose_mask(Volume& mask, std::optional<int> label, std::optional<double> threshold,
+                           const std::string& origin, const std::string& key);
 
 }  // namespace helicarm::volume

@@ -70,7 +70,7 @@ TEST(LabelMap, LabelsAreCounted) {
 
 TEST(LabelMap, SeveralLabelsWithoutAChoiceAreRefused) {
   Volume map = row_of({0, 2, 2, 0, 7, 2});
-  const auto refused = choose_label(map, std::nullopt, "femur: map.nrrd", "\"mask_label\"");
+  const auto refused = choose_mask(map, std::nullopt, std::nullopt, "femur: map.nrrd", "mask");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::bad_value);
   EXPECT_EQ(refused.error().message,
@@ -79,31 +79,50 @@ TEST(LabelMap, SeveralLabelsWithoutAChoiceAreRefused) {
 
 TEST(LabelMap, OneLabelIsKept) {
   Volume map = row_of({0, 2, 2, 0, 7, 2});
-  ASSERT_TRUE(choose_label(map, 7, "map", "key"));
+  ASSERT_TRUE(choose_mask(map, 7, std::nullopt, "map", "key"));
   EXPECT_THAT(map.voxels, ElementsAre(0, 0, 0, 0, 1, 0));
 }
 
 TEST(LabelMap, AMissingLabelIsRefusedWithThoseThereAre) {
   Volume map = row_of({0, 2, 2, 0, 7, 2});
-  EXPECT_THAT(choose_label(map, 3, "map", "key").error().message, HasSubstr("no label 3, but 2 (3 voxels)"));
+  EXPECT_THAT(choose_mask(map, 3, std::nullopt, "map", "key").error().message,
+              HasSubstr("no label 3, but 2 (3 voxels)"));
   Volume empty = row_of({0, 0});
-  EXPECT_THAT(choose_label(empty, 3, "map", "key").error().message, HasSubstr("only 0"));
+  EXPECT_THAT(choose_mask(empty, 3, std::nullopt, "map", "key").error().message, HasSubstr("only 0"));
 }
 
 TEST(LabelMap, AMaskOfOneValueNeedsNoChoice) {
   Volume mask = row_of({0, 255, 255, 0});
-  ASSERT_TRUE(choose_label(mask, std::nullopt, "mask", "key"));
+  ASSERT_TRUE(choose_mask(mask, std::nullopt, std::nullopt, "mask", "key"));
   EXPECT_THAT(mask.voxels, ElementsAre(0, 255, 255, 0));
 }
 
-TEST(LabelMap, AnInterpolatedMaskIsNoLabelMap) {
+TEST(LabelMap, SharesNeedAThreshold) {
   Volume soft = row_of({0, 0.25F, 0.75F, 1});
   EXPECT_FALSE(labels_in(soft));
-  EXPECT_TRUE(choose_label(soft, std::nullopt, "mask", "key"));
-  EXPECT_EQ(choose_label(soft, 1, "mask", "key").error().reason, Reason::bad_value);
-  std::vector<float> grey(256);
-  for (std::size_t i = 0; i < grey.size(); ++i) grey[i] = float(i);
-  EXPECT_FALSE(labels_in(row_of(grey)));
+  EXPECT_EQ(choose_mask(soft, 1, std::nullopt, "mask", "key").error().reason, Reason::bad_value);
+  EXPECT_THAT(choose_mask(soft, std::nullopt, std::nullopt, "mask", "key").error().message,
+              HasSubstr("\"key_threshold\""));
+  ASSERT_TRUE(choose_mask(soft, std::nullopt, 0.5, "mask", "key"));
+  EXPECT_THAT(soft.voxels, ElementsAre(0, 0, 1, 1));
+  std::vector<float> values(256);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = float(i);
+  Volume grey = row_of(values);
+  EXPECT_FALSE(labels_in(grey));
+  ASSERT_TRUE(choose_mask(grey, std::nullopt, 0.5, "mask", "key"));
+  EXPECT_EQ(std::ranges::count(grey.voxels, 1.0F), 128);
+}
+
+TEST(LabelMap, LabelsTakeNoThreshold) {
+  Volume mask = row_of({0, 255, 255, 0});
+  EXPECT_EQ(choose_mask(mask, std::nullopt, 0.5, "mask", "key").error().reason, Reason::bad_value);
+}
+
+TEST(LabelMap, AnInterpolatedLabelMapIsRefused) {
+  Volume blurred = row_of({0, 0.5F, 1, 1.5F, 2});
+  for (const std::optional<double> threshold : {std::optional<double>(), std::optional(0.5)})
+    EXPECT_THAT(choose_mask(blurred, std::nullopt, threshold, "mask", "key").error().message,
+                HasSubstr("by its nearest voxel"));
 }
 
 }  // namespace

@@ -135,8 +135,8 @@ TEST_F(NiftiFiles, ALabelMapOfThePairIsAMask) {
   put("labels.hdr", Nifti2().header());
   auto mask = read("labels.img", stored<std::int16_t>({0, 2, 5, 2}));
   ASSERT_TRUE(mask.has_value()) << mask.error().message;
-  EXPECT_FALSE(choose_label(*mask, std::nullopt, "labels.img", "mask_label"));
-  ASSERT_TRUE(choose_label(*mask, 2, "labels.img", "mask_label"));
+  EXPECT_FALSE(choose_mask(*mask, std::nullopt, std::nullopt, "labels.img", "mask"));
+  ASSERT_TRUE(choose_mask(*mask, 2, std::nullopt, "labels.img", "mask"));
   EXPECT_THAT(mask->voxels, ElementsAre(0, 1, 0, 1));
 }
 

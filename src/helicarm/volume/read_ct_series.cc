@@ -204,11 +204,16 @@ Vector3d even_step(const std::vector<Slice>& slices, const std::string& origin) 
                   {},
                   {{"gap_mm", gaps[i]}, {"usual_mm", usual}}});
   const Vector3d step = (slices.back().corner - slices[0].corner) / static_cast<double>(slices.size() - 1);
+  const double most_aside = 2 * allowed;
   for (std::size_t i = 0; i < slices.size(); ++i) {
-    const double off = (slices[0].corner + static_cast<double>(i) * step - slices[i].corner).norm();
-    if (off > std::max(2 * allowed, 0.5 * usual))
-      throw BadInput(Reason::bad_value, fmt::format("{}: slice {} of {} is misaligned by {:.4g} mm", origin,
-                                                    i + 1, slices.size(), off));
+    const Vector3d apart = slices[i].corner - slices[0].corner - static_cast<double>(i) * step;
+    // Uneven gaps add up along the step; aside from it, where a gantry's tilt is part of it, nothing does.
+    const double along = normal.dot(apart) / normal.dot(step);
+    const double off = (apart - along * step).norm();
+    if (off > most_aside || std::abs(along) * usual > std::max(2 * allowed, 0.5 * usual))
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{}: slice {} of {} is misaligned by {:.4g} mm", origin, i + 1,
+                                 slices.size(), std::max(off, std::abs(along) * usual)));
   }
   return step;
 }
@@ -224,7 +229,8 @@ void check_rescale_type(const Slice& slice, const xray::DicomElements& elements,
                                   slice.path.string(), xray::quote(type))});
 }
 
-void decode_slice(const Slice& slice, float* voxels, std::vector<Warning>& warnings) {
+/// Whether the slice states how its values become Hounsfield units.
+bool decode_slice(const Slice& slice, float* voxels, std::vector<Warning>& warnings) {
   const std::string origin = slice.path.string();
   const std::string read = slice.held ? "" : value_or_throw(read_file(slice.path, most_slice_bytes));
   const std::string_view bytes = slice.held ? *slice.held : read;
@@ -232,17 +238,22 @@ void decode_slice(const Slice& slice, float* voxels, std::vector<Warning>& warni
   if (outline.columns != slice.columns || outline.rows != slice.rows)
     throw BadInput(Reason::bad_size, origin + ": changed while it was read");
   check_rescale_type(slice, outline.elements, warnings);
-  const double slope =
-      outline.elements.numbers(xray::tags::rescale_slope, 1, -1e6, 1e6).value_or(std::vector{1.0})[0];
+  const auto stated_slope = outline.elements.numbers(xray::tags::rescale_slope, 1, -1e6, 1e6);
+  const auto stated_shift = outline.elements.numbers(xray::tags::rescale_intercept, 1, -1e6, 1e6);
+  if (stated_slope.has_value() != stated_shift.has_value())
+    outline.elements.refuse(Reason::bad_value,
+                            stated_slope ? xray::tags::rescale_intercept : xray::tags::rescale_slope,
+                            "is missing beside the other of the two");
+  const double slope = stated_slope ? stated_slope->front() : 1,
+               shift = stated_shift ? stated_shift->front() : 0;
   if (!(slope > 0))
     outline.elements.refuse(
         Reason::bad_value, xray::tags::rescale_slope,
         fmt::format("is {:g}, must be over 0: a CT's values rise with the density", slope));
-  const double shift =
-      outline.elements.numbers(xray::tags::rescale_intercept, 1, -1e6, 1e6).value_or(std::vector{0.0})[0];
   const image::Image<float> pixels = value_or_throw(xray::decode_frame(outline, 0));
   for (const float pixel : pixels.pixels())
     *voxels++ = static_cast<float>(slope * static_cast<double>(pixel) + shift);
+  return stated_slope.has_value();
 }
 
 std::vector<Slice>& largest_of(FolderOfSlices& found, const std::string& origin,
@@ -277,8 +288,20 @@ Volume volume_of(std::vector<Slice>& slices, const std::string& origin) {
   volume.patient_from_voxel.translation() = slices[0].corner;
   volume.voxels.resize(count);
   const std::size_t area = count / slices.size();
+  std::size_t without = 0;
   for (std::size_t i = 0; i < slices.size(); ++i)
-    decode_slice(slices[i], volume.voxels.data() + i * area, volume.warnings);
+    if (!decode_slice(slices[i], volume.voxels.data() + i * area, volume.warnings)) ++without;
+  if (without > 0 && without < slices.size())
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: {} of {} slices state no Rescale Slope and Intercept (0028,1053 and "
+                               "0028,1052): their values are not known in Hounsfield units",
+                               origin, without, slices.size()));
+  if (without > 0)
+    volume.warnings.push_back(
+        {Reason::irregular_file,
+         fmt::format("{}: no slice states Rescale Slope and Intercept (0028,1053 and 0028,1052): the stored "
+                     "values are taken as Hounsfield units",
+                     origin)});
   return volume;
 }
 

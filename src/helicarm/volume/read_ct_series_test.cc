@@ -61,6 +61,32 @@ TEST_F(CtSeries, MissingOrDuplicateSliceIsRefusedWithFigures) {
   EXPECT_EQ(read().error().reason, Reason::bad_value);
 }
 
+TEST_F(CtSeries, SlicesBesideTheirStackAreRefusedATiltedStackIsNot) {
+  const auto beside = [](int i, double y) {
+    return slice(2.5 * i).text(0x00200032, "DS", fmt::format("-3\\{}\\{}", y, 2.5 * i));
+  };
+  for (int i = 0; i < 6; ++i) put(beside(i, 4 - 0.8 * i));  // a gantry's tilt
+  EXPECT_TRUE(read().has_value()) << read().error().message;
+  fs::remove_all(folder_);
+  for (int i = 0; i < 6; ++i) put(beside(i, i < 3 ? 4 : 5.6));  // two blocks
+  ASSERT_FALSE(read().has_value());
+  EXPECT_THAT(read().error().message, testing::HasSubstr("misaligned"));
+}
+
+TEST_F(CtSeries, SlicesThatDoNotStateTheirRescaleAreNotMixedWithOthers) {
+  for (int i = 0; i < 3; ++i) put(slice(i));
+  put(slice(3).erase(0x00281052).erase(0x00281053));
+  ASSERT_FALSE(read().has_value());
+  EXPECT_THAT(read().error().message, testing::HasSubstr("1 of 4 slices"));
+  fs::remove_all(folder_);
+  for (int i = 0; i < 3; ++i) put(slice(i).erase(0x00281052).erase(0x00281053));
+  ASSERT_TRUE(read().has_value());
+  EXPECT_THAT(read()->warnings.at(0).message, testing::HasSubstr("taken as Hounsfield units"));
+  fs::remove_all(folder_);
+  for (int i = 0; i < 3; ++i) put(slice(i).erase(0x00281052));
+  EXPECT_EQ(read().error().reason, Reason::bad_value);
+}
+
 TEST_F(CtSeries, AMissingThinSliceIsRefused) {
   for (const int i : {0, 1, 2, 4, 5}) put(slice(0.06 * i));
   const auto gap = read();

@@ -56,6 +56,11 @@ Expected<Volume> tiff_stack(const std::filesystem::path& path, const Eigen::Vect
                        fmt::format("{}: page {} has {} x {} pixels, the first {} x {}", origin, page + 1,
                                    size.x(), size.y(), stack.size.x(), stack.size.y()));
       stack.size = size;
+      if (page == 0 && slice.white_is_zero)
+        stack.warnings.push_back(
+            {Reason::irregular_file, fmt::format("{}: declares that 0 is white, which is of its display: the "
+                                                 "stored values are taken, not inverted",
+                                                 origin)});
       for (const std::uint16_t value : slice.pixels.pixels())
         stack.voxels.push_back(static_cast<float>(value + offset_hu));
     }

@@ -33,6 +33,22 @@ Expected<std::size_t> voxel_count(const Eigen::Vector3d& size, const std::string
   return static_cast<std::size_t>(count);
 }
 
+bool has_spacing(const Volume& volume, const Eigen::Vector3d& voxel_mm) {
+  const Eigen::Vector3d spacing = volume.patient_from_voxel.linear().colwise().norm();
+  return spacing.isApprox(voxel_mm, 1e-3);
+}
+
+bool is_same_grid(const Volume& volume, const Volume& other) {
+  if (volume.size != other.size) return false;
+  const Eigen::Affine3d there = other.patient_from_voxel.inverse() * volume.patient_from_voxel;
+  const Eigen::Vector3d last = (volume.size.cast<double>().array() - 1).matrix();
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d at = last.cwiseProduct(Eigen::Vector3d(corner & 1, corner >> 1 & 1, corner >> 2));
+    if (!((there * at - at).cwiseAbs().maxCoeff() < same_place_voxels)) return false;
+  }
+  return true;
+}
+
 Expected<void> check_grid(const Eigen::Affine3d& patient_from_voxel, const std::string& origin) {
   if (!patient_from_voxel.matrix().allFinite())
     return fail(Reason::not_finite, fmt::format("{}: the voxels' positions are not finite", origin));

@@ -16,6 +16,9 @@ namespace helicarm::volume {
 inline constexpr int max_volume_side = 16384;
 inline constexpr std::size_t max_volume_bytes = std::size_t{1} << 31;
 
+/// Voxels of two volumes lie at the same place.
+inline constexpr double same_place_voxels = 0.1;
+
 /// A CT or another voxel volume. Patient frame: L, P, S (x left, y posterior, z superior), mm.
 struct Volume {
   Eigen::Vector3i size = Eigen::Vector3i::Zero();
@@ -28,6 +31,12 @@ struct Volume {
     return patient_from_voxel * (0.5 * (size.cast<double>().array() - 1)).matrix();
   }
 };
+
+/// Whether the distances of neighbouring voxels are these, mm, within 0.1 %.
+bool has_spacing(const Volume& volume, const Eigen::Vector3d& voxel_mm);
+
+/// Whether the voxels are as many, and each lies where the other's is, within 0.1 voxel.
+bool is_same_grid(const Volume& volume, const Volume& other);
 
 /// Number of voxels for a size from a file. Refuses (bad_size) a side outside 1 .. 16384 and a total above
 /// the memory limit. `origin` begins the message.

@@ -2,6 +2,7 @@
 #include "helicarm/xray/dataset_writing.h"
 
 #include <algorithm>
+#include <array>
 #include <ctime>
 
 #include <dcmtk/config/osconfig.h>
@@ -11,7 +12,6 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/private_files.h"
 #include "helicarm/xray/dicom_tags.h"
-#include "helicarm/xray/dicom_time.h"
 #include "helicarm/xray/uid.h"
 
 namespace helicarm::xray {
@@ -59,10 +59,23 @@ std::string own_text(const PatientStudy& patient_study, std::string text) {
   return text;
 }
 
+namespace {
+
+/// YYYYMMDDHHMMSS here, as the study's times are without Timezone Offset From UTC (0008,0201).
+std::string local_date_time() {
+  const std::time_t now = std::time(nullptr);
+  std::tm here{};
+  localtime_r(&now, &here);
+  std::array<char, 16> text{};
+  return {text.data(), std::strftime(text.data(), text.size(), "%Y%m%d%H%M%S", &here)};
+}
+
+}  // namespace
+
 void put_object(DcmDataset& dataset, const char* sop_class, const std::string& modality,
                 const std::string& content, const PatientStudy& patient_study) {
   const std::string key = text_key(content);
-  const std::string now = dicom_date_time(double(std::time(nullptr)));
+  const std::string now = local_date_time();
   put_in(dataset, DCM_SOPClassUID, sop_class);
   put_in(dataset, DCM_SOPInstanceUID, uid_of(key));
   put_in(dataset, DCM_SeriesInstanceUID, uid_of(text_key(key + " series")));

@@ -40,11 +40,14 @@ std::string why_no_spacing(const fs::path& path) {
       other ? fmt::format("; {} beside it is another kind of file", other->filename().string()) : "");
 }
 
-XrayImage xray_image_of(const image::GreyImage& grey_image, const fs::path& path) {
+/// `highest`: value of its scale; nothing: by the bits that its pixels use.
+XrayImage xray_image_of(const image::GreyImage& grey_image, const fs::path& path,
+                        std::optional<float> highest = {}) {
   XrayImage xray_image;
   xray_image.pixels = image::Image<float>(grey_image.pixels.width(), grey_image.pixels.height());
   std::ranges::copy(grey_image.pixels.pixels(), xray_image.pixels.pixels().begin());
-  xray_image.highest = grey_image.bits == 8 ? 255 : highest_grey(xray_image.pixels);
+  xray_image.highest = highest ? *highest : grey_image.bits == 8 ? 255 : highest_grey(xray_image.pixels);
+  if (grey_image.white_is_zero) invert(xray_image);
   const std::string origin = path.filename().string();
   xray_image.warnings.push_back({Reason::spacing_missing, why_no_spacing(path)});
   if (std::abs(grey_image.pixel_aspect - 1) > square_tolerance)
@@ -101,8 +104,7 @@ image::GreyImage grey_image_of(std::string_view bytes, FileKind kind, int page, 
 XrayImage image_of_film(const Film& film, const fs::path& path, std::optional<int> frame) {
   const std::string origin = path.filename().string();
   const int index = value_or_throw(choose_frame(origin, film.frames(), frame));
-  XrayImage xray_image = xray_image_of(film.read(index), path);
-  xray_image.highest = float((1 << film.bits()) - 1);
+  XrayImage xray_image = xray_image_of(film.read(index), path, float((1 << film.bits()) - 1));
   if (const auto loss = film.loss())
     xray_image.warnings.push_back({Reason::lossy_image, fmt::format("{}: {}", origin, *loss)});
   return xray_image;

@@ -71,7 +71,7 @@ bool exceeds_cr(const Acquisition& a) {
 SopClass class_of(const DerivedImage& image) {
   const Acquisition& a = image.acquisition;
   const auto found = std::ranges::find(sop_classes, a.modality, &SopClass::modality);
-  if (found == sop_classes.end() || (found->modality == dx.modality && !a.pixel_mm) ||
+  if (found == sop_classes.end() || (found->modality == dx.modality && (!a.pixel_mm || !a.logarithmic)) ||
       (found->modality == "CR" && exceeds_cr(a)))
     return xa;
   return *found;
@@ -244,8 +244,7 @@ void put_digital(DcmDataset& dataset, const DerivedImage& image) {
   put(dataset, DCM_PresentationLUTShape, "IDENTITY");
   put(dataset, DCM_WindowCenter, decimal(levels / 2));
   put(dataset, DCM_WindowWidth, decimal(levels));
-  const auto& logarithmic = image.acquisition.logarithmic;
-  put(dataset, DCM_PixelIntensityRelationship, logarithmic.value_or(true) ? "LOG" : "LIN");
+  put(dataset, DCM_PixelIntensityRelationship, *image.acquisition.logarithmic ? "LOG" : "LIN");
   must(dataset.putAndInsertSint16(DCM_PixelIntensityRelationshipSign, 1), "sign");
 }
 

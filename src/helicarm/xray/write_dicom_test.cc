@@ -135,9 +135,18 @@ TEST_F(WriteDicom, ModalityIsKept) {
     DerivedImage image = grey_image(12);
     image.acquisition.modality = modality;
     image.acquisition.pixel_mm = Eigen::Vector2d(0.2, 0.3);
+    if (image.acquisition.modality == "DX") image.acquisition.logarithmic = true;
     ASSERT_TRUE(write_dicom(folder_ / "a.dcm", image));
     EXPECT_EQ(read_xray_image(folder_ / "a.dcm", "AP", {})->acquisition.modality, modality);
   }
+}
+
+TEST_F(WriteDicom, WhatGreyValuesAreOfIsNotInvented) {
+  DerivedImage image = grey_image(12);
+  image.acquisition.modality = "DX";
+  image.acquisition.pixel_mm = Eigen::Vector2d(0.2, 0.3);
+  ASSERT_TRUE(write_dicom(folder_ / "a.dcm", image));
+  EXPECT_FALSE(read_xray_image(folder_ / "a.dcm", "AP", {})->acquisition.logarithmic);
 }
 
 TEST_F(WriteDicom, DoseTableUndoesTheLogarithm) {
