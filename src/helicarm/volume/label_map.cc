@@ -50,11 +50,9 @@ bool onto_grid(Volume& map, const Volume& ct, bool may_be_part) {
   if (!(turn.cwiseAbs() * Eigen::Vector3d::Ones()).isOnes() ||
       !(turn.cwiseAbs().transpose() * Eigen::Vector3d::Ones()).isOnes())
     return false;
+  const Volume there{map.size, {}, ct.patient_from_voxel * (Eigen::Translation3d(first) * turn), {}};
+  if (!is_same_grid(map, there)) return false;
   const Eigen::Vector3d last = (map.size.cast<double>().array() - 1).matrix();
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d at = last.cwiseProduct(Eigen::Vector3d(corner & 1, corner >> 1 & 1, corner >> 2));
-    if (!((ct_from_map * at - (turn * at + first)).cwiseAbs().maxCoeff() < same_place_voxels)) return false;
-  }
   // Between the first and the last voxel, which are corners of the CT or, of a part, lie within it.
   const Eigen::Vector3d low = first.cwiseMin(turn * last + first), high = first.cwiseMax(turn * last + first);
   const Eigen::Vector3d end = (ct.size.cast<double>().array() - 1).matrix();

@@ -39,6 +39,7 @@ bool has_spacing(const Volume& volume, const Eigen::Vector3d& voxel_mm) {
 }
 
 bool is_same_grid(const Volume& volume, const Volume& other) {
+  constexpr double same_place_voxels = 0.1;
   if (volume.size != other.size) return false;
   const Eigen::Affine3d there = other.patient_from_voxel.inverse() * volume.patient_from_voxel;
   const Eigen::Vector3d last = (volume.size.cast<double>().array() - 1).matrix();

@@ -16,9 +16,6 @@ namespace helicarm::volume {
 inline constexpr int max_volume_side = 16384;
 inline constexpr std::size_t max_volume_bytes = std::size_t{1} << 31;
 
-/// Voxels of two volumes lie at the same place.
-inline constexpr double same_place_voxels = 0.1;
-
 /// A CT or another voxel volume. Patient frame: L, P, S (x left, y posterior, z superior), mm.
 struct Volume {
   Eigen::Vector3i size = Eigen::Vector3i::Zero();
